@@ -75,7 +75,7 @@ def estimate(run: Execution) -> Estimate:
         True,
         max((abs(one - other) for one, other in pairs), default=None),
         {name: abs(a.state[name] - b.state[name]) for name in a.state} if comparable else None,
-        _largest(run, finer, float(errors.late[-1]) if len(errors.late) else 0.0),
+        _largest(run, finer, float(errors.time_errors[-1]) if len(errors.time_errors) else 0.0),
     )
 
 

@@ -41,7 +41,7 @@ def _runtime() -> ctypes.CDLL:
     library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
     library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
     library.hs_sample.argtypes, library.hs_sample.restype = (ctypes.c_void_p,), ctypes.c_int64
-    library.hs_look.argtypes, library.hs_look.restype = (ctypes.c_void_p,) * 3, ctypes.c_int64
+    library.hs_screen_run.argtypes, library.hs_screen_run.restype = (ctypes.c_void_p,) * 3, ctypes.c_int64
     library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
     return library
 

@@ -69,11 +69,11 @@ Sampling, Ensemble = STRUCTURES["hs_sampling"], STRUCTURES["hs_ensemble"]
 Operation, Formula, Formulas = (STRUCTURES[name] for name in ("hs_operation", "hs_formula", "hs_formulas"))
 Record, Screen, Correction = (STRUCTURES[f"hs_{name}"] for name in ("record", "screen", "correction"))
 ARC, TRANSITION, NOTE = (np.dtype(STRUCTURES[name]) for name in ("hs_arc", "hs_transition", "hs_note"))
-METHOD_KINDS, INTERPOLANTS, KINDS, SCHEMES, NOTICES, REASONS, FAILURES, OPERATORS, DOUBTS = (
+METHOD_KINDS, INTERPOLANTS, KINDS, SCHEMES, NOTICES, REASONS, FAILURES, OPERATORS, HYPOTHESES = (
     ENUMERATIONS[f"hs_{name}"]
     for name in (
         *("method_kind", "interpolant", "arc_kind", "scheme", "notice"),
-        *("reason", "step_failure", "operator", "doubt"),
+        *("reason", "step_failure", "operator", "hypothesis"),
     )
 )
 

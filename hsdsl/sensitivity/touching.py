@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.judged import closed_in, has_condition
+from hsdsl.simulate.verdict.near_surface import has_condition, rising_zero
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 
@@ -25,19 +25,21 @@ def touched(run: RunView) -> Iterator[tuple[Number, str]]:
         for i, (before, after) in enumerate(pairwise(rates)):
             for k in range(count):
                 if before[k] > 0 >= after[k]:
-                    yield from _turning(run, run.between(arc, arc.first + i), arc.first + i + 1, k)
+                    yield from _turning(run, run.dense_output(arc, arc.first + i), arc.first + i + 1, k)
 
 
 def _rates(place: Place, count: int) -> list[Number]:
     return [place.rate(k) for k in range(count)]
 
 
-def _turning(run: RunView, look: Callable[[Number], Place], row: int, k: int) -> Iterator[tuple[Number, str]]:
+def _turning(run: RunView, along: Callable[[Number], Place], row: int, k: int) -> Iterator[tuple[Number, str]]:
     """Look at a surface where it turns back on a step."""
     try:
-        place = closed_in(look, lambda place: -place.rate(k))
-        shift, below = run.shift(place, k, row), -place.value(k)
-        if has_condition(place, k) and place.conditions(k, run.error(place, row), run.late(place, k, row)) == {False}:
+        place = rising_zero(along, lambda place: -place.rate(k))
+        shift, below = run.surface_error(place, k, row), -place.value(k)
+        if has_condition(place, k) and place.conditions(
+            k, run.error(place, row), run.safe_time_error(place, k, row)
+        ) == {False}:
             return
     except DOMAIN_ERRORS:
         return

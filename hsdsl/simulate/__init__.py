@@ -19,7 +19,7 @@
 `run`                   a problem under way, and the state of its mode
 `recorder`              rows, arcs and transitions, and the execution's columns
 `stops`                 how runs end; `standstill` says why one cannot go on
-`diagnostics`           departures from the theorem, and doubts
+`diagnostics`           departures from the theorem, and what is undecided
 `plan`                  a problem ready to run; the two engines
 `refinement`            the settings of the finer run that errors are measured by
 `result`                what was recorded or written, as an execution

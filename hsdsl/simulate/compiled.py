@@ -58,7 +58,7 @@ class CompiledPlan:
         self._mode, self._x = problem.mode, np.array(problem.x, np.float64)
         self._start = len(problem.x), self._x.ctypes.data
         self.until, self.memory = settings.until, settings.memory
-        self.of_screens: dict[bool, Any] = {}  # those of its runs, by whether they are held against companions
+        self.of_screens: dict[bool, Any] = {}  # those of its runs, by whether they are held against shadow runs
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
     def lay(self, workspace: Workspace) -> None:

@@ -1,6 +1,6 @@
-"""Departures and doubts of a run, in sentences, and how it ends where transitions go on without end.
+"""Departures and undecided points of a run, in sentences, and how it ends where transitions go on without end.
 
-A departure is where a run left what the theorem is about, a doubt what could not be checked.
+A departure is where a run left what the theorem is about, undecided what could not be checked.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Diagnostics:
     """What a run says of itself besides its transitions; of one kind only the first is kept."""
 
     departures: list[str] = field(default_factory=list[str])
-    doubts: list[str] = field(default_factory=list[str])
+    undecided: list[str] = field(default_factory=list[str])
     _noted: set[object] = field(default_factory=set[object])
     _moved: dict[str, tuple[int, Number, Number]] = field(default_factory=dict[str, tuple[int, Number, Number]])
 
@@ -86,7 +86,7 @@ class Diagnostics:
         """A crossing was found on a piece of a surface that is no polynomial."""
         if (mode, k) not in self._noted:
             self._noted.add((mode, k))
-            self.doubts.append(f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}")
+            self.undecided.append(f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}")
 
 
 def slides(edge: str, source: ModeProgram, target: ModeProgram, t: Number) -> Stop:

@@ -98,7 +98,7 @@ def _assessment_of(
 
 @cache
 def _of_compiled() -> Callable[..., Verdict]:
-    from hsdsl.simulate.verdict.clear import assess_compiled  # not every run needs one
+    from hsdsl.simulate.verdict.compiled_verdict import assess_compiled  # not every run needs one
 
     return assess_compiled
 

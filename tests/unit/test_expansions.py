@@ -35,7 +35,7 @@ HS_EXPORT void enclose(int degree, const double *coefficients, double start, dou
   hs_expansion around[2], slope;
   hs_screen s = {.run = {.rows = 2, .width = 1, .degree = degree, .times = times, .values = coefficients,
                          .pieces = coefficients + 1}};
-  hs_view v = {.s = &s, .n = 1, .cut = &cut, .range = range, .around = around, .slopes = &slope, .own = &none};
+  hs_view v = {.s = &s, .n = 1, .cut = &cut, .range = range, .around = around, .slopes = &slope, .mode_error = &none};
   take_step(&v, 0);
   expand_cut(&v, 0);
   set_expanded_part(&v, 0, start, width, 0.0);
@@ -72,7 +72,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def along(a: Any, share: Any) -> Any:
-    """The values of a function that is ``share`` of its rest away from its polynomial."""
+    """The values of a function that is ``share`` of its remainder away from its polynomial."""
     return a[0] + U * (a[1] + U * (a[2] + U * a[3])) + share * a[4]
 
 
@@ -102,7 +102,7 @@ def test_no_value_is_further_away_than_the_rest(name: str, compiled: Any) -> Non
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_both_languages_expand_alike(name: str, compiled: Any) -> None:
     rng = np.random.default_rng(11)
-    hidden = 0
+    unresolved = 0
     for _ in range(200):
         size = 10.0 ** rng.uniform(-2, 0.5)
         numbers = rng.normal(size=(2, 7)) * size ** np.array([0, 1, 2, 3, 4, 4, 1])
@@ -112,9 +112,11 @@ def test_both_languages_expand_alike(name: str, compiled: Any) -> None:
         compiled.expand_one(structures.OPERATORS.index(name), POWER, a, b, found)
         with np.errstate(all="ignore"):
             same = IN_PYTHON[name](*(expansions.Expansion(each[:4, None], *each[4:, None]) for each in numbers))
-        assert [*same.terms.ravel(), same.rest, same.hidden, same.moved] == pytest.approx([*found], rel=1e-6, abs=1e-12)
-        hidden += 0 < found[5] < np.inf
-    assert hidden >= 20
+        assert [*same.terms.ravel(), same.remainder, same.unresolved, same.error] == pytest.approx(
+            [*found], rel=1e-6, abs=1e-12
+        )
+        unresolved += 0 < found[5] < np.inf
+    assert unresolved >= 20
 
 
 @pytest.mark.parametrize("width", [1e-1, 1e-3, 1e-6])

@@ -16,7 +16,7 @@ from engines import needs_compiler
 import hsdsl
 from hsdsl.simulate import verdict
 from hsdsl.simulate.diagnostics import Diagnostics
-from hsdsl.simulate.verdict import RunView, assess, clear, run_view
+from hsdsl.simulate.verdict import RunView, assess, compiled_verdict, run_view
 from hsdsl.simulate.verdict.screen import Screen, screened
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +82,7 @@ def both(loaded: Any, method: str, tolerance: float, **parameters: float) -> tup
     """The verdict of a run, and that without a screen."""
     found = run_of(loaded, method, tolerance, **parameters).verdict
     with (
-        patch.object(clear, "screens_of", return_value=None),
+        patch.object(compiled_verdict, "screens_of", return_value=None),
         patch.object(run_view, "screened", return_value=None),
         patch.object(verdict, "is_compiled", return_value=False),
     ):
@@ -119,7 +119,7 @@ def test_findings_of_small_flows_are_the_same(name: str, method: str, tolerance:
 
 def test_a_pulse_between_stages_is_found() -> None:
     run = run_of(model(*FLOWS["pulse"]), "taylor", 1e-6)
-    assert screen_of(run).doubts("flow change")
+    assert screen_of(run).undecided("flow change")
     assert any(reason.startswith(UNSEEN) for reason in run.verdict.reasons)
 
 
@@ -162,9 +162,9 @@ def test_how_polynomials_swing_around_the_flow_is_no_pulse(method: str, toleranc
     assert found.theorem == "holds"
 
 
-def test_a_clear_run_has_no_doubts() -> None:
+def test_of_a_clear_run_nothing_is_undecided() -> None:
     screen = screen_of(run_of(model("y", "-x + cos(2*t)"), "taylor", 1e-9))
-    assert not screen.doubts()
+    assert not screen.undecided()
     assert screen.margins.crossed == 0
 
 
@@ -189,7 +189,7 @@ def test_a_screen_reads_no_further_than_its_columns() -> None:
 def test_ties_that_commute_need_no_closer_look():
     run = run_of(hsdsl.load(ROOT / "models/pronking-runner.yaml"), "taylor", 1e-9)
     screen = screen_of(run)
-    assert screen.commuting and not screen.doubts()
+    assert screen.commuting and not screen.undecided()
 
 
 @needs_compiler

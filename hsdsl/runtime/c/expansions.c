@@ -1,57 +1,59 @@
 /* Routines along a part of a step: up to third order around its middle, and how far they may be from that. See
    hsdsl/expansions.py.
 
-   An expansion is a function of u from -1 to 1, no further from value + first u + second u**2 + third u**3 than `rest`;
+   An expansion is a function of u from -1 to 1, no further from value + first u + second u**2 + third u**3 than
+   `remainder`;
    that is infinite where nothing is known. What is added to it for rounding is far more than rounding does, that of C's
    library too. An operation is resolved where what it makes beyond third order is no more than an eighth of its terms:
-   its result is as smooth as the part is long. `hidden` is what others may add. `moved` is how much the errors of
+   its result is as smooth as the part is long. `unresolved` is what others may add. `error` is how much the errors of
    states change the result, where no terms cancel. */
 
 #include "roundoff.c"
 
-#define EXPANDED 0x1p-48 /* of all terms together: more than rounding makes of a coefficient */
+#define EXPANSION_ROUNDOFF 0x1p-48 /* of all terms together: more than rounding makes of a coefficient */
 #define RESOLVED 8       /* terms are so many times what is beyond them; what moves a state by so many errors is seen */
 
 typedef struct {
-  double value, first, second, third, rest, hidden, moved;
+  double value, first, second, third, remainder, unresolved, error;
 } hs_expansion;
 
 static const hs_expansion anything = {0.0, 0.0, 0.0, 0.0, INFINITY, INFINITY, 0.0};
 
-HS_INLINE hs_expansion expansion(double value, double first, double second, double third, double rest, double hidden,
-                                 double moved) {
-  const hs_expansion found = {value, first, second, third, rest, hidden, moved};
-  return rest <= DBL_MAX ? found : anything;
+HS_INLINE hs_expansion expansion(double value, double first, double second, double third, double remainder,
+                                 double unresolved, double error) {
+  const hs_expansion found = {value, first, second, third, remainder, unresolved, error};
+  return remainder <= DBL_MAX ? found : anything;
 }
 
 HS_INLINE hs_expansion constant_expansion(double value) {
-  return expansion(value, 0.0, 0.0, 0.0, fabs(value) * EXPANDED, 0.0, 0.0);
+  return expansion(value, 0.0, 0.0, 0.0, fabs(value) * EXPANSION_ROUNDOFF, 0.0, 0.0);
 }
 
 /* How far its polynomial may be from its value, itself, and how far from zero. */
-HS_INLINE double turn(hs_expansion a) { return fabs(a.first) + fabs(a.second) + fabs(a.third); }
-HS_INLINE double reach(hs_expansion a) { return turn(a) + a.rest; }
-HS_INLINE double size_of(hs_expansion a) { return fabs(a.value) + reach(a); }
+HS_INLINE double variation(hs_expansion a) { return fabs(a.first) + fabs(a.second) + fabs(a.third); }
+HS_INLINE double deviation(hs_expansion a) { return variation(a) + a.remainder; }
+HS_INLINE double size_of(hs_expansion a) { return fabs(a.value) + deviation(a); }
 
-/* What is hidden in the result of an operation with so large terms that makes `beyond` and leaves out `off`: where it
+/* What is unresolved in the result of an operation with so large terms that makes `beyond` and leaves out `off`: where it
    is resolved, what its operands hide. */
-HS_INLINE double hidden_in(double beyond, double terms, double hidden, double off) {
-  return beyond * RESOLVED <= terms ? hidden : off;
+HS_INLINE double unresolved_in(double beyond, double varies, double unresolved, double off) {
+  return beyond * RESOLVED <= varies ? unresolved : off;
 }
 
 HS_INLINE hs_expansion expanded_sum(hs_expansion a, hs_expansion b) {
   return expansion(a.value + b.value, a.first + b.first, a.second + b.second, a.third + b.third,
-                   a.rest + b.rest + (size_of(a) + size_of(b)) * EXPANDED, a.hidden + b.hidden, a.moved + b.moved);
+                   a.remainder + b.remainder + (size_of(a) + size_of(b)) * EXPANSION_ROUNDOFF, a.unresolved + b.unresolved,
+                   a.error + b.error);
 }
 
 HS_INLINE hs_expansion expanded_multiple(hs_expansion a, double by) {
-  const double rest = (a.rest + size_of(a) * EXPANDED) * fabs(by);
-  return expansion(a.value * by, a.first * by, a.second * by, a.third * by, rest, a.hidden * fabs(by),
-                   a.moved * fabs(by));
+  const double remainder = (a.remainder + size_of(a) * EXPANSION_ROUNDOFF) * fabs(by);
+  return expansion(a.value * by, a.first * by, a.second * by, a.third * by, remainder, a.unresolved * fabs(by),
+                   a.error * fabs(by));
 }
 
 HS_INLINE hs_expansion negated(hs_expansion a) {
-  const hs_expansion found = {-a.value, -a.first, -a.second, -a.third, a.rest, a.hidden, a.moved};
+  const hs_expansion found = {-a.value, -a.first, -a.second, -a.third, a.remainder, a.unresolved, a.error};
   return found;
 }
 
@@ -63,25 +65,27 @@ HS_INLINE double higher(hs_expansion a, hs_expansion b) {
 
 HS_INLINE hs_expansion expanded_product(hs_expansion a, hs_expansion b) {
   const double size = size_of(a), other = size_of(b), beyond = higher(a, b);
-  const double terms = turn(a) * (fabs(b.value) + turn(b)) + fabs(a.value) * turn(b) - beyond;
-  const double off = beyond + a.rest * other + b.rest * (size - a.rest), hidden = a.hidden * other + b.hidden * size;
+  const double varies = variation(a) * (fabs(b.value) + variation(b)) + fabs(a.value) * variation(b) - beyond;
+  const double off = beyond + a.remainder * other + b.remainder * (size - a.remainder);
+  const double unresolved = a.unresolved * other + b.unresolved * size;
   return expansion(a.value * b.value, a.value * b.first + a.first * b.value,
                    a.value * b.second + a.first * b.first + a.second * b.value,
                    a.value * b.third + a.first * b.second + a.second * b.first + a.third * b.value,
-                   off + size * other * EXPANDED, hidden_in(beyond, terms, hidden, off),
-                   fabs(a.value) * b.moved + a.moved * fabs(b.value));
+                   off + size * other * EXPANSION_ROUNDOFF, unresolved_in(beyond, varies, unresolved, off),
+                   fabs(a.value) * b.error + a.error * fabs(b.value));
 }
 
 /* A function with the coefficients c around an expansion's value; `further` bounds its powers from the fourth on. */
 HS_INLINE hs_expansion composed(hs_expansion a, const double c[4], double further) {
-  const double by = reach(a), one = fabs(a.first), slope = fabs(c[1]), bend = fabs(c[2]), twist = fabs(c[3]);
-  const double terms = by * (slope + by * (bend + by * twist));
+  const double by = deviation(a), one = fabs(a.first), slope = fabs(c[1]), bend = fabs(c[2]), twist = fabs(c[3]);
+  const double varies = by * (slope + by * (bend + by * twist));
   const double beyond = bend * (by * by - one * (one + 2 * fabs(a.second))) + twist * (by * by * by - one * one * one) +
-                        further, off = slope * a.rest + beyond;
-  const double hidden = a.hidden * (slope + by * (2 * bend + 3 * by * twist));
+                        further, off = slope * a.remainder + beyond;
+  const double unresolved = a.unresolved * (slope + by * (2 * bend + 3 * by * twist));
   return expansion(c[0], c[1] * a.first, c[1] * a.second + c[2] * a.first * a.first,
                    c[1] * a.third + a.first * (2 * c[2] * a.second + c[3] * a.first * a.first),
-                   off + (fabs(c[0]) + terms) * EXPANDED, hidden_in(beyond, terms, hidden, off), slope * a.moved);
+                   off + (fabs(c[0]) + varies) * EXPANSION_ROUNDOFF, unresolved_in(beyond, varies, unresolved, off),
+                   slope * a.error);
 }
 
 /* What the fourth derivative of a function makes of it, that being at most `most`. */
@@ -94,31 +98,31 @@ HS_INLINE double geometric(double share) {
 
 static hs_expansion expanded_reciprocal(hs_expansion a) {
   const double v = 1 / a.value, c[4] = {v, -v * v, v * v * v, -v * v * v * v};
-  return composed(a, c, fabs(v) * geometric(reach(a) * fabs(v)));
+  return composed(a, c, fabs(v) * geometric(deviation(a) * fabs(v)));
 }
 
 /* Of the binomials of 1/2 the fourth, 5/128, is the largest from there on. */
 static hs_expansion expanded_root(hs_expansion a) {
   if (!(a.value > 0.0)) return anything;
   const double s = sqrt(a.value), v = 1 / a.value, c[4] = {s, s * v / 2, -s * v * v / 8, s * v * v * v / 16};
-  return composed(a, c, s * 5 / 128 * geometric(reach(a) * v));
+  return composed(a, c, s * 5 / 128 * geometric(deviation(a) * v));
 }
 
 static hs_expansion expanded_exponential(hs_expansion a) {
   const double here = exp(a.value), c[4] = {here, here, here / 2, here / 6};
-  return composed(a, c, fourth(reach(a), here * exp(reach(a))));
+  return composed(a, c, fourth(deviation(a), here * exp(deviation(a))));
 }
 
 static hs_expansion expanded_logarithm(hs_expansion a) {
   if (!(a.value > 0.0)) return anything;
   const double less = 1 / a.value, c[4] = {log(a.value), less, -less * less / 2, less * less * less / 3};
-  return composed(a, c, geometric(reach(a) * less) / 4);
+  return composed(a, c, geometric(deviation(a) * less) / 4);
 }
 
 /* Where `here` is its sine and `across` its cosine; or its cosine, and minus its sine. */
 static hs_expansion expanded_sine(hs_expansion a, double here, double across) {
   const double c[4] = {here, across, -here / 2, -across / 6};
-  return composed(a, c, fourth(reach(a), 1.0));
+  return composed(a, c, fourth(deviation(a), 1.0));
 }
 
 /* 2/(1 + exp(-2 a)) - 1, for minus a where that is smaller. */
@@ -133,7 +137,7 @@ static hs_expansion expanded_tanh(hs_expansion a) {
 /* The slope of atan has poles sqrt(1 + c**2) away. */
 static hs_expansion expanded_angle(hs_expansion a) {
   const double x = a.value, m = 1 / (1 + x * x), c[4] = {atan(x), m, -x * m * m, (x * x - 1.0 / 3) * m * m * m};
-  return composed(a, c, geometric(reach(a) * sqrt(m)) / 4);
+  return composed(a, c, geometric(deviation(a) * sqrt(m)) / 4);
 }
 
 static hs_expansion expanded_power(hs_expansion a, int exponent) {
@@ -144,12 +148,12 @@ static hs_expansion expanded_power(hs_expansion a, int exponent) {
 
 /* The smaller of two, where it is the same one everywhere. */
 static hs_expansion expanded_least(hs_expansion a, hs_expansion b) {
-  const double apart = reach(a) + reach(b);
+  const double apart = deviation(a) + deviation(b);
   return b.value - a.value > apart ? a : a.value - b.value > apart ? b : anything;
 }
 
 static hs_expansion series_of_operation(const hs_operation *o, const hs_expansion *a, const hs_expansion *b) {
-  const double c = a->value, r = reach(*a);
+  const double c = a->value, r = deviation(*a);
   switch (o->kind) {
   case HS_ADD: return expanded_sum(*a, *b);
   case HS_SUB: return expanded_sum(*a, negated(*b));
@@ -174,21 +178,21 @@ static hs_expansion series_of_operation(const hs_operation *o, const hs_expansio
   }
 }
 
-/* Where less is hidden in all that the result of an operation may be than in its series, take a constant. */
-static hs_expansion less_hidden(const hs_operation *o, const hs_expansion *a, const hs_expansion *b,
+/* Where less is unresolved in all that the result of an operation may be than in its series, take a constant. */
+static hs_expansion less_unresolved(const hs_operation *o, const hs_expansion *a, const hs_expansion *b,
                                           hs_expansion found) {
-  if (o->kind == HS_SQRT || !hs_finite(a->rest) || !hs_finite(b->rest)) return found;
-  const double r = reach(*a), s = reach(*b);
+  if (o->kind == HS_SQRT || !hs_finite(a->remainder) || !hs_finite(b->remainder)) return found;
+  const double r = deviation(*a), s = deviation(*b);
   const hs_range one = {a->value - r, a->value + r}, other = {b->value - s, b->value + s};
   const hs_range all = range_of(o, one, other);
   const double half = (all.high - all.low) / 2, value = all.low + half;
-  if (!(half < found.hidden)) return found;
-  return expansion(value, 0.0, 0.0, 0.0, half + fabs(value) * EXPANDED, half, found.moved);
+  if (!(half < found.unresolved)) return found;
+  return expansion(value, 0.0, 0.0, 0.0, half + fabs(value) * EXPANSION_ROUNDOFF, half, found.error);
 }
 
 static hs_expansion expansion_of(const hs_operation *o, const hs_expansion *a, const hs_expansion *b) {
   const hs_expansion found = series_of_operation(o, a, b);
-  return found.hidden > 0.0 ? less_hidden(o, a, b, found) : found;
+  return found.unresolved > 0.0 ? less_unresolved(o, a, b, found) : found;
 }
 
 static void expand_operations(const hs_formulas *f, int first, int last, int base, hs_expansion *v) {

@@ -60,7 +60,7 @@ typedef struct {
   double node[4], weight[6][4], bulge[4], slope[4], inside, pole;
 } hs_correction;
 
-/* Where something may be that only a closer look can tell, one bit each; HS_PARTED: everything. */
+/* Hypotheses of the theorem that a screen may leave undecided, one bit each; HS_PARTED: all of them. */
 typedef enum {
   HS_PARTED,
   HS_ACCUMULATION,
@@ -72,38 +72,38 @@ typedef enum {
   HS_NEAREST,
   HS_ENDING,
   HS_FLOW_CHANGE
-} hs_doubt;
+} hs_hypothesis;
 
-/* What needs a closer look at a transition. */
-enum { HS_LOOK_AT_CROSSING = 1, HS_LOOK_AT_RESET = 2 };
+/* What is undecided of a transition. */
+enum { HS_CROSSING_UNDECIDED = 1, HS_RESET_UNDECIDED = 2 };
 
 typedef struct {
   const hs_model *model;
   const hs_timeline *timeline;
   const hs_formulas *formulas; /* of each mode */
   hs_record run, finer;
-  int32_t order;            /* the most of a companion's series; 0 where there is none */
-  const hs_correction *correction; /* of a companion without series; 0 likewise */
+  int32_t order;            /* the most of a shadow run's series; 0 where there is none */
+  const hs_correction *correction; /* of a shadow run without series; 0 likewise */
   double until, relaxation, tolerance;
   int64_t room;             /* numbers in the workspace, in which what is found begins: */
   double *workspace;
-  int32_t *crossing;        /* (transition): HS_LOOK_AT_... */
+  int32_t *crossing;        /* (transition): HS_..._UNDECIDED */
   int32_t *landing, *ending; /* (arc), likewise */
   int32_t *turning, *changing; /* (row): of the step that begins there */
-  double *measured;         /* (row, width): how far each is from the companion; 0 where there is none */
-  double *late;             /* (transition): how far they are from the other run's or the companion's, up to each */
-  double *together;         /* when transitions are tied that commute, `commuting` times */
+  double *shadow_errors;    /* (row, width): how far each is from the shadow run; 0 where there is none */
+  double *time_errors;      /* (transition): how far times are from the finer or the shadow run's, up to each */
+  double *tied_times;       /* when transitions are tied that commute, `commuting` times */
   int64_t commuting;
   int32_t marks;            /* those of `crossing` together */
-  int32_t doubts;
+  int32_t undecided;
   int64_t crossed;          /* transitions that the flow made; of these: */
   double slowest, least;    /* rate, and how often the error fits into what keeps a crossing */
   double margin, missed;    /* the nearest miss: how often the error fits, and when; infinite for none */
   int32_t missed_mode, missed_surface;
 } hs_screen;
 
-/* Look at a run, held against a finer one if there is one: 0 where there is surely nothing to find, -1 where there may
+/* Screen a run, held against a finer one if there is one: 0 where there is surely nothing to find, -1 where there may
    be. Where that takes more room than there is, nothing was done, and it is so many numbers. */
-HS_EXPORT int64_t hs_look(hs_screen *screen, const hs_record *run, const hs_record *finer);
+HS_EXPORT int64_t hs_screen_run(hs_screen *screen, const hs_record *run, const hs_record *finer);
 
 #endif

@@ -1,12 +1,12 @@
-/* What a closer look at a recorded run need not look at. See hsdsl/simulate/verdict.
+/* A recorded run, screened: which hypotheses surely hold of it. See hsdsl/simulate/verdict.
 
-   Every hypothesis of the theorem is looked at once, in one pass over rows, arcs and transitions. What surely has no
-   finding is left out; where that is not sure, a doubt is noted and the place is marked. */
+   Every hypothesis of the theorem is screened in one pass over rows, arcs and transitions. Where it is not
+   sure that there is no finding, the hypothesis is undecided and the place is marked. */
 
 #include "screen_view.h"
 
 #include "screen_errors.c"
-#include "screen_companion.c"
+#include "screen_shadow.c"
 #include "screen_ties.c"
 #include "screen_places.c"
 #include "screen_steps.c"
@@ -23,29 +23,29 @@ static int crowded_anywhere(const hs_screen *s) {
   return 0;
 }
 
-/* Look at one arc of flow. */
-static void look_at_arc(hs_view *v) {
+/* Screen one arc of flow. */
+static void screen_arc(hs_view *v) {
   hs_screen *const s = v->s;
   const hs_arc *arc = &s->run.arc[v->arc];
   const int64_t jump = arc->jump;
   const double shift =
-      jump && !is_followed(s) ? resumed(&s->finer.transition[jump - 1]) - resumed(&s->run.transition[jump - 1]) : 0.0;
+      jump && !has_shadow(s) ? resumed(&s->finer.transition[jump - 1]) - resumed(&s->run.transition[jump - 1]) : 0.0;
   const int flown = takes_time(&s->run, v->arc);
   int known = 0;
   if (s->model->mode[arc->mode].final) return;
   bind(v, arc->mode, segment_at(s->timeline, s->run.times[arc->first]));
   v->last = last_row(&s->run, v->arc);
   v->crossed = crossed_at_end(v);
-  if (flown && v->f->jumps) s->doubts |= DOUBT(HS_FLOW_CHANGE);
+  if (flown && v->f->jumps) s->undecided |= BIT(HS_FLOW_CHANGE);
   for (int64_t row = arc->first; row <= v->last; row++) {
     reach_row(v, row, jump, shift);
     if (row == arc->first && flown) s->landing[v->arc] = lands_close(v);
-    if (row > arc->first && flown) look_at_step(v, row - 1, &known);
+    if (row > arc->first && flown) screen_step(v, row - 1, &known);
   }
-  if (s->landing[v->arc]) s->doubts |= DOUBT(HS_LANDING);
-  if (flown && (s->ending[v->arc] = ends_close(v, 0))) s->doubts |= DOUBT(HS_ENDING);
+  if (s->landing[v->arc]) s->undecided |= BIT(HS_LANDING);
+  if (flown && (s->ending[v->arc] = ends_close(v, 0))) s->undecided |= BIT(HS_ENDING);
   const int leaves = v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump;
-  if (leaves && jump < s->run.transitions && !s->run.transition[jump].entry) look_at_crossing(v, jump, flown);
+  if (leaves && jump < s->run.transitions && !s->run.transition[jump].entry) screen_crossing(v, jump, flown);
 }
 
 /* Whether a transition within the error of the end is undecided; the view is at the last arc. */
@@ -61,22 +61,22 @@ static int undecided_end(hs_view *v) {
   if ((jumped || takes_time(&s->run, v->arc)) && ends_close(v, 1)) return 1;
   if (!count) return 0;
   const double last = s->run.transition[count - 1].time;
-  return end - last < SAFE * (late_by(v, last) + s->tolerance * length);
+  return end - last < SAFE * (time_error_at(v, last) + s->tolerance * length);
 }
 
-static void look_at_all(hs_view *v) {
+static void screen_all(hs_view *v) {
   hs_screen *const s = v->s;
   const hs_transition *made = s->run.transition;
   for (v->arc = 0; v->arc < s->run.arcs; v->arc++)
-    if (s->run.arc[v->arc].first <= last_row(&s->run, v->arc)) look_at_arc(v);
+    if (s->run.arc[v->arc].first <= last_row(&s->run, v->arc)) screen_arc(v);
   v->arc = s->run.arcs - 1;
-  if (undecided_end(v)) s->doubts |= DOUBT(HS_ENDING);
+  if (undecided_end(v)) s->undecided |= BIT(HS_ENDING);
   for (int64_t j = 0; j < s->run.transitions; j++) {
     if (made[j].alternatives) {
-      if (any_order(v, j)) s->together[s->commuting++] = made[j].time;
-      else s->doubts |= DOUBT(HS_CHOICE);
+      if (ties_commute(v, j)) s->tied_times[s->commuting++] = made[j].time;
+      else s->undecided |= BIT(HS_CHOICE);
     }
-    if (jumps_close(v, &made[j])) s->crossing[j] |= HS_LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
+    if (jumps_close(v, &made[j])) s->crossing[j] |= HS_RESET_UNDECIDED, s->undecided |= BIT(HS_LANDING);
     s->marks |= s->crossing[j];
   }
   for (int i = 0; i < s->model->modes; i++) {
@@ -86,7 +86,7 @@ static void look_at_all(hs_view *v) {
     measure_miss(v);
     if (each->start != each->start) continue;
     if (each->surface < s->model->mode[i].edges && s->model->mode[i].edge[each->surface].conditional)
-      s->doubts |= DOUBT(HS_NEAREST);
+      s->undecided |= BIT(HS_NEAREST);
     if (s->missed_mode < 0 || each->start < s->margin)
       s->margin = each->start, s->missed = each->middle, s->missed_mode = i, s->missed_surface = each->surface;
   }
@@ -99,9 +99,9 @@ static void lay_out_found(hs_screen *s, hs_store *store) {
   s->ending = take(store, arcs, sizeof(int32_t));
   s->turning = take(store, rows, sizeof(int32_t));
   s->changing = take(store, rows, sizeof(int32_t));
-  s->measured = is_followed(s) ? numbers(store, rows * s->run.width) : 0;
-  s->late = numbers(store, transitions);
-  s->together = numbers(store, transitions);
+  s->shadow_errors = has_shadow(s) ? numbers(store, rows * s->run.width) : 0;
+  s->time_errors = numbers(store, transitions);
+  s->tied_times = numbers(store, transitions);
 }
 
 static hs_view make_view(hs_screen *s, hs_store *store) {
@@ -116,17 +116,17 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   lay_out_found(s, store);
   v.error = numbers(store, model->states);
   v.size = numbers(store, model->states);
-  v.floor = numbers(store, 2 * (int64_t)model->states);
-  v.late = s->late;
-  v.lines = numbers(store, is_followed(s) ? (int64_t)model->lines * (s->order + 2) : 0);
-  v.noise = numbers(store, w);
+  v.roundoff_floor = numbers(store, 2 * (int64_t)model->states);
+  v.time_errors = s->time_errors;
+  v.lines = numbers(store, has_shadow(s) ? (int64_t)model->lines * (s->order + 2) : 0);
+  v.roundoff = numbers(store, w);
   v.defects = numbers(store, s->correction ? 5 * (int64_t)w : 0);
   v.derivatives = numbers(store, s->correction ? model->derivatives : 0);
   v.factors = numbers(store, s->correction ? model->factors : 0);
   v.inverse = numbers(store, s->correction ? model->factors : 0);
   v.exchanged = take(store, s->correction ? w : 0, sizeof(int));
   v.tied = take(store, s->run.transitions + 1, sizeof(int64_t));
-  double **states[] = {&v.own, &v.x, &v.y, &v.z, &v.slope, 0}, **of_surfaces[] = {&v.values, &v.magnitudes,
+  double **states[] = {&v.mode_error, &v.x, &v.y, &v.z, &v.slope, 0}, **of_surfaces[] = {&v.values, &v.magnitudes,
                        &v.at_start, &v.at_end, 0};
   for (double ***each = states; *each; each++) **each = numbers(store, w);
   for (double ***each = of_surfaces; *each; each++) **each = numbers(store, m);
@@ -135,9 +135,9 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.bernstein = numbers(store, (int64_t)(LEVELS + 1) * (d + 1) * w);
   v.open = take(store, (int64_t)(LEVELS + 2) * m, sizeof(int));
   v.beyond_at_start = take(store, m, sizeof(int));
-  v.enough = numbers(store, w);
+  v.allowance = numbers(store, w);
   v.drift = numbers(store, w);
-  v.missed = numbers(store, (int64_t)w * model->modes);
+  v.miss_error = numbers(store, (int64_t)w * model->modes);
   v.cut = take(store, w, sizeof(int));
   v.range = take(store, registers, sizeof(hs_range));
   v.rounded = take(store, registers, sizeof(hs_rounded));
@@ -150,7 +150,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
 /* Begin what is found with nothing. */
 static void begin_screen(hs_view *v) {
   hs_screen *const s = v->s;
-  s->doubts = s->marks = 0;
+  s->undecided = s->marks = 0;
   s->crossed = s->commuting = 0;
   s->missed_mode = -1;
   s->slowest = s->least = s->margin = INFINITY;
@@ -165,7 +165,7 @@ static void begin_screen(hs_view *v) {
   for (int64_t i = 0; i < s->run.rows; i++) s->turning[i] = s->changing[i] = 0;
 }
 
-int64_t hs_look(hs_screen *s, const hs_record *run, const hs_record *finer) {
+int64_t hs_screen_run(hs_screen *s, const hs_record *run, const hs_record *finer) {
   hs_store store = {s->workspace, 0};
   s->run = *run;
   if (finer) s->finer = *finer;
@@ -173,11 +173,11 @@ int64_t hs_look(hs_screen *s, const hs_record *run, const hs_record *finer) {
   if (store.used > s->room) return store.used;
   begin_screen(&v);
   const int apart =
-      is_followed(s) ? !plain_arcs(&s->run, s->model) || !accompany(&v)
-               : !together(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
-  if (apart) s->doubts = DOUBT(HS_PARTED);
-  else if (crowded_anywhere(s)) s->doubts = DOUBT(HS_ACCUMULATION);
-  else look_at_all(&v);
-  if (outgrown(&v)) s->doubts |= DOUBT(HS_PARTED);
-  return s->doubts || s->marks ? -1 : 0;
+      has_shadow(s) ? !plain_arcs(&s->run, s->model) || !follow_run(&v)
+               : !same_transitions(&v) || s->run.arc[s->run.arcs - 1].mode != s->finer.arc[s->finer.arcs - 1].mode;
+  if (apart) s->undecided = BIT(HS_PARTED);
+  else if (crowded_anywhere(s)) s->undecided = BIT(HS_ACCUMULATION);
+  else screen_all(&v);
+  if (outgrown(&v)) s->undecided |= BIT(HS_PARTED);
+  return s->undecided || s->marks ? -1 : 0;
 }

@@ -6,11 +6,11 @@ enum { NODES = 4, POWERS = 6, SMALL = 3 /* states, kept in registers */ };
 
 /* How much the polynomial of the run's step fails the flow at the share s, begun at x and moved by `bulge` u, its slope
    by `rate` u. */
-HS_INLINE int defect_at(hs_view *v, const hs_companion *c, int n, double s, const double *x, double bulge, double rate,
+HS_INLINE int defect_at(hs_view *v, const hs_shadow *c, int n, double s, const double *x, double bulge, double rate,
                         const double *restrict u, double *restrict g) {
   const int d = v->s->run.degree, w = v->s->run.width;
   const double *coefficient = recorded_piece(&v->s->run, c->row) + (d - 1) * w;
-  const double *const noise = c->noise, h = c->h;
+  const double *const roundoff = c->roundoff, h = c->h;
   double *restrict const at = v->z, *restrict const slope = v->slope;
   HS_SIMD
   for (int i = 0; i < n; i++) at[i] = s * coefficient[i], slope[i] = d * coefficient[i];
@@ -30,13 +30,13 @@ HS_INLINE int defect_at(hs_view *v, const hs_companion *c, int n, double s, cons
   }
   if (c->table->flow(c->p, c->t + s * h, at, g)) return 1;
   HS_SIMD
-  for (int i = 0; i < n; i++) g[i] = h * g[i] - slope[i] + noise[i];
+  for (int i = 0; i < n; i++) g[i] = h * g[i] - slope[i] + roundoff[i];
   return 0;
 }
 
 /* Factor 1 - a h J, J being the derivatives of the flow where the run's step ends. A dense matrix is inverted:
    products need not wait for each other as the unknowns of a triangle do. */
-HS_INLINE int factor_correction(hs_view *v, const hs_companion *c, int n) {
+HS_INLINE int factor_correction(hs_view *v, const hs_shadow *c, int n) {
   const double *const x = recorded_row(&v->s->run, c->row + 1), away = -v->s->correction->pole * c->h;
   const hs_sparse *const rows = &c->table->jacobian;
   const hs_elimination *const of = n > SMALL ? c->table->elimination : 0;
@@ -58,7 +58,7 @@ HS_INLINE int factor_correction(hs_view *v, const hs_companion *c, int n) {
 }
 
 /* The product of the inverse and a vector. */
-HS_INLINE void solve_correction(hs_view *v, const hs_companion *c, int n, const double *restrict right,
+HS_INLINE void solve_correction(hs_view *v, const hs_shadow *c, int n, const double *restrict right,
                                 double *restrict d) {
   const double *restrict const w = v->inverse;
   if (n > SMALL && c->table->elimination) {
@@ -76,13 +76,13 @@ HS_INLINE void weigh(int n, const double *weight, double *const *g, double *rest
   for (int i = 0; i < n; i++) sum[i] = weight[0] * a[i] + weight[1] * b[i] + weight[2] * c[i] + weight[3] * d[i];
 }
 
-HS_INLINE int correct_in(hs_view *v, hs_companion *c, int n, double *restrict apart) {
+HS_INLINE int correct_in(hs_view *v, hs_shadow *c, int n, double *restrict apart) {
   const hs_correction *const known = v->s->correction;
   const double *const start = recorded_row(&v->s->run, c->row), *const end = recorded_row(&v->s->run, c->row + 1);
   double *g[NODES], *const u = v->defects + NODES * v->s->run.width, few[2][SMALL];
   double *restrict const right = n > SMALL ? v->slope : few[0], *restrict const d = n > SMALL ? c->y : few[1];
   for (int k = 0; k < NODES; k++) g[k] = v->defects + k * v->s->run.width;
-  for (int i = 0; i < n; i++) c->noise[i] = copysign(c->noise[i], c->x[i] - start[i]), u[i] = 0.0;
+  for (int i = 0; i < n; i++) c->roundoff[i] = copysign(c->roundoff[i], c->x[i] - start[i]), u[i] = 0.0;
   if (factor_correction(v, c, n) || defect_at(v, c, n, known->inside, start, 0.0, 0.0, u, g[0])) return 0;
   solve_correction(v, c, n, g[0], u);
   for (int i = 0; i < n; i++) apart[i] = fabs(c->x[i] - start[i] + known->pole * u[i]);
@@ -99,20 +99,20 @@ HS_INLINE int correct_in(hs_view *v, hs_companion *c, int n, double *restrict ap
   return 1;
 }
 
-static int correct_2(hs_view *v, hs_companion *c, double *apart) {
+static int correct_2(hs_view *v, hs_shadow *c, double *apart) {
   return correct_in(v, c, 2, apart);
 }
 
-static int correct_3(hs_view *v, hs_companion *c, double *apart) {
+static int correct_3(hs_view *v, hs_shadow *c, double *apart) {
   return correct_in(v, c, 3, apart);
 }
 
-static int correct_n(hs_view *v, hs_companion *c, double *apart) {
+static int correct_n(hs_view *v, hs_shadow *c, double *apart) {
   return correct_in(v, c, v->n, apart);
 }
 
-/* Find where the companion is at the end of the run's step, to y, further away by `noise`, which goes on as the flow
+/* Find where the shadow run is at the end of the run's step, to y, further away by `roundoff`, which goes on as the flow
    does; and how far it is from the run inside, to `apart`. */
-static int correct_step(hs_view *v, hs_companion *c, double *apart) {
+static int correct_step(hs_view *v, hs_shadow *c, double *apart) {
   return (v->n == 2 ? correct_2 : v->n == 3 ? correct_3 : correct_n)(v, c, apart);
 }

@@ -13,7 +13,7 @@ static int plain_arcs(const hs_record *run, const hs_model *model) {
 }
 
 /* Whether both runs make the same transitions; how far their times are apart. */
-static int together(hs_view *v) {
+static int same_transitions(hs_view *v) {
   const hs_record *a = &v->s->run, *b = &v->s->finer;
   if (!plain_arcs(a, v->s->model) || !plain_arcs(b, v->s->model)) return 0;
   double apart = tie_of(v->s, a->times[a->rows - 1]);
@@ -21,7 +21,7 @@ static int together(hs_view *v) {
   for (int64_t k = 0; k < a->transitions; k++) {
     const hs_transition *one = &a->transition[k], *other = &b->transition[k];
     if (one->mode != other->mode || one->edge != other->edge) return 0;
-    v->late[k] = apart = hs_max(apart, fabs(one->time - other->time));
+    v->time_errors[k] = apart = hs_max(apart, fabs(one->time - other->time));
   }
   return 1;
 }
@@ -55,12 +55,12 @@ static void compare_states(hs_view *v, int mode, const double *one, const double
 /* The errors up to a row, which none but the first is without. */
 static void reach_row(hs_view *v, int64_t row, int64_t jump, double shift) {
   const hs_screen *s = v->s;
-  const double least = hs_max(s->tolerance, ROUNDOFF_SHARE * HS_UNIT), *x = recorded_row(&s->run, row);
+  const double least = hs_max(s->tolerance, ERROR_UNITS * HS_UNIT), *x = recorded_row(&s->run, row);
   const int w = s->model->width;
-  if (is_followed(s))
-    for (int i = 0; i < v->n; i++) grow(&v->error[v->table->state[i]], s->measured[row * s->run.width + i]);
+  if (has_shadow(s))
+    for (int i = 0; i < v->n; i++) grow(&v->error[v->table->state[i]], s->shadow_errors[row * s->run.width + i]);
   else compare_row(v, row, jump, shift);
-  if (!is_followed(s) && row == v->last && (v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump)) {
+  if (!has_shadow(s) && row == v->last && (v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump)) {
     const hs_transition *made = s->run.transition;
     if (jump < s->run.transitions)
       compare_states(v, made[jump].mode, s->run.before + jump * w, s->finer.before + jump * w);
@@ -72,33 +72,33 @@ static void reach_row(hs_view *v, int64_t row, int64_t jump, double shift) {
   for (int i = 0; i < v->n; i++) {
     const int state = v->table->state[i];
     grow(&v->size[state], fabs(x[i]));
-    v->own[i] = row ? hs_max(v->error[state], least * v->size[state]) : v->error[state];
+    v->mode_error[i] = row ? hs_max(v->error[state], least * v->size[state]) : v->error[state];
   }
 }
 
 /* How much the error may move a surface of which the gradient is known. */
-static double shift_by(const hs_view *v, double t) {
+static double surface_error(const hs_view *v, double t) {
   double shift = 0.0;
   for (int i = 0; i < v->row->count; i++)
-    shift += fabs(v->gradient[i]) * (v->row->place[i] ? v->own[v->row->place[i] - 1] : late_by(v, t));
+    shift += fabs(v->gradient[i]) * (v->row->place[i] ? v->mode_error[v->row->place[i] - 1] : time_error_at(v, t));
   return shift;
 }
 
 /* Whether no error of a state exceeds a tenth of its largest size by more than round-off of the flow explains. */
 static int explained(const hs_view *v) {
-  const double least = hs_max(v->s->tolerance, ROUNDOFF_SHARE * HS_UNIT);
+  const double least = hs_max(v->s->tolerance, ERROR_UNITS * HS_UNIT);
   for (int i = 0; i < v->s->model->states; i++) {
     const double error = hs_max(v->error[i], least * v->size[i]);
-    if (error > 0 && !(error * SAFE <= v->size[i]) && !(error <= SAFE * v->floor[i])) return 0;
+    if (error > 0 && !(error * SAFE <= v->size[i]) && !(error <= SAFE * v->roundoff_floor[i])) return 0;
   }
   return 1;
 }
 
-/* What round-off of the flow at a row moves states by, over the run: to `floor`, from what it was found to be before; 0
-   where that has no bound. */
+/* What round-off of the flow at a row moves states by, over the run: to `roundoff_floor`, from what it was found to be
+   before; 0 where that has no bound. */
 static int round_off_at(hs_view *v, int64_t row, const double *before) {
   const hs_record *const run = &v->s->run;
-  const double span = run->times[run->rows - 1] - run->times[0], unit = ROUNDOFF_SHARE * HS_UNIT;
+  const double span = run->times[run->rows - 1] - run->times[0], unit = ERROR_UNITS * HS_UNIT;
   const double t = run->times[row], *x = recorded_row(run, row);
   v->range[0] = outwards(t - unit * fabs(t), t + unit * fabs(t), 0x1p-52);
   for (int i = 0; i < v->n; i++) {
@@ -109,7 +109,7 @@ static int round_off_at(hs_view *v, int64_t row, const double *before) {
   for (int i = 0; i < v->n; i++) {
     const hs_range f = v->range[v->f->flow.result[i]];
     if (!hs_finite(f.high - f.low)) return 0;
-    grow(&v->floor[v->table->state[i]], span * (f.high - f.low));
+    grow(&v->roundoff_floor[v->table->state[i]], span * (f.high - f.low));
   }
   return 1;
 }
@@ -143,11 +143,11 @@ static int round_off(hs_view *v, const double *before) {
 /* Whether the error of a state exceeds a tenth of its largest size, and is more than round-off of the flow explains. */
 static int outgrown(hs_view *v) {
   const int states = v->s->model->states;
-  double *const floor = v->floor, *const before = v->floor + states;
-  for (int i = 0; i < states; i++) floor[i] = 0.0;
+  double *const most = v->roundoff_floor, *const before = v->roundoff_floor + states;
+  for (int i = 0; i < states; i++) most[i] = 0.0;
   for (int round = 0; round < 3; round++) {
     if (explained(v)) return 0;
-    copy(before, floor, states);
+    copy(before, most, states);
     if (!round_off(v, before)) return 1;
   }
   return !explained(v);

@@ -24,7 +24,7 @@ static int surely_turns(hs_view *v, int64_t row, int k) {
 }
 
 /* Note the turning point that comes closest to its surface, in errors, of each mode. */
-static void look_for_miss(hs_view *v, int64_t row) {
+static void note_near_miss(hs_view *v, int64_t row) {
   const hs_record *run = &v->s->run;
   const double begin = run->times[row], length = run->times[row + 1] - begin, middle = begin + length / 2;
   const hs_formula *const surfaces = &v->f->surfaces;
@@ -35,7 +35,8 @@ static void look_for_miss(hs_view *v, int64_t row) {
       along_step(v, run, row, 0.5, v->z);
       if (v->table->values(v->p, middle, v->z, v->values)) return;
       v->range[0] = outwards(middle, middle, 0.0);
-      for (int i = 0; i < v->n; i++) v->range[1 + i] = outwards(v->z[i] - v->own[i], v->z[i] + v->own[i], 0x1p-52);
+      for (int i = 0; i < v->n; i++)
+        v->range[1 + i] = outwards(v->z[i] - v->mode_error[i], v->z[i] + v->mode_error[i], 0x1p-52);
       range_operations(v->f, surfaces->first, surfaces->last, first_register(v), v->range);
       looked = 1;
     }
@@ -44,7 +45,7 @@ static void look_for_miss(hs_view *v, int64_t row) {
     hs_near_miss *const best = &v->nearest[v->mode];
     if (margin < best->margin) {
       best->margin = margin, best->row = row, best->surface = k, best->segment = v->segment;
-      copy(v->missed + v->mode * v->s->model->width, v->own, v->n);
+      copy(v->miss_error + v->mode * v->s->model->width, v->mode_error, v->n);
     }
   }
 }
@@ -80,20 +81,20 @@ static double turning_share(hs_view *v, const hs_near_miss *miss) {
   return b;
 }
 
-/* How often the error fits between the surface and the turning point noted in the mode that is looked at. */
+/* How often the error fits between the surface and the turning point noted in the mode. */
 static void measure_miss(hs_view *v) {
   hs_screen *const s = v->s;
   hs_near_miss *const best = &v->nearest[v->mode];
   const double *const times = s->run.times + best->row;
   const double share = turning_share(v, best);
-  hs_judged found;
-  copy(v->own, v->missed + v->mode * s->model->width, v->n);
+  hs_near_surface found;
+  copy(v->mode_error, v->miss_error + v->mode * s->model->width, v->n);
   best->middle = hs_min(times[0] + share * (times[1] - times[0]), times[1]);
   along_step(v, &s->run, best->row, share, v->z);
   if (share != share || evaluate_surfaces(v, best->middle, v->z) ||
-      judge_surface(v, best->surface, best->middle, v->z, &found)) {
-    s->doubts |= DOUBT(HS_NEAREST);
+      near_surface(v, best->surface, best->middle, v->z, &found)) {
+    s->undecided |= BIT(HS_NEAREST);
     return;
   }
-  best->start = found.value < 0 ? (found.shift > 0 ? -found.value / found.shift : INFINITY) : NAN;
+  best->start = found.value < 0 ? (found.error > 0 ? -found.value / found.error : INFINITY) : NAN;
 }

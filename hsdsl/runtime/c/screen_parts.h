@@ -40,7 +40,7 @@ static void whole_step(hs_view *v, int64_t row) {
       b[k] = x[i];
       for (int l = 1; l <= k; l++) b[k] += v->matrix[k * (d + 1) + l] * c[(l - 1) * w + i];
     }
-  v->looks = 0;
+  v->parts = 0;
 }
 
 /* Those of the first half of a part, at the next level; those of the second half take its place. Then of that half. */
@@ -69,7 +69,7 @@ static void set_part(hs_view *v, int64_t row, int level, double start, double wi
     if (!v->cut[i]) continue;
     double low = b[0], high = b[0];
     for (int k = 1; k <= d; k++) low = hs_min(low, b[k]), high = hs_max(high, b[k]);
-    set_box(v, low, high, i, errors * v->own[i]);
+    set_box(v, low, high, i, errors * v->mode_error[i]);
   }
 }
 
@@ -92,24 +92,24 @@ static hs_part part_of(const hs_view *v, int64_t row, double start, double width
 static hs_expansion expand_state(const hs_view *v, int64_t row, int i, hs_part part, hs_expansion *slope) {
   const hs_record *const run = &v->s->run;
   const double *const c = recorded_piece(run, row) + i, x = recorded_row(run, row)[i], by = part.by, per = part.per;
-  double value = 0.0, first = 0.0, second = 0.0, third = 0.0, rest = 0.0, at = 0.0;
+  double value = 0.0, first = 0.0, second = 0.0, third = 0.0, remainder = 0.0, at = 0.0;
   double power = part.power, further = part.further;
   for (int k = v->degree; k > 0; k--, power *= part.less) {
     const double term = c[(k - 1) * run->width] * power;
-    rest += (further *= 0.5) * fabs(third);
+    remainder += (further *= 0.5) * fabs(third);
     third += second, second += first, first += value, value += k * term;
     at += term;
   }
-  first *= by, second *= by * by, third *= by * by * by, rest *= by * by * by * by;
-  rest += (fabs(value) + fabs(first) + fabs(second) + fabs(third)) * EXPANDED;
-  *slope = expansion(value * per, first * per, second * per, third * per, rest * per, 0.0, 0.0);
-  rest = (fabs(third) / 4 + rest / 5) * by + fabs(x + at) * EXPANDED;
-  return expansion(x + at, value * by, first * by / 2, second * by / 3, rest, 0.0, v->own[i]);
+  first *= by, second *= by * by, third *= by * by * by, remainder *= by * by * by * by;
+  remainder += (fabs(value) + fabs(first) + fabs(second) + fabs(third)) * EXPANSION_ROUNDOFF;
+  *slope = expansion(value * per, first * per, second * per, third * per, remainder * per, 0.0, 0.0);
+  remainder = (fabs(third) / 4 + remainder / 5) * by + fabs(x + at) * EXPANSION_ROUNDOFF;
+  return expansion(x + at, value * by, first * by / 2, second * by / 3, remainder, 0.0, v->mode_error[i]);
 }
 
 /* Expand the states that are cut. */
 static void expand_cut(hs_view *v, int64_t row) {
-  v->looks = 0;
+  v->parts = 0;
   if (v->expanded) return;
   const hs_part whole = part_of(v, row, 0.0, 1.0);
   for (int i = 0; i < v->n; i++)
@@ -126,15 +126,15 @@ static void set_expanded_part(hs_view *v, int64_t row, double start, double widt
     const double bend = (a.second + 3 * m * a.third) * (width * width) / 2;
     const double middle = a.value + m * (a.first + m * (a.second + m * a.third)) + bend;
     const double slope = a.first + m * (2 * a.second + 3 * m * a.third);
-    const double wide = width * (fabs(slope) + width * width * fabs(a.third)) + fabs(bend) + a.rest;
-    set_box(v, middle - wide, middle + wide, i, errors * v->own[i] + size_of(a) * EXPANDED);
+    const double wide = width * (fabs(slope) + width * width * fabs(a.third)) + fabs(bend) + a.remainder;
+    set_box(v, middle - wide, middle + wide, i, errors * v->mode_error[i] + size_of(a) * EXPANSION_ROUNDOFF);
   }
 }
 
-/* Look at one half of a part. */
+/* The box of one half of a part. */
 static void set_half(hs_view *v, int64_t row, int level, int half, double start, double width, double errors) {
   const double from = start + half * width / 2;
-  v->looks++;
+  v->parts++;
   if (v->coarse) {
     set_expanded_part(v, row, from, width / 2, errors);
     return;

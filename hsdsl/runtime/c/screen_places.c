@@ -4,13 +4,13 @@
 #include "screen_view.h"
 
 /* Surface k at a point, of which `values` and `magnitudes` are known; not 0 where something has no value. */
-static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found) {
+static int near_surface(hs_view *v, int k, double t, const double *x, hs_near_surface *found) {
   const hs_sparse *const row = v->row = &v->table->gradients[k];
   if (row->values(v->p, t, x, v->gradient) || v->table->rates[k](v->p, t, x, &found->rate)) return 1;
   found->value = v->values[k];
-  found->noise = noise_of(v, v->magnitudes[k], t, x);
-  found->shift = shift_by(v, t);
-  return !hs_finite(found->value + found->noise + found->shift + found->rate);
+  found->roundoff = surface_roundoff(v, v->magnitudes[k], t, x);
+  found->error = surface_error(v, t);
+  return !hs_finite(found->value + found->roundoff + found->error + found->rate);
 }
 
 static int evaluate_surfaces(hs_view *v, double t, const double *x) {
@@ -18,7 +18,7 @@ static int evaluate_surfaces(hs_view *v, double t, const double *x) {
 }
 
 /* Below this the rate of a surface counts as zero; its gradient is the one last judged. */
-static double rate_noise(const hs_view *v) {
+static double rate_roundoff(const hs_view *v) {
   double total = 0.0;
   for (int i = 0; i < v->row->count; i++)
     total += fabs(v->gradient[i] * (v->row->place[i] ? v->slope[v->row->place[i] - 1] : 1.0));
@@ -50,12 +50,12 @@ static int lands_close(hs_view *v) {
   if (arc->jump && follows_choice(v, arc->jump - 1)) return 0; /* its choice decides */
   if (evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope)) return 1;
   for (int k = 0; k < v->table->surfaces; k++) {
-    hs_judged found;
-    if (judge_surface(v, k, t, x, &found)) return 1;
-    if (arc->first == 0 && fabs(found.value) <= found.noise) return 1;
-    if (arc->jump == 0 || fabs(found.value) > SAFE * found.shift + found.noise) continue;
+    hs_near_surface found;
+    if (near_surface(v, k, t, x, &found)) return 1;
+    if (arc->first == 0 && fabs(found.value) <= found.roundoff) return 1;
+    if (arc->jump == 0 || fabs(found.value) > SAFE * found.error + found.roundoff) continue;
     const int conditional = k < v->table->edges && v->table->edge[k].conditional;
-    if (found.rate > rate_noise(v) && !conditional) continue;
+    if (found.rate > rate_roundoff(v) && !conditional) continue;
     const hs_transition *made = &run->transition[arc->jump - 1];
     if (made->mode != v->mode || made->edge != k || !untouched(v, k)) return 1;
   }
@@ -80,11 +80,11 @@ static int ends_close(hs_view *v, int all) {
   if (v->crossed >= 0 || all) bind(v, v->mode, there);
   int close = evaluate_surfaces(v, t, x);
   for (int k = 0; k < v->table->surfaces && !close; k++) {
-    hs_judged found;
+    hs_near_surface found;
     if (k == v->crossed || (v->crossed >= 0 && is_alternative(v, s->run.arc[v->arc].jump, k))) continue;
-    close = judge_surface(v, k, t, x, &found) ||
-            (found.rate > 0 && (all || found.value <= found.noise) && fabs(found.value) <= SAFE * found.shift);
-    if (close && v->crossed >= 0 && k < v->table->edges && found.value <= found.noise) {
+    close = near_surface(v, k, t, x, &found) ||
+            (found.rate > 0 && (all || found.value <= found.roundoff) && fabs(found.value) <= SAFE * found.error);
+    if (close && v->crossed >= 0 && k < v->table->edges && found.value <= found.roundoff) {
       const hs_tied tied = {v->mode, t, x, 2 * -found.value / found.rate};
       close = !commute(v, &tied, v->crossed, k) || evaluate_surfaces(v, t, x);
     }
@@ -96,13 +96,13 @@ static int ends_close(hs_view *v, int all) {
 /* Whether a reset may jump within the error of a transition: over a wider box it changes little more. */
 static int reset_jumps(hs_view *v, const hs_transition *made, const double *x) {
   const hs_formula *const reset = &v->f->reset[made->edge];
-  const double late = SAFE * late_by(v, made->time);
+  const double late = SAFE * time_error_at(v, made->time);
   const int w = v->s->model->width, results = v->f->curved[made->edge] < w ? v->f->curved[made->edge] : w;
   double *const narrow = v->y;
   for (int times = 1; times <= WIDER && results; times += WIDER - 1) {
     v->range[0] = outwards(made->time - times * late, made->time + times * late, 0x1p-52);
     for (int i = 0; i < v->n; i++) {
-      const double wide = times * SAFE * v->own[i];
+      const double wide = times * SAFE * v->mode_error[i];
       v->range[1 + i] = outwards(x[i] - wide, x[i] + wide, 0x1p-52);
     }
     range_operations(v->f, reset->first, reset->last, first_register(v), v->range);
@@ -110,7 +110,7 @@ static int reset_jumps(hs_view *v, const hs_transition *made, const double *x) {
       const hs_range value = v->range[reset->result[i]];
       const double width = value.high - value.low, size = fabs(value.high + value.low) / 2;
       if (!hs_finite(width) || (times > 1 && !(width >= narrow[i] * WIDER / 2))) return 1;
-      narrow[i] = width > hs_max(ROUNDOFF_SHARE * HS_UNIT * size, HS_NOTHING) ? width : 0.0;
+      narrow[i] = width > hs_max(ERROR_UNITS * HS_UNIT * size, HS_NOTHING) ? width : 0.0;
     }
   }
   return 0;
@@ -119,30 +119,30 @@ static int reset_jumps(hs_view *v, const hs_transition *made, const double *x) {
 /* Whether an input may jump within the error of a transition. */
 static int jumps_close(const hs_view *v, const hs_transition *made) {
   const hs_timeline *const timeline = v->s->timeline;
-  const double late = SAFE * late_by(v, made->time);
+  const double late = SAFE * time_error_at(v, made->time);
   const int64_t here = segment_at(timeline, made->time);
   if (timeline->jump[here] && fabs(timeline->start[here] - made->time) <= late) return 1;
   return here + 1 < timeline->segments && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late;
 }
 
 /* How often the error fits into what keeps a crossing, at the end of the arc. */
-static void look_at_crossing(hs_view *v, int64_t j, int flown) {
+static void screen_crossing(hs_view *v, int64_t j, int flown) {
   hs_screen *const s = v->s;
   const hs_transition *made = &s->run.transition[j];
   const double t = made->time, *x = s->run.before + j * s->model->width;
   const int64_t step = v->segment, row = v->last - 1;
-  hs_judged found;
+  hs_near_surface found;
   double bend = 0.0, rate;
   bind(v, v->mode, segment_at(s->timeline, t));
   s->crossed++;
   int bad = evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope) ||
-            judge_surface(v, made->edge, t, x, &found);
+            near_surface(v, made->edge, t, x, &found);
   if (!bad) {
-    if (reset_jumps(v, made, x)) s->crossing[j] |= HS_LOOK_AT_RESET, s->doubts |= DOUBT(HS_LANDING);
+    if (reset_jumps(v, made, x)) s->crossing[j] |= HS_RESET_UNDECIDED, s->undecided |= BIT(HS_LANDING);
     int flat = 1;
     for (int i = 0; i < v->row->count; i++) flat &= v->gradient[i] == 0.0;
-    if (flat || !(found.rate > rate_noise(v)) || v->table->edge[made->edge].conditional)
-      s->crossing[j] |= HS_LOOK_AT_CROSSING;
+    if (flat || !(found.rate > rate_roundoff(v)) || v->table->edge[made->edge].conditional)
+      s->crossing[j] |= HS_CROSSING_UNDECIDED;
     if (flown) {
       const double begin = s->run.times[row], middle = begin + (s->run.times[v->last] - begin) / 2;
       bind(v, v->mode, segment_at(s->timeline, middle));
@@ -153,12 +153,12 @@ static void look_at_crossing(hs_view *v, int64_t j, int flown) {
   }
   bind(v, v->mode, step);
   if (bad) {
-    s->doubts |= DOUBT(HS_CROSSING);
+    s->undecided |= BIT(HS_CROSSING);
     return;
   }
   const double depth = bend > 0 ? found.rate * found.rate / (2 * bend) : INFINITY;
-  const double margin = found.shift > 0 ? depth / found.shift : INFINITY;
-  if (!(margin >= SAFE)) s->crossing[j] |= HS_LOOK_AT_CROSSING;
+  const double margin = found.error > 0 ? depth / found.error : INFINITY;
+  if (!(margin >= SAFE)) s->crossing[j] |= HS_CROSSING_UNDECIDED;
   s->slowest = hs_min(s->slowest, found.rate);
   s->least = hs_min(s->least, margin);
 }

@@ -49,7 +49,7 @@ static void cut_few(hs_view *v, const int *open) {
   }
 }
 
-/* Look at both halves of a part, and at their halves. */
+/* Whether a surface may turn close to zero on a half of a part, or on halves of that. */
 static int halves_close(hs_view *v, int64_t row, int level, double start, double width) {
   const int most = v->s->model->surfaces, ends = row + 1 == v->last && start + width == 1.0;
   if (level >= END_LEVELS && ends && only_crossed(v, v->open + level * most)) return 0;
@@ -57,7 +57,7 @@ static int halves_close(hs_view *v, int64_t row, int level, double start, double
   for (int half = 0; half < 2; half++) {
     const double from = start + half * width / 2;
     set_half(v, row, level, half, start, width, SAFE);
-    if (v->looks > (v->coarse ? COARSE_LOOKS : MOST_LOOKS)) return 1;
+    if (v->parts > (v->coarse ? COARSE_PARTS_TRIED : MOST_PARTS_TRIED)) return 1;
     if (turns_close(v, v->open + level * most, v->open + (level + 1) * most) &&
         halves_close(v, row, level + 1, from, width / 2))
       return 1;
@@ -85,7 +85,7 @@ static int turns_along(hs_view *v, int64_t row) {
   for (int i = 0; i < v->n; i++) {
     double total = 0.0, size = 0.0;
     for (int k = 0; k < d; k++) total += c[k * w + i], size += fabs(c[k * w + i]);
-    set_box(v, x[i] + (total - size) / 2, x[i] + (total + size) / 2, i, SAFE * v->own[i]);
+    set_box(v, x[i] + (total - size) / 2, x[i] + (total + size) / 2, i, SAFE * v->mode_error[i]);
   }
   set_times(v, run->times[row], run->times[row + 1] - run->times[row], 0.0, 1.0);
   for (int k = 0; k < m; k++) v->open[v->s->model->surfaces + k] = 1;
@@ -119,8 +119,8 @@ static int passes(hs_view *v, int64_t row) {
   return 0;
 }
 
-/* Look at the step that begins at a row; errors are those at its end. */
-static void look_at_step(hs_view *v, int64_t row, int *known) {
+/* Screen the step that begins at a row; errors are those at its end. */
+static void screen_step(hs_view *v, int64_t row, int *known) {
   hs_screen *const s = v->s;
   const double end = s->run.times[row + 1];
   const int64_t segment = segment_at(s->timeline, s->run.times[row]);
@@ -131,12 +131,12 @@ static void look_at_step(hs_view *v, int64_t row, int *known) {
   }
   take_step(v, row);
   v->expanded = 0;
-  if (flow_hides(v, row)) s->changing[row] = 1, s->doubts |= DOUBT(HS_FLOW_CHANGE);
-  if (turns_along(v, row)) s->turning[row] = 1, s->doubts |= DOUBT(HS_TURNING);
-  if (!(s->doubts & DOUBT(HS_TRANSPARENT)) && passes(v, row)) s->doubts |= DOUBT(HS_TRANSPARENT);
+  if (flow_hides(v, row)) s->changing[row] = 1, s->undecided |= BIT(HS_FLOW_CHANGE);
+  if (turns_along(v, row)) s->turning[row] = 1, s->undecided |= BIT(HS_TURNING);
+  if (!(s->undecided & BIT(HS_TRANSPARENT)) && passes(v, row)) s->undecided |= BIT(HS_TRANSPARENT);
   if (!*known) all_rates(v, s->run.times[row], recorded_row(&s->run, row), v->at_start);
   all_rates(v, end, recorded_row(&s->run, row + 1), v->at_end);
-  look_for_miss(v, row);
+  note_near_miss(v, row);
   swap(&v->at_start, &v->at_end);
   *known = 1;
 }

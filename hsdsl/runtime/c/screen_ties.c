@@ -35,7 +35,7 @@ static int goes_at_once(hs_view *v, const hs_mode *table, const double *p, doubl
     double rate;
     v->row = &table->gradients[k];
     if (v->row->values(p, t, x, v->gradient) || table->rates[k](p, t, x, &rate)) return -2;
-    const double r = v->values[k], near = hs_max(noise_of(v, v->magnitudes[k], t, x), fabs(rate) * since);
+    const double r = v->values[k], near = hs_max(surface_roundoff(v, v->magnitudes[k], t, x), fabs(rate) * since);
     if (!hs_finite(near)) return -2;
     if (r > near && !edge->conditional && is_first(table, k, beyond)) beyond = k;
     if (!(fabs(r) <= near && rate > 0) || edge->releases >= 0) continue;
@@ -90,7 +90,7 @@ static int is_alternative(const hs_view *v, int64_t j, int k) {
 }
 
 /* Whether a transition and those tied with it lead to the same point in any order. */
-static int any_order(hs_view *v, int64_t j) {
+static int ties_commute(hs_view *v, int64_t j) {
   const hs_transition *const made = &v->s->run.transition[j];
   const hs_edge *const edge = v->s->model->mode[made->mode].edge;
   const hs_tied tied = {made->mode, made->time, v->s->run.before + j * v->s->model->width, 0.0};

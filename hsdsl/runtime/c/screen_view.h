@@ -1,21 +1,21 @@
-/* A recorded run while it is screened: the mode that is looked at, its routines, and what is known so far. */
+/* A recorded run while it is screened: the mode of the current arc, its routines, and what is known so far. */
 
 #ifndef HS_SCREEN_VIEW_H
 #define HS_SCREEN_VIEW_H
 
 #include "expansions.c"
 
-#define DOUBT(at) (1 << (at))
+#define BIT(at) (1 << (at))
 #define SAFE 10             /* margins below so many errors are named */
-#define ROUNDOFF_SHARE 64   /* units of round-off of a state's size: no error is smaller */
+#define ERROR_UNITS 64      /* units of round-off of a state's size: no error is smaller */
 #define TANGENT_UNITS 64
 #define CUTTING 0x1p-48     /* of the largest coefficient: what cutting and changing the basis may add */
 #define WIDER 8             /* a box so many times as wide: what jumps changes little more over it */
 #define LEVELS 10           /* a step is cut in halves */
 #define END_LEVELS 6        /* the part at its end, where a surface is crossed */
-#define MOST_LOOKS 128      /* at parts of one step */
-#define COARSE_LOOKS 16     /* likewise, by expansions of the states */
-#define PLACES 64           /* of a mode where the round-off of its flow is looked at */
+#define MOST_PARTS_TRIED 128 /* of one step */
+#define COARSE_PARTS_TRIED 16 /* likewise, by expansions of the states */
+#define PLACES 64           /* of a mode where the round-off of its flow is bounded */
 #define ROUNDS 48           /* of closing in on a turning point */
 #define CLOSE_SHARE 0x1p-50 /* of a step, to which one is found */
 
@@ -32,19 +32,19 @@ typedef struct {
   const double *p;
   int64_t segment, arc, last, fine_row, fine_arc;
   int mode, n, crossed;
-  int degree, filled; /* of the step that is looked at, without coefficients that are zero; and of the matrix */
-  double *error, *size, *floor, *late; /* of all states; of each transition */
-  double *lines; /* series of the companion */
-  double *noise; /* what round-off of the flow may do in a step of the companion */
+  int degree, filled; /* of the current step, without coefficients that are zero; and of the matrix */
+  double *error, *size, *roundoff_floor, *time_errors; /* of all states; of each transition */
+  double *lines; /* series of the shadow run */
+  double *roundoff; /* what round-off of the flow may do in a step of the shadow run */
   double *defects, *derivatives, *factors, *inverse; /* of a correction; see screen_correction.c */
   int *exchanged;
   int64_t *tied; /* where the alternatives of each transition begin */
-  double *own;                        /* how wrong the states of the mode are */
+  double *mode_error; /* how wrong the states of the mode are */
   const hs_sparse *row; /* whose values `gradient` holds */
   double *x, *y, *z, *gradient, *slope, *values, *magnitudes, *at_start, *at_end;
   double *matrix, *bernstein;
-  double *enough; /* how far a step may still move states */
-  double *missed; /* how wrong states were where each mode's nearest miss is */
+  double *allowance; /* how far a step may still move states */
+  double *miss_error; /* how wrong states were where each mode's nearest miss is */
   int *open;
   int *beyond_at_start; /* whether a step begins beyond each surface of an edge with an `if` */
   int *cut; /* whether a state is, where a step is cut in halves */
@@ -54,23 +54,23 @@ typedef struct {
   hs_expansion *around, *slopes;
   double *drift;  /* how far parts of a step have moved states unseen */
   hs_near_miss *nearest; /* of each mode */
-  int looks;
+  int parts; /* of the step that were tried */
 } hs_view;
 
 typedef struct {
-  double value, rate, noise, shift;
-} hs_judged;
+  double value, rate, roundoff, error;
+} hs_near_surface;
 
-/* Where the companion is at the start of a step of the run, and how far it is from there on: coefficients 1 to order + 1
+/* Where the shadow run is at the start of a step of the run, and how far it is from there on: coefficients 1 to order + 1
    in shares of the step, and by how much it has moved at the end besides. */
 typedef struct {
   const hs_mode *table;
   const double *p;
-  double *x, *y, *moved, *noise, *lines;
+  double *x, *y, *moved, *roundoff, *lines;
   double t, h;
   int64_t row; /* where the run's step begins */
   int order, begins; /* whether an arc begins there */
-} hs_companion;
+} hs_shadow;
 
 /* The point at which transitions go, and the time within which other surfaces are reached together with it. */
 typedef struct {
@@ -85,7 +85,7 @@ static const double *recorded_piece(const hs_record *run, int64_t row) {
 }
 static const double *recorded_row(const hs_record *run, int64_t row) { return run->values + row * run->width; }
 
-/* Look at the step from a row: some states, as those of a fall, need few powers. */
+/* Make the step from a row the current one: some states, as those of a fall, need few powers. */
 static void take_step(hs_view *v, int64_t row) {
   const double *const c = recorded_piece(&v->s->run, row);
   const int w = v->s->run.width;
@@ -144,7 +144,7 @@ static int takes_time(const hs_record *run, int64_t arc) {
 static double tie_of(const hs_screen *s, double t) { return HS_TIE * hs_max(s->until, fabs(t)); }
 
 /* How wrong the time is of what happens at a time. */
-static double late_by(const hs_view *v, double t) {
+static double time_error_at(const hs_view *v, double t) {
   const hs_screen *s = v->s;
   const double tie = tie_of(s, s->run.times[s->run.rows - 1]);
   int64_t low = 0, high = s->run.transitions;
@@ -153,31 +153,31 @@ static double late_by(const hs_view *v, double t) {
     if (s->run.transition[middle].time <= t + tie) low = middle + 1;
     else high = middle;
   }
-  return low ? v->late[low - 1] : tie;
+  return low ? v->time_errors[low - 1] : tie;
 }
 
 static double resumed(const hs_transition *made) { return made->resumed == made->resumed ? made->resumed : made->time; }
 
 /* Round-off of a surface at a point, of which the gradient is known. */
-static double noise_of(const hs_view *v, double magnitude, double t, const double *x) {
+static double surface_roundoff(const hs_view *v, double magnitude, double t, const double *x) {
   for (int i = 0; i < v->row->count; i++)
     magnitude += fabs(v->gradient[i]) * fabs(v->row->place[i] ? x[v->row->place[i] - 1] : t);
   return ROUNDOFF_UNITS * HS_UNIT * magnitude;
 }
 
-/* Whether a companion shows the errors of the run. */
-static int is_followed(const hs_screen *s) { return s->order || s->correction; }
+/* Whether a shadow run shows the errors of the run. */
+static int has_shadow(const hs_screen *s) { return s->order || s->correction; }
 
 /* screen_errors.c */
 static void grow(double *error, double by);
-static double shift_by(const hs_view *v, double t);
+static double surface_error(const hs_view *v, double t);
 
 /* screen_ties.c */
 static int commute(hs_view *v, const hs_tied *tied, int one, int other);
 static int is_alternative(const hs_view *v, int64_t j, int k);
 
 /* screen_places.c */
-static int judge_surface(hs_view *v, int k, double t, const double *x, hs_judged *found);
+static int near_surface(hs_view *v, int k, double t, const double *x, hs_near_surface *found);
 static int evaluate_surfaces(hs_view *v, double t, const double *x);
 
 #endif

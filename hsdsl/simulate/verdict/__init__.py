@@ -1,32 +1,32 @@
-"""Does the theorem hold for this run? Its hypotheses, looked at one by one in what a run recorded.
+"""Does the theorem hold for this run? Its hypotheses, one by one, in what a run recorded.
 
 The convergence theorem (Burden et al. 2013, Thm 26, Cor. 28) is about executions that cross finitely many guards, each
 transversally. No other surface is so near that an error could change the sequence, and simultaneous choices lead to the
 same point. A run shows its own neighbourhood of the execution, so every margin is held against the error that the run
 allows itself.
 
-==============  ==============================================================================
-`screen`        where a compiled look says that there is nothing to find; `formulas`: routines as it takes them
-`companion`     the errors of a run, by what takes the same steps (`follower`), closer to the solution
-`correction`    steps that no series repeats, corrected
-`agreement`     the errors of a run, by the same run made finer
-`run_view`      an execution with its modes' routines; `place` is one state of it
-`steps`         its steps as polynomials, many at once, with routines over intervals
-`clear`         compiled runs of which it leaves nothing open
-`looks`         all of the following, of a run that the screen leaves open
-`finding`       one reason; `judged` holds margins against errors
-`reliability`   from when on a run cannot be relied on
-`crossings`     is each transition transversal, and its condition the same all around it?
-`landings`      does a reset land within the error of a surface, or jump?
-`misses`        surfaces that are almost reached or passed over; `endings`: what happens at the end
-`tangent`       arcs that leave a surface tangentially, as where sliding ends
-`transparent`   surfaces that are passed where their condition is false
-`flows`         does the flow vary unseen, jump, or have a slope without bound?
-`expansions`    operations along parts of steps, and what they hide; `expanded`: functions of these
-`commutation`   do transitions that are reached together commute?
-`accumulation`  Zeno points and rest, which the relaxed scheme goes through without a word
-`strips`        transitions that are lost while another one waits in a strip
-==============  ==============================================================================
+==================  ================================================================================
+`screen`            what compiled enclosures leave undecided; `formulas`: routines as it takes them
+`shadow`            the errors of a run, by a `shadow_run` that takes the same steps, closer to the solution
+`correction`        steps that no series repeats, corrected
+`agreement`         the errors of a run, by the same run made finer
+`run_view`          an execution with its modes' routines; `place` is one state of it
+`steps`             its steps as polynomials, many at once, with routines over intervals
+`compiled_verdict`  compiled runs of which it leaves nothing undecided
+`findings`          all of the following, of a run that the screen leaves undecided
+`finding`           one reason; `near_surface` holds margins against errors
+`reliability`       from when on a run cannot be relied on
+`crossings`         is each transition transversal, and its condition the same all around it?
+`landings`          does a reset land within the error of a surface, or jump?
+`misses`            surfaces that are almost reached or passed over; `endings`: what happens at the end
+`tangent`           arcs that leave a surface tangentially, as where sliding ends
+`transparent`       surfaces that are passed where their condition is false
+`flows`             does the flow vary unseen, jump, or have a slope without bound?
+`expansions`        operations along parts of steps, and what they leave unresolved; `expanded`: functions of these
+`commutation`       do transitions that are reached together commute?
+`accumulation`      Zeno points and rest, which the relaxed scheme goes through without a word
+`strips`            transitions that are lost while another one waits in a strip
+==================  ================================================================================
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import together
-from hsdsl.simulate.verdict.companion import has_companion, is_compiled
 from hsdsl.simulate.verdict.crossings import summary
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import Margins
+from hsdsl.simulate.verdict.shadow import has_shadow, is_compiled
 from hsdsl.simulate.verdict.strips import lost_in_strips
 
 __all__ = ["RunView", "assess", "margins_of"]
@@ -56,7 +56,7 @@ __all__ = ["RunView", "assess", "margins_of"]
 def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """Decide whether the theorem's hypotheses hold for a run, are left, or are unknown.
 
-    Where a companion shows that they hold, there is no finer run.
+    Where a shadow run shows that they hold, there is no finer run.
 
     Parameters
     ----------
@@ -68,28 +68,28 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     if run.stop.reason == "interrupted":  # nobody waits for what could not decide it
         if diagnostics.departures:
             return Verdict("left", _once(diagnostics.departures))
-        return Verdict("unknown", _once(diagnostics.doubts, [_incomplete(run.stop)]))
-    noted = diagnostics.departures or diagnostics.doubts
-    if not (noted or run.against or run.followed) and has_companion(run.problem, run.execution):
-        accompanied = replace(run, accompanied=True)
-        if accompanied.screen is not None or not is_compiled(run.execution):
-            found = _assessed(accompanied, diagnostics)
+        return Verdict("unknown", _once(diagnostics.undecided, [_incomplete(run.stop)]))
+    noted = diagnostics.departures or diagnostics.undecided
+    if not (noted or run.against or run.followed) and has_shadow(run.problem, run.execution):
+        by_shadow = replace(run, by_shadow=True)
+        if by_shadow.screen is not None or not is_compiled(run.execution):
+            found = _assessed(by_shadow, diagnostics)
             if found.theorem == "holds":
                 return found
     return _assessed(run, diagnostics)
 
 
 def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
-    left, unknown = list(departures(run, diagnostics)), [*diagnostics.doubts]
+    left, unknown = list(departures(run, diagnostics)), [*diagnostics.undecided]
     if left:
         return Verdict("left", _once(left, unknown))
     screen = run.screen
-    entered_inside = run.accompanied or not run.execution.enters_beyond
-    if not unknown and screen is not None and not screen.doubts() and entered_inside:
+    entered_inside = run.by_shadow or not run.execution.enters_beyond
+    if not unknown and screen is not None and not screen.undecided() and entered_inside:
         return Verdict("holds", margins_of(run.problem.program, run.execution.made, screen.margins, screen.commuting))
-    from hsdsl.simulate.verdict.looks import looked_at  # of a run that the screen leaves open
+    from hsdsl.simulate.verdict.findings import findings_of  # of a run that the screen leaves undecided
 
-    found, margins = looked_at(run)
+    found, margins = findings_of(run)
     left += _named(found, "left")
     unknown += _named(found, "unknown")
     unknown += _unchecked(run, run.stop)
@@ -99,7 +99,7 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
 
 
 def margins_of(program: Program, made: int, margins: Margins, commuting: Sequence[float]) -> tuple[str, ...]:
-    """The sentences on a run that a screen leaves nothing open of."""
+    """The sentences on a run that a screen leaves nothing undecided of."""
     crossed = summary(made, margins.crossed, margins.slowest, margins.least)
     return _once(crossed, together(commuting), margins.nearest_miss(program.modes))
 

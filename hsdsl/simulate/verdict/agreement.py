@@ -19,7 +19,7 @@ from hsdsl.execution import Execution, Transition
 
 Array = NDArray[np.float64]
 SAFE = 10  # margins below so many errors are named
-ROUNDOFF_UNITS = 64  # of the size of a state: no error is smaller
+ERROR_UNITS = 64  # of the size of a state: no error is smaller
 
 
 @dataclass(frozen=True)
@@ -67,16 +67,20 @@ class Errors:
         return SAFE * max(self.tie, self.tolerance * span) + strips
 
     @cached_property
-    def late(self) -> Array:
+    def time_errors(self) -> Array:
         """How far times of transitions are apart, up to each of them; shape (transitions in common,)."""
         pairs = zip(self.run.transitions, self.finer.transitions, strict=False)
         apart = [abs(float(one.time - other.time)) for one, other in pairs]
         return np.maximum.accumulate(np.array([self.tie, *apart]))[1:]
 
-    def late_by(self, time: Any) -> float:
+    def time_error_at(self, time: Any) -> float:
         """How wrong the time of what happens at a time is."""
         made = int(np.searchsorted(self._made_at, float(time) + self.tie, "right"))
-        return float(self.late[min(made, len(self.late)) - 1]) if made and len(self.late) else self.tie
+        return (
+            float(self.time_errors[min(made, len(self.time_errors)) - 1])
+            if made and len(self.time_errors)
+            else self.tie
+        )
 
     @cached_property
     def _made_at(self) -> Array:
@@ -91,7 +95,7 @@ class Errors:
     def measured(self) -> Array:
         """How far the two runs are apart in each state; shape (rows, states), nowhere falling."""
         found = np.zeros(self._values.shape)
-        count = len(self.late) if self.parted is None else int(np.searchsorted(self._made_at, self.parted))
+        count = len(self.time_errors) if self.parted is None else int(np.searchsorted(self._made_at, self.parted))
         shift = np.array([0.0, *(self._resumed(self.finer, k) - self._resumed(self.run, k) for k in range(count))])
         rows = np.flatnonzero(self._jumps <= count)
         self._compare(found, rows, self._values[rows], self._times[rows] + shift[self._jumps[rows]])
@@ -115,7 +119,7 @@ class Errors:
     @cached_property
     def by_row(self) -> Array:
         """How wrong each state is; shape (rows, states), nowhere falling, and never below what one step may do."""
-        least = max(self.tolerance, ROUNDOFF_UNITS * self.unit) * self.sizes
+        least = max(self.tolerance, ERROR_UNITS * self.unit) * self.sizes
         least[0] = 0.0
         return np.maximum(self.measured, least)
 

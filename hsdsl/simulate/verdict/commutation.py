@@ -24,11 +24,11 @@ Landed = tuple[str, State]
 
 def choices(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at every transition that others were passed over for."""
-    if run.screen is not None and not run.doubts("choice"):
+    if run.screen is not None and not run.undecided("choice"):
         return [], together(run.screen.commuting)
     found: list[Finding] = []
     commuting: list[Number] = []
-    for made in run.relied_transitions:
+    for made in run.reliable_transitions:
         if not made.alternatives:
             continue
         place, k = run.before(made)
@@ -62,7 +62,7 @@ def together(commuting: Sequence[Number]) -> list[str]:
 
 def outranked(run: RunView, place: Place, k: int, other: int, made: Transition) -> bool:
     """Whether an edge has the surface of the one that was taken, and a lower priority: no error changes their order."""
-    error = tuple(abs(x) for x in place.x) if run.errors is None else run.around(place, run.row_before(made))
+    error = tuple(abs(x) for x in place.x) if run.errors is None else run.safe_error(place, run.row_before(made))
     return place.outranks(k, other, error)
 
 

@@ -1,9 +1,9 @@
-"""Corrections of recorded steps that no series repeats: by how much a companion moves away from the run along one.
+"""Corrections of recorded steps that no series repeats: by how much a shadow run moves away from the run along one.
 
-The run is at p(s) at the share s of a step of length h, and the companion at p(0) + e where it begins. A polynomial by
+The run is at p(s) at the share s of a step of length h, and the shadow run at p(0) + e where it begins. A polynomial by
 Radau IIA is off inside by more than at its end, by two powers of h: so much that changes of the derivatives along the
 step matter. It fails the flow by a multiple of M(s), the product of s - c over its nodes. So with u, of what it fails
-where that is most, the companion is first taken to be at q(s) = p(s) + e + u m(s), m being the integral of M, which is
+where that is most, the shadow run is first taken to be at q(s) = p(s) + e + u m(s), m being the integral of M, which is
 0 at both ends. Then it is at q(s) + d(s), where, J being the derivatives of the flow by the states at the step's end,
 
     d' = h J d + g,    g(s) = h f(t + s h, q(s)) - q'(s),    d(1) = integral of exp((1 - s) h J) g(s) over [0, 1].
@@ -13,7 +13,7 @@ Radau's quadrature are taken, which is exact to degree 6: collocation by three o
 exponential of each power of s has a rational function instead, with one pole of order 6, so that one real matrix is
 factored. Its series agree with the exact ones to the power 3 of h J, and with those at infinity to the power -2: so
 small an error as that of a stiff state at the end of a step is found, of which defects elsewhere in the step are
-thousands of times as large. The pole 1/5 makes the companion's own steps A-stable, and keeps the amplitude of an
+thousands of times as large. The pole 1/5 makes the shadow run's own steps A-stable, and keeps the amplitude of an
 oscillation of one radian a step to 1e-4.
 """
 

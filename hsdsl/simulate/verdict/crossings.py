@@ -11,10 +11,10 @@ from hsdsl.execution import Arc, Transition
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.judged import has_condition
+from hsdsl.simulate.verdict.near_surface import has_condition
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
-from hsdsl.simulate.verdict.screen import LOOK_AT_CROSSING
+from hsdsl.simulate.verdict.screen import CROSSING_UNDECIDED
 
 
 def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
@@ -22,8 +22,8 @@ def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
     found: list[Finding] = []
     slowest: Number | None = None
     least: Number | None = None
-    known = None if run.doubts("crossing") or run.screen is None else run.screen.margins
-    made = run.relied_transitions if known is None else run.doubtful_transitions(LOOK_AT_CROSSING)
+    known = None if run.undecided("crossing") or run.screen is None else run.screen.margins
+    made = run.reliable_transitions if known is None else run.undecided_transitions(CROSSING_UNDECIDED)
     made = [t for t in made if not t.entry]
     ends = {arc.jump: arc for arc in run.flows} if made else {}
     for transition in made:
@@ -57,10 +57,10 @@ def _margin(run: RunView, place: Place, k: int, arc: Arc | None, made: Transitio
     """How often the error fits into what keeps the crossing; None where nothing shows it."""
     if run.errors is None:
         return None
-    shift = run.shift(place, k, run.row_before(made))
+    shift = run.surface_error(place, k, run.row_before(made))
     rate, bend = place.rate(k), run.arithmetic.zero
     if arc is not None:
-        before = run.between(arc, arc.last - 1)((run.arithmetic.zero + 1) / 2)
+        before = run.dense_output(arc, arc.last - 1)((run.arithmetic.zero + 1) / 2)
         bend = abs(rate - before.rate(k)) / (place.t - before.t) if place.t > before.t else bend
     depth = rate * rate / (2 * bend) if bend > 0 else run.arithmetic.zero + float("inf")
     return depth / shift if shift > 0 else run.arithmetic.zero + float("inf")
@@ -87,6 +87,8 @@ def _findings(
     if run.errors is None:
         return found
     row = run.row_before(made)
-    if has_condition(place, k) and place.conditions(k, run.around(place, row), run.late(place, k, row)) != {True}:
+    if has_condition(place, k) and place.conditions(
+        k, run.safe_error(place, row), run.safe_time_error(place, k, row)
+    ) != {True}:
         found.append(Finding("condition", "unknown", f"whether the condition of {where} holds is within the error"))
     return found

@@ -11,7 +11,7 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.commutation import commute
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.judged import has_condition, judged, may_hold
+from hsdsl.simulate.verdict.near_surface import has_condition, may_hold, near_surface
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 
@@ -31,15 +31,15 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
         yield from _at_a_kink(run, arc, place)
         return
     if crossed is None:
-        place = run.between(arc, arc.last - 1)(run.arithmetic.zero + 1)
+        place = run.dense_output(arc, arc.last - 1)(run.arithmetic.zero + 1)
     alternatives = run.transitions[arc.jump].alternatives if crossed is not None else ()
     tied = {run.edge_at(place, name) for name in alternatives}  # `choices` looks at these
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
         if k == crossed or k in tied or place.value(k) > place.roundoff_bound(k) or not place.rate(k) > 0:
             continue
-        if crossed is not None and crossed != k and place.outranks(crossed, k, run.around(place, arc.last)):
+        if crossed is not None and crossed != k and place.outranks(crossed, k, run.safe_error(place, arc.last)):
             continue
-        finding = judged(run, place, k, arc.last, "is about to reach")
+        finding = near_surface(run, place, k, arc.last, "is about to reach")
         if finding is None:
             continue
         if crossed is None:
@@ -56,13 +56,13 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
 
 def _at_a_kink(run: RunView, arc: Arc, after: Place) -> Iterator[Finding]:
     """Surfaces that rise up to a kink of an input and no further."""
-    before = run.between(arc, arc.last - 1)(run.arithmetic.zero + 1)
+    before = run.dense_output(arc, arc.last - 1)(run.arithmetic.zero + 1)
     for k in range(len(after.mode.edges) + len(after.mode.walls)):
         if not before.rate(k) > 0 >= after.rate(k) or before.value(k) > before.roundoff_bound(k):
             continue
         if has_condition(before, k) and not may_hold(run, before, k, arc.last):
             continue
-        margin = SAFE * run.shift(before, k, arc.last) + before.roundoff_bound(k)
+        margin = SAFE * run.surface_error(before, k, arc.last) + before.roundoff_bound(k)
         if abs(before.value(k)) <= margin:
             where = f"the surface of {before.name(k)} at t = {show(before.t)}, where an input has a kink"
             yield Finding("miss", "unknown", f"the run turns back within the error of {where}")
@@ -70,21 +70,21 @@ def _at_a_kink(run: RunView, arc: Arc, after: Place) -> Iterator[Finding]:
 
 def at_the_end(run: RunView) -> Iterator[Finding]:
     """Surfaces that would be reached just behind the end, and a transition just before it."""
-    if run.errors is None or run.upto < inf or run.stop.reason != "until" or not run.flows:
+    if run.errors is None or run.reliable_until < inf or run.stop.reason != "until" or not run.flows:
         return
     arc, until = run.flows[-1], run.times[-1]
     place = run.at_row(arc, arc.last)
     if run.times[arc.last] == until:
         for k in range(len(place.mode.edges)):
             try:
-                near = abs(place.value(k)) <= SAFE * run.shift(place, k, arc.last)
-                if near and place.rate(k) > 0 and judged(run, place, k, arc.last, "ends at"):
+                near = abs(place.value(k)) <= SAFE * run.surface_error(place, k, arc.last)
+                if near and place.rate(k) > 0 and near_surface(run, place, k, arc.last, "ends at"):
                     yield Finding("end", "unknown", _undecided(place.name(k)))
             except DOMAIN_ERRORS:
                 continue
     if run.transitions:
         made, length = run.transitions[-1], float(run.times[-1] - run.times[0])
-        late = run.errors.late_by(made.time) + run.errors.tolerance * length
+        late = run.errors.time_error_at(made.time) + run.errors.tolerance * length
         if until - made.time < SAFE * late:
             yield Finding("end", "unknown", _undecided(made.edge))
 

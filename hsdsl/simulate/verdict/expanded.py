@@ -31,13 +31,15 @@ UNBOUNDED = frozenset({"sqrt"})  # its slope at the end of its domain: no range 
 
 
 def _exponential(a: Expansion) -> Expansion:
-    here, by = np.exp(a.terms[0]), a.reach
+    here, by = np.exp(a.terms[0]), a.deviation
     return composed(a, (here, here, here / 2, here / 6), by**4 / 24 * here * np.exp(by))
 
 
 def _logarithm(a: Expansion) -> Expansion:
     value = np.where(a.terms[0] > 0, a.terms[0], np.nan)
-    return composed(a, (np.log(value), 1 / value, -1 / value**2 / 2, 1 / value**3 / 3), geometric(a.reach / value) / 4)
+    return composed(
+        a, (np.log(value), 1 / value, -1 / value**2 / 2, 1 / value**3 / 3), geometric(a.deviation / value) / 4
+    )
 
 
 def _root(a: Expansion) -> Expansion:
@@ -45,19 +47,19 @@ def _root(a: Expansion) -> Expansion:
     value = np.where(a.terms[0] > 0, a.terms[0], np.nan)
     s = np.sqrt(value)
     coefficients = s, s / value / 2, -s / value**2 / 8, s / value**3 / 16
-    return composed(a, coefficients, s * 5 / 128 * geometric(a.reach / value))
+    return composed(a, coefficients, s * 5 / 128 * geometric(a.deviation / value))
 
 
 def _sine(a: Expansion, quarter: int = 0) -> Expansion:
     sine, cosine = np.sin(a.terms[0]), np.cos(a.terms[0])
     here, across = (cosine, -sine) if quarter else (sine, cosine)
-    return composed(a, (here, across, -here / 2, -across / 6), a.reach**4 / 24)
+    return composed(a, (here, across, -here / 2, -across / 6), a.deviation**4 / 24)
 
 
 def _angle(a: Expansion) -> Expansion:
     x = a.terms[0]
     m = 1 / (1 + x * x)
-    return composed(a, (np.arctan(x), m, -x * m * m, (x * x - 1 / 3) * m**3), geometric(a.reach * np.sqrt(m)) / 4)
+    return composed(a, (np.arctan(x), m, -x * m * m, (x * x - 1 / 3) * m**3), geometric(a.deviation * np.sqrt(m)) / 4)
 
 
 def _odd(function: Callable[[Expansion], Expansion]) -> Callable[[Expansion], Expansion]:
@@ -110,11 +112,11 @@ def _unknown(_: Expansion) -> Expansion:
 
 
 def _absolute(a: Expansion) -> Expansion:
-    return chosen(np.abs(a.terms[0]) > a.reach, chosen(a.terms[0] < 0, -a, a), NOTHING_KNOWN)
+    return chosen(np.abs(a.terms[0]) > a.deviation, chosen(a.terms[0] < 0, -a, a), NOTHING_KNOWN)
 
 
 def _least(one: Expansion, other: Expansion) -> Expansion:
-    apart, more = one.reach + other.reach, other.terms[0] - one.terms[0]
+    apart, more = one.deviation + other.deviation, other.terms[0] - one.terms[0]
     return chosen(np.abs(more) > apart, chosen(more > 0, one, other), NOTHING_KNOWN)
 
 
@@ -123,7 +125,7 @@ def _most(one: Expansion, other: Expansion) -> Expansion:
 
 
 def _below(number: Expansion, bound: Expansion, one: Expansion, other: Expansion) -> Expansion:
-    more, apart = bound.terms[0] - number.terms[0], number.reach + bound.reach
+    more, apart = bound.terms[0] - number.terms[0], number.deviation + bound.deviation
     return chosen((more > apart) | (more <= -apart), chosen(more > 0, one, other), NOTHING_KNOWN)
 
 
@@ -183,6 +185,6 @@ EXPANDED = Arithmetic(
     bits=53,
     unit=2.0**-53,
     constant=_constant,
-    isfinite=lambda value: bool(np.all(np.isfinite(value.rest))),
+    isfinite=lambda value: bool(np.all(np.isfinite(value.remainder))),
     functions=FUNCTIONS,
 )

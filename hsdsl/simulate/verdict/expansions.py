@@ -1,10 +1,10 @@
 """Expansions of generated routines along parts of steps, many at once: what a formula is there up to third order.
 
-An expansion is a function of u from -1 to 1, no further than its rest from a polynomial. An operation is *resolved*
-where what it makes beyond third order is no more than an eighth of its terms: its result is as smooth as the part is
-long. What the others may add is carried along as hidden. So a narrow pulse is hidden, however small it is against the
-terms that it is added to, and a term that varies with the part is not, however large. ``runtime/c/expansions.c`` does
-the same.
+An expansion is a function of u from -1 to 1, no further than its remainder from a polynomial. An operation is
+*resolved* where what it makes beyond third order is no more than an eighth of its terms: its result is as smooth as the
+part is long. What the others may add is carried along as unresolved. So a narrow pulse is unresolved, however small it
+is against the terms that it is added to, and a term that varies with the part is not, however large.
+``runtime/c/expansions.c`` does the same.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from hsdsl.enclosures import Range, as_range
 Array = NDArray[np.float64]
 
 ORDER = 3
-ROUNDED = 2.0**-48  # of all terms together: more than rounding makes of a coefficient
+EXPANSION_ROUNDOFF = 2.0**-48  # of all terms together: more than rounding makes of a coefficient
 RESOLVED = 8  # terms are so many times what is beyond them; what moves a state by so many errors is seen
 
 
@@ -34,26 +34,26 @@ class Expansion:
     ----------
     terms : array, shape (4, N)
         Coefficients of 1, u, u**2 and u**3.
-    rest : array, shape (N,)
+    remainder : array, shape (N,)
         How far the function may be from these; infinite where nothing is known.
-    hidden : array, shape (N,)
+    unresolved : array, shape (N,)
         How much of that no smooth function explains.
-    moved : array, shape (N,)
+    error : array, shape (N,)
         How much the errors of states change it, where no terms cancel.
     """
 
     terms: Array
-    rest: Array
-    hidden: Array
-    moved: Array
+    remainder: Array
+    unresolved: Array
+    error: Array
 
     @property
-    def turn(self) -> Array:
+    def variation(self) -> Array:
         """How far the polynomial may be from its value in the middle."""
         return np.abs(self.terms[1:]).sum(axis=0)
 
     @property
-    def shown(self) -> Array:
+    def magnitude(self) -> Array:
         """How far the polynomial may be from zero."""
         return np.abs(self.terms).sum(axis=0)
 
@@ -63,26 +63,26 @@ class Expansion:
         return self.terms[0] + self.terms[2] / 3
 
     @property
-    def reach(self) -> Array:
+    def deviation(self) -> Array:
         """How far the function may be from that."""
-        return self.turn + self.rest
+        return self.variation + self.remainder
 
     @property
     def size(self) -> Array:
         """How far it may be from zero."""
-        return self.shown + self.rest
+        return self.magnitude + self.remainder
 
     @property
     def range(self) -> Range:
         """All that it may be."""
-        return Range(self.terms[0] - self.reach, self.terms[0] + self.reach)
+        return Range(self.terms[0] - self.deviation, self.terms[0] + self.deviation)
 
     def __neg__(self) -> Expansion:
-        return Expansion(-self.terms, self.rest, self.hidden, self.moved)
+        return Expansion(-self.terms, self.remainder, self.unresolved, self.error)
 
     def __add__(self, other: Expansion) -> Expansion:
-        rest = self.rest + other.rest + (self.size + other.size) * ROUNDED
-        return _known(self.terms + other.terms, rest, self.hidden + other.hidden, self.moved + other.moved)
+        remainder = self.remainder + other.remainder + (self.size + other.size) * EXPANSION_ROUNDOFF
+        return _known(self.terms + other.terms, remainder, self.unresolved + other.unresolved, self.error + other.error)
 
     def __sub__(self, other: Expansion) -> Expansion:
         return self + -other
@@ -104,71 +104,71 @@ def line(value: Any, slope: Any) -> Expansion:
     """A linear function, known up to rounding."""
     value, slope = np.broadcast_arrays(np.atleast_1d(np.asarray(value, dtype=float)), slope)
     zero = np.zeros(value.shape)
-    return Expansion(np.stack([value, slope, zero, zero]), np.abs(value) * ROUNDED, zero, zero)
+    return Expansion(np.stack([value, slope, zero, zero]), np.abs(value) * EXPANSION_ROUNDOFF, zero, zero)
 
 
-def polynomial(powers: Array, moved: Array) -> Expansion:
+def polynomial(powers: Array, error: Array) -> Expansion:
     """A polynomial of u; ``powers`` has shape (N, degree + 1)."""
     sizes = np.abs(powers)
     terms = np.zeros((ORDER + 1, len(powers)))
     terms[: powers.shape[1]] = powers[:, : ORDER + 1].T
-    rest = sizes[:, ORDER + 1 :].sum(axis=1) + sizes[:, : ORDER + 1].sum(axis=1) * ROUNDED
-    return Expansion(terms, rest, np.zeros(len(powers)), moved)
+    remainder = sizes[:, ORDER + 1 :].sum(axis=1) + sizes[:, : ORDER + 1].sum(axis=1) * EXPANSION_ROUNDOFF
+    return Expansion(terms, remainder, np.zeros(len(powers)), error)
 
 
-def _known(terms: Array, rest: Array, hidden: Array, moved: Array) -> Expansion:
+def _known(terms: Array, remainder: Array, unresolved: Array, error: Array) -> Expansion:
     """An expansion, or one of which nothing is known."""
-    lost = ~np.isfinite(rest)
+    lost = ~np.isfinite(remainder)
     if lost.any():
-        terms, moved = np.where(lost, 0.0, terms), np.where(lost, 0.0, moved)
-        rest, hidden = np.where(lost, np.inf, rest), np.where(lost, np.inf, hidden)
-    return Expansion(terms, rest, hidden, moved)
+        terms, error = np.where(lost, 0.0, terms), np.where(lost, 0.0, error)
+        remainder, unresolved = np.where(lost, np.inf, remainder), np.where(lost, np.inf, unresolved)
+    return Expansion(terms, remainder, unresolved, error)
 
 
-def _flat(value: Range, moved: Any = 0.0) -> Expansion:
+def _flat(value: Range, error: Any = 0.0) -> Expansion:
     """A constant, and anything within a range."""
     half = (value.high - value.low) / 2
     terms = np.zeros((ORDER + 1, *np.shape(half)))
     terms[0] = value.low + half
-    return _known(terms, half + np.abs(terms[0]) * ROUNDED, half, moved + np.zeros(half.shape))
+    return _known(terms, half + np.abs(terms[0]) * EXPANSION_ROUNDOFF, half, error + np.zeros(half.shape))
 
 
 def chosen(which: Any, one: Expansion, other: Expansion) -> Expansion:
     """One of two, element by element."""
     return Expansion(
         np.where(which, one.terms, other.terms),
-        np.where(which, one.rest, other.rest),
-        np.where(which, one.hidden, other.hidden),
-        np.where(which, one.moved, other.moved),
+        np.where(which, one.remainder, other.remainder),
+        np.where(which, one.unresolved, other.unresolved),
+        np.where(which, one.error, other.error),
     )
 
 
 def at_most(found: Expansion, function: Callable[..., Any], *arguments: Expansion) -> Expansion:
-    """The constant instead, where less is hidden in all that a function may be."""
-    if not (found.hidden > 0).any():
+    """The constant instead, where less is unresolved in all that a function may be."""
+    if not (found.unresolved > 0).any():
         return found
-    flat = _flat(as_range(function(*(a.range for a in arguments))), found.moved)
-    better = reduce(np.logical_and, [np.isfinite(a.rest) for a in arguments], flat.hidden < found.hidden)
+    flat = _flat(as_range(function(*(a.range for a in arguments))), found.error)
+    better = reduce(np.logical_and, [np.isfinite(a.remainder) for a in arguments], flat.unresolved < found.unresolved)
     return chosen(better, flat, found)
 
 
 def product(a: Expansion, b: Expansion) -> Expansion:
     """A b, by its series alone."""
-    whole = np.zeros((2 * ORDER + 1, *np.broadcast_shapes(a.rest.shape, b.rest.shape)))
+    whole = np.zeros((2 * ORDER + 1, *np.broadcast_shapes(a.remainder.shape, b.remainder.shape)))
     for k, each in enumerate(a.terms):
         whole[k : k + ORDER + 1] += each * b.terms
     terms, beyond = whole[: ORDER + 1], np.abs(whole[ORDER + 1 :]).sum(axis=0)
     sizes = np.abs(a.terms[0]), np.abs(b.terms[0])
-    together = a.turn * (sizes[1] + b.turn) + sizes[0] * b.turn - beyond
-    off, size = beyond + a.rest * b.size + b.rest * (a.size - a.rest), a.size * b.size
-    hidden = np.where(beyond * RESOLVED <= together, a.hidden * b.size + b.hidden * a.size, off)
-    return _known(terms, off + size * ROUNDED, hidden, sizes[0] * b.moved + a.moved * sizes[1])
+    varies = a.variation * (sizes[1] + b.variation) + sizes[0] * b.variation - beyond
+    off, size = beyond + a.remainder * b.size + b.remainder * (a.size - a.remainder), a.size * b.size
+    unresolved = np.where(beyond * RESOLVED <= varies, a.unresolved * b.size + b.unresolved * a.size, off)
+    return _known(terms, off + size * EXPANSION_ROUNDOFF, unresolved, sizes[0] * b.error + a.error * sizes[1])
 
 
 def reciprocal(a: Expansion) -> Expansion:
     """1/a."""
     v = 1 / a.terms[0]
-    return composed(a, (v, -(v**2), v**3, -(v**4)), np.abs(v) * geometric(a.reach * np.abs(v)))
+    return composed(a, (v, -(v**2), v**3, -(v**4)), np.abs(v) * geometric(a.deviation * np.abs(v)))
 
 
 def geometric(share: Array) -> Array:
@@ -179,19 +179,19 @@ def geometric(share: Array) -> Array:
 def composed(a: Expansion, c: Sequence[Array], further: Array) -> Expansion:
     """A function with coefficients around the value of an expansion; ``further`` bounds its powers from the fourth."""
     _, first, second, third = a.terms
-    by, one = a.reach, np.abs(first)
+    by, one = a.deviation, np.abs(first)
     slope, bend, twist = (np.abs(each) for each in c[1:])
-    together = by * (slope + by * (bend + by * twist))
+    varies = by * (slope + by * (bend + by * twist))
     beyond = bend * (by * by - one * (one + 2 * np.abs(second))) + twist * (by**3 - one**3) + further
-    off, gain = slope * a.rest + beyond, slope + by * (2 * bend + 3 * by * twist)
-    hidden = np.where(beyond * RESOLVED <= together, a.hidden * gain, off)
+    off, gain = slope * a.remainder + beyond, slope + by * (2 * bend + 3 * by * twist)
+    unresolved = np.where(beyond * RESOLVED <= varies, a.unresolved * gain, off)
     terms = [
         c[0],
         c[1] * first,
         c[1] * second + c[2] * first * first,
         c[1] * third + first * (2 * c[2] * second + c[3] * first * first),
     ]
-    return _known(np.stack(terms), off + (np.abs(c[0]) + together) * ROUNDED, hidden, slope * a.moved)
+    return _known(np.stack(terms), off + (np.abs(c[0]) + varies) * EXPANSION_ROUNDOFF, unresolved, slope * a.error)
 
 
 NOTHING_KNOWN = Expansion(np.zeros((ORDER + 1, 1)), np.full(1, np.inf), np.full(1, np.inf), np.zeros(1))

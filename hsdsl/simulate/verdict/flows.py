@@ -29,11 +29,11 @@ Array = NDArray[np.float64]
 
 def flows(run: RunView) -> tuple[list[Finding], list[str]]:
     """Look at the flow of every mode along all steps in it."""
-    jumping = [mode for mode in visited(run) if mode.jumps] if run.doubts("flow change") else []
+    jumping = [mode for mode in visited(run) if mode.jumps] if run.undecided("flow change") else []
     found = [_jumping(jumping)] if jumping else []
     if run.errors is None:
         return found, []
-    for steps in steps_of(run, doubtful="changing"):
+    for steps in steps_of(run, marked="changing"):
         with np.errstate(all="ignore"):
             steep = run.problem.program.modes[steps.mode].steep
             unbounded = [*_named(run, "the slope of the flow", "has no bound", *_steep(run, steps))] if steep else []
@@ -63,52 +63,56 @@ def _unseen(run: RunView, steps: Parts) -> tuple[Parts, NDArray[np.bool_]]:
     """
     number = np.zeros(int(steps.row.max(initial=0)) + 1, dtype=int)
     number[steps.row] = np.arange(len(steps))
-    enough, parts, halvings = RESOLVED * np.maximum(steps.error, NOTHING), steps, 0
-    looked, moved = steps.take([]), np.zeros((3, 0, steps.error.shape[1]))
+    allowance, parts, halvings = RESOLVED * np.maximum(steps.error, NOTHING), steps, 0
+    decided, moved = steps.take([]), np.zeros((3, 0, steps.error.shape[1]))
     while True:
         step, here = number[parts.row], _moved_unseen(run, parts)
-        open_ = np.logical_not(here[0] <= enough[step] * parts.width[:, None] / 2)
+        open_ = np.logical_not(here[0] <= allowance[step] * parts.width[:, None] / 2)
         left: NDArray[np.bool_] = np.any(open_, axis=1)
-        both, together = joined([looked, parts]), np.concatenate([moved, here], axis=1)
-        far = _furthest(number[both.row], both.start, together, enough)
-        left &= np.any(np.logical_not(far <= enough), axis=1)[step]
+        both, together = joined([decided, parts]), np.concatenate([moved, here], axis=1)
+        far = _furthest(number[both.row], both.start, together, allowance)
+        left &= np.any(np.logical_not(far <= allowance), axis=1)[step]
         if halvings == HALVINGS or not 0 < left.sum() <= MOST_PARTS // 2:
             return parts.take(left), open_[left]
-        kept = np.concatenate([np.ones(len(looked), dtype=bool), ~left])
-        looked, moved = both.take(kept), together[:, kept]
+        kept = np.concatenate([np.ones(len(decided), dtype=bool), ~left])
+        decided, moved = both.take(kept), together[:, kept]
         parts, halvings = parts.take(left).halves(), halvings + 1
 
 
-def _furthest(step: NDArray[np.int64], start: Array, moved: Array, enough: Array) -> Array:
+def _furthest(step: NDArray[np.int64], start: Array, moved: Array, allowance: Array) -> Array:
     """How far parts, one after another, may move states along their steps; shape (steps, n)."""
     order = np.lexsort((start, step))
     steps, first, counts = np.unique(step[order], return_index=True, return_counts=True)
-    most, drift, hidden = moved[:, order]
-    drift = np.clip(drift, -3 * enough[step[order]], 3 * enough[step[order]])  # no step spoils the sums of another
+    most, drift, unresolved = moved[:, order]
+    drift = np.clip(
+        drift, -3 * allowance[step[order]], 3 * allowance[step[order]]
+    )  # no step spoils the sums of another
     sums = np.cumsum(drift, axis=0)
     since = np.abs(sums - np.repeat(sums[first] - drift[first], counts, axis=0))
-    found = np.zeros(enough.shape)
-    found[steps] = np.maximum.reduceat(since, first) + np.maximum.reduceat(most, first) + np.add.reduceat(hidden, first)
+    found = np.zeros(allowance.shape)
+    found[steps] = (
+        np.maximum.reduceat(since, first) + np.maximum.reduceat(most, first) + np.add.reduceat(unresolved, first)
+    )
     return found
 
 
 def _moved_unseen(run: RunView, parts: Parts) -> Array:
     """How far states are moved along parts by what these do not show; shape (3, N, n).
 
-    Either way, in all, and by what may have any sign: that is what is hidden or, on parts so short that no method looks
-    at each, how the flow differs from the slopes of the states' polynomials. What errors of states change the flow by
-    is no pulse.
+    Either way, in all, and by what may have any sign: that is what is unresolved or, on parts so short that no method
+    looks at each, how the flow differs from the slopes of the states' polynomials. What errors of states change
+    the flow by is no pulse.
     """
     (time, *states), slopes = parts.expanded()
     data = [line(column, 0.0) for column in parts.data.T]
     flow = run.problem.kernel.over(EXPANDED).bind(parts.mode, data).flow(time, *states)
     found = np.zeros((3, len(parts), len(slopes)))
     for i, (f, slope) in enumerate(zip(flow, slopes, strict=True)):
-        differs, allowed = f - slope, RESOLVED * f.moved
-        shown, drift = (np.where(parts.width < SEEN, a, 0.0) for a in (differs.shown, differs.mean))
-        found[0, :, i] = np.maximum(f.hidden + shown - allowed, 0.0)
+        differs, allowed = f - slope, RESOLVED * f.error
+        shown, drift = (np.where(parts.width < SEEN, a, 0.0) for a in (differs.magnitude, differs.mean))
+        found[0, :, i] = np.maximum(f.unresolved + shown - allowed, 0.0)
         found[1, :, i] = np.copysign(np.maximum(np.abs(drift) - allowed, 0.0), drift)
-        found[2, :, i] = np.maximum(f.hidden - np.maximum(allowed - np.abs(drift), 0.0), 0.0)
+        found[2, :, i] = np.maximum(f.unresolved - np.maximum(allowed - np.abs(drift), 0.0), 0.0)
     return found * (parts.width * parts.length)[:, None]
 
 

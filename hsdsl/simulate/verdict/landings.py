@@ -19,7 +19,7 @@ from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
 from hsdsl.simulate.verdict.place import ALONG, Place
 from hsdsl.simulate.verdict.run_view import RunView
-from hsdsl.simulate.verdict.screen import LOOK_AT_RESET
+from hsdsl.simulate.verdict.screen import RESET_UNDECIDED
 from hsdsl.simulate.verdict.tangent import leaves_along
 
 UNITS = 64  # of round-off, and less, are no jump
@@ -32,7 +32,7 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
     if run.errors is None:
         return [], []
     found: list[Finding] = []
-    for arc in run.doubtful_flows("landing"):
+    for arc in run.undecided_flows("landing"):
         place = run.at_row(arc, arc.first)
         made = run.transitions[arc.jump - 1] if arc.jump else None
         for k in range(len(place.mode.edges) + len(place.mode.walls)):
@@ -41,7 +41,7 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
                     found += _on(run, arc, place, k, made)
             except DOMAIN_ERRORS:
                 continue  # `misses` looks along the arc
-    for made in run.doubtful_transitions(LOOK_AT_RESET):
+    for made in run.undecided_transitions(RESET_UNDECIDED):
         try:
             found += _continuous(run, made)
         except DOMAIN_ERRORS:
@@ -61,15 +61,15 @@ def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -
             yield Finding("start", "unknown", f"the run starts on {where}, {how}")
         return
     assert run.errors is not None
-    shift = run.shift(place, k, arc.first)
+    shift = run.surface_error(place, k, arc.first)
     if made is None or _tied(run, made) or abs(value) > SAFE * shift + noise:
         return
     if rate > place.rate_roundoff(k) and not conditional:
         return  # it is crossed at once, on either side of it
     if _keeps(run, made, k, value):
         return
-    late = SAFE * run.errors.late_by(place.t)
-    if conditional and place.conditions(k, run.around(place, arc.first), late) == {False}:
+    late = SAFE * run.errors.time_error_at(place.t)
+    if conditional and place.conditions(k, run.safe_error(place, arc.first), late) == {False}:
         return
     on = abs(value) <= noise or not shift > 0
     away = f"on {where}" if on else f"{times(abs(value) / shift)} the error away from {where}"
@@ -79,7 +79,7 @@ def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -
 def _soon(run: RunView, place: Place, row: int) -> State:
     """How far the state may be from a place within the tie tolerance, with its error and round-off."""
     slope, tie = place.kernel.flow(place.t, *place.x), run.tie(place.t)
-    moved = zip(run.around(place, row), place.x, slope, strict=True)
+    moved = zip(run.safe_error(place, row), place.x, slope, strict=True)
     return tuple(e + run.arithmetic.unit * abs(x) + abs(f) * tie for e, x, f in moved)
 
 
@@ -99,7 +99,7 @@ def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:
     target = before.mode.edges[edge].target
     if k == edge and target == run.index(made.source) and _untouched(before, edge):
         return True
-    for moved in before.along_guard(edge, run.around(before, run.row_before(made))):
+    for moved in before.along_guard(edge, run.safe_error(before, run.row_before(made))):
         landed = before.kernel.resets[edge](made.time, *moved)
         after = run.place(target, made.time, landed)
         here = before.kernel.resets[edge](made.time, *before.x)
@@ -122,13 +122,13 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
     assert run.errors is not None
     place, k = run.before(made)
     where = f"{made.edge} at t = {show(made.time)}"
-    late = SAFE * run.errors.late_by(made.time)
+    late = SAFE * run.errors.time_error_at(made.time)
     if any(jump and abs(time - float(made.time)) <= late for time, jump in _samples_near(run, made.time)):
         yield Finding("input", "unknown", f"an input or function of time jumps within the error of the time of {where}")
     edge = place.mode.edges[k]
     if made.after is None or not any(map(CURVED.search, edge.reset_texts)):
         return
-    error = run.around(place, run.row_before(made))
+    error = run.safe_error(place, run.row_before(made))
     narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))
     noise = _noise(run, place, k)
     least = [

@@ -18,14 +18,14 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.endings import at_its_end, at_the_end
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.judged import closed_in, has_condition, judged, may_hold
+from hsdsl.simulate.verdict.near_surface import has_condition, may_hold, near_surface, rising_zero
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 from hsdsl.simulate.verdict.tangent import leaves_along
-from hsdsl.simulate.verdict.transparent import Passed, almost_left, passed_at, reached, spread, transparent
+from hsdsl.simulate.verdict.transparent import Passed, almost_left, passed_at, reached, shares_between, transparent
 
 HALVINGS = 20
-MOST_LOOKED_AT = 256  # turning points, one by one
+MOST_TURNING_POINTS = 256  # turning points, one by one
 
 
 class Open(NamedTuple):
@@ -37,7 +37,7 @@ class Open(NamedTuple):
     end: float
 
 
-class Miss(NamedTuple):
+class NearMiss(NamedTuple):
     """How often the error fits between a surface and the run where it turns back, the surface's name, and when."""
 
     margin: float
@@ -51,33 +51,35 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
         return [], []
     found: list[Finding] = []
     passed: Passed = {}
-    nearest: Miss | None = None
-    for steps in steps_of(run, doubtful="turning"):
+    nearest: NearMiss | None = None
+    for steps in steps_of(run, marked="turning"):
         turning = _turning(run, steps)
-        found += filter(None, (_turned(run, run.arc_of(each.row), each, passed) for each in turning[:MOST_LOOKED_AT]))
-        if len(turning) > MOST_LOOKED_AT:
-            more = f"{len(turning) - MOST_LOOKED_AT} more turning points close to surfaces were not looked at"
+        found += filter(
+            None, (_turned(run, run.arc_of(each.row), each, passed) for each in turning[:MOST_TURNING_POINTS])
+        )
+        if len(turning) > MOST_TURNING_POINTS:
+            more = f"{len(turning) - MOST_TURNING_POINTS} more turning points close to surfaces were not looked at"
             found.append(Finding("misses", "unknown", more))
-    passing, near = run.doubts("transparent"), run.doubts("nearest")
+    passing, near = run.undecided("transparent"), run.undecided("nearest")
     for steps in steps_of(run) if passing or near else ():
         if passing:
             found += transparent(run, steps, passed)
         if near:
             nearest = min(filter(None, (nearest, _nearest(run, steps))), default=None)
-    for arc in run.doubtful_flows("ending"):
+    for arc in run.undecided_flows("ending"):
         try:
             found += at_its_end(run, arc, run.crossed.get(arc.last))
         except DOMAIN_ERRORS:
             sentence = f"a surface of {arc.mode} has no value close to t = {show(run.times[arc.last])}"
             found.append(Finding("no value", "unknown", sentence))
     margins = _margins(run, nearest) if not found else []
-    ended = at_the_end(run) if run.doubts("ending") else ()
+    ended = at_the_end(run) if run.undecided("ending") else ()
     return [*found, *ended], [*margins, *(passed_at(name, at) for name, at in passed.items())]
 
 
-def _margins(run: RunView, nearest: Miss | None) -> list[str]:
+def _margins(run: RunView, nearest: NearMiss | None) -> list[str]:
     """Say which turning point comes closest to its surface."""
-    if not run.doubts("nearest") and run.screen is not None:
+    if not run.undecided("nearest") and run.screen is not None:
         return run.screen.margins.nearest_miss(run.problem.program.modes)
     if nearest is None:
         return []
@@ -141,21 +143,23 @@ def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | Non
     k, last = each.surface, each.row + 1 == arc.last
     if last and run.crossed.get(arc.last) == k and each.end >= 1:
         return None  # `crossings` looks at how it is crossed
-    look = run.between(arc, each.row)
+    along = run.dense_output(arc, each.row)
     if run.followed and each.row == arc.first and not each.start and leaves_along(run, arc, k):
         return None
     try:
-        places = [look(run.arithmetic.zero + s) for s in spread(each.start, each.end)]
+        places = [along(run.arithmetic.zero + s) for s in shares_between(each.start, each.end)]
         place = max(places, key=lambda place: place.value(k))
         if has_condition(place, k):
-            start = look(run.arithmetic.zero)
+            start = along(run.arithmetic.zero)
             beyond = start.value(k) > start.roundoff_bound(k) or (start.value(k) > 0 and start.rate(k) > 0)
             if beyond or place.value(k) > place.roundoff_bound(k):
-                finding = reached(run, k, (arc, each.row), {*spread(0.0, 1.0), *spread(each.start, each.end)}, passed)
+                finding = reached(
+                    run, k, (arc, each.row), {*shares_between(0.0, 1.0), *shares_between(each.start, each.end)}, passed
+                )
                 return finding or (almost_left(run, k, each.row + 1, places) if beyond else None)
             if not may_hold(run, place, k, each.row + 1):
                 return None
-        if finding := judged(run, place, k, each.row + 1, "turns back close to"):
+        if finding := near_surface(run, place, k, each.row + 1, "turns back close to"):
             return finding
         sentence = f"whether {place.name(k)} is reached close to t = {show(place.t)} could not be decided"
         return Finding("undecided", "unknown", sentence)
@@ -164,7 +168,7 @@ def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | Non
         return Finding("no value", "unknown", f"a surface of {arc.mode} has no value close to t = {time}")
 
 
-def _nearest(run: RunView, steps: Parts) -> Miss | None:
+def _nearest(run: RunView, steps: Parts) -> NearMiss | None:
     """The turning point that comes closest to its surface, measured in errors."""
     mode = run.problem.program.modes[steps.mode]
     count, best = len(mode.edges) + len(mode.walls), None
@@ -185,10 +189,10 @@ def _nearest(run: RunView, steps: Parts) -> Miss | None:
         return None
     _, k, row = best
     try:
-        place = closed_in(run.between(run.arc_of(row), row), lambda place: -place.rate(k))
-        shift, below = run.shift(place, k, row + 1), -place.value(k)
+        place = rising_zero(run.dense_output(run.arc_of(row), row), lambda place: -place.rate(k))
+        shift, below = run.surface_error(place, k, row + 1), -place.value(k)
         if below <= 0 or (has_condition(place, k) and not may_hold(run, place, k, row + 1)):
             return None
-        return Miss(float(below / shift) if shift > 0 else float("inf"), place.name(k), place.t)
+        return NearMiss(float(below / shift) if shift > 0 else float("inf"), place.name(k), place.t)
     except DOMAIN_ERRORS:
         return None

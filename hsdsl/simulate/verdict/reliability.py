@@ -8,7 +8,7 @@ import numpy as np
 
 from hsdsl.enclosures import Range, as_range
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.agreement import ROUNDOFF_UNITS, SAFE
+from hsdsl.simulate.verdict.agreement import ERROR_UNITS, SAFE
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import steps_of
@@ -18,10 +18,10 @@ ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in
 
 
 def reliability(run: RunView) -> Iterator[Finding]:
-    """From when on the run and its finer repetition differ in more than digits; sets ``run.upto``."""
+    """From when on the run and its finer repetition differ in more than digits; sets ``run.reliable_until``."""
     if unreliable := _unreliable(run):
-        run.upto, why = unreliable
-        yield Finding("reliability", "unknown", f"the run is unreliable from t = {show(run.upto)} on: {why}")
+        run.reliable_until, why = unreliable
+        yield Finding("reliability", "unknown", f"the run is unreliable from t = {show(run.reliable_until)} on: {why}")
 
 
 def _unreliable(run: RunView) -> tuple[float, str] | None:
@@ -44,7 +44,7 @@ def _roundoff(run: RunView) -> dict[str, float]:
 
     A state that stays near zero by cancellation has no digit right, and nothing is wrong with it.
     """
-    span, unit = float(run.times[-1] - run.times[0]), ROUNDOFF_UNITS * float(run.arithmetic.unit)
+    span, unit = float(run.times[-1] - run.times[0]), ERROR_UNITS * float(run.arithmetic.unit)
     ends = list(steps_of(run, PLACES))
     moved: dict[str, float] = {}
     for _ in range(ROUNDS):

@@ -1,4 +1,4 @@
-"""A recorded run with its modes' routines bound again, so that it can be looked at anywhere."""
+"""A recorded run with its modes' routines bound again, so that any state of it can be evaluated."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from hsdsl.program import ModeProgram
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.surfaces import Surfaces, at
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
-from hsdsl.simulate.verdict.companion import Accompanied, accompany
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.screen import Screen, screened
+from hsdsl.simulate.verdict.shadow import ErrorsByShadow, shadow_errors
 
 
 @dataclass(eq=False)
@@ -38,18 +38,18 @@ class RunView:
     followed : bool
         Whether motion along surfaces counts as the flow of a mode of the system, as for derivatives.
     accompanied : bool
-        Whether errors are those that a companion shows, not a finer run.
-    looked : Screen or None
-        The screen of a run with a companion, where there was a look already.
+        Whether errors are those that a shadow run shows, not a finer run.
+    screen_made : Screen or None
+        The screen of a run with a shadow run, where it was made already.
     """
 
     problem: Problem
     execution: Execution
     against: Execution | None = None
-    upto: float = inf
+    reliable_until: float = inf
     followed: bool = False
-    accompanied: bool = False
-    looked: Screen | None = None
+    by_shadow: bool = False
+    screen_made: Screen | None = None
 
     @property
     def transitions(self) -> Sequence[Transition]:
@@ -79,12 +79,12 @@ class RunView:
 
     @cached_property
     def errors(self) -> Errors | None:
-        """How wrong the run is, by a companion or a finer run; None where steps are fixed and no finer run is given."""
+        """How wrong the run is, by a shadow or a finer run; None where steps are fixed and no finer one is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
         known = float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(self.execution.times[-1]))
-        if self.accompanied:
-            companion = self.screen.companion if self.screen else accompany(self.problem, self.execution)
-            return Accompanied(self.execution, self.execution, *known, companion)
+        if self.by_shadow:
+            shadow = self.screen.shadow_errors if self.screen else shadow_errors(self.problem, self.execution)
+            return ErrorsByShadow(self.execution, self.execution, *known, shadow)
         if finer is None and tolerance is not None:
             finer = self.execution.finer
         if finer is None or finer.stop.reason == "interrupted":
@@ -93,16 +93,16 @@ class RunView:
 
     @cached_property
     def screen(self) -> Screen | None:
-        """Where a compiled screen finds that a closer look is needed; None where there is none."""
-        if self.accompanied:
-            screen = self.looked or screened(self.execution, None)
+        """What a compiled screen leaves undecided; None where there is none."""
+        if self.by_shadow:
+            screen = self.screen_made or screened(self.execution, None)
         else:
             screen = self.errors and screened(self.execution, self.errors.finer)
-        return None if screen is None or screen.doubts("parted", "accumulation") else screen
+        return None if screen is None or screen.undecided("parted", "accumulation") else screen
 
-    def doubts(self, *words: str) -> bool:
-        """Whether a closer look is needed at something that the screen names."""
-        return self.screen is None or self.screen.doubts(*words)
+    def undecided(self, *words: str) -> bool:
+        """Whether the screen leaves any of the hypotheses that are named undecided."""
+        return self.screen is None or self.screen.undecided(*words)
 
     @cached_property
     def sizes(self) -> dict[str, float]:
@@ -114,29 +114,29 @@ class RunView:
                 found[name] = max(found.get(name, 0.0), size)
         return found
 
-    def doubtful_flows(self, name: str) -> list[Arc]:
-        """Those of them that the screen leaves open."""
+    def undecided_flows(self, name: str) -> list[Arc]:
+        """Those of them that the screen leaves undecided."""
         if self.screen is None:
-            return self.relied_flows
+            return self.reliable_flows
         marked = self.screen.arcs(name)
-        return [arc for arc in self.relied_flows if arc.first in marked] if marked else []
+        return [arc for arc in self.reliable_flows if arc.first in marked] if marked else []
 
-    def doubtful_transitions(self, mark: int) -> list[Transition]:
-        """The transitions that the screen leaves open."""
+    def undecided_transitions(self, mark: int) -> list[Transition]:
+        """The transitions that the screen leaves undecided."""
         if self.screen is None:
-            return self.relied_transitions
+            return self.reliable_transitions
         marked = np.flatnonzero(self.screen.marked("crossing") & mark).tolist()
         return [self.transitions[index] for index in marked]
 
     @property
-    def relied_flows(self) -> list[Arc]:
+    def reliable_flows(self) -> list[Arc]:
         """The arcs that begin before the run becomes unreliable."""
-        return [arc for arc in self.flows if self.times[arc.first] < self.upto]
+        return [arc for arc in self.flows if self.times[arc.first] < self.reliable_until]
 
     @property
-    def relied_transitions(self) -> list[Transition]:
+    def reliable_transitions(self) -> list[Transition]:
         """The transitions made until the run becomes unreliable: the last one may be why."""
-        return [made for made in self.transitions if made.time <= self.upto]
+        return [made for made in self.transitions if made.time <= self.reliable_until]
 
     @cached_property
     def crossed(self) -> dict[int, int]:
@@ -204,7 +204,7 @@ class RunView:
         """Look at a row."""
         return self.place(arc.mode, self.times[row], self.state(arc, row))
 
-    def between(self, arc: Arc, row: int) -> Callable[[Number], Place]:
+    def dense_output(self, arc: Arc, row: int) -> Callable[[Number], Place]:
         """Look at shares of the step from a row to the next."""
         t, h = self.times[row], self.times[row + 1] - self.times[row]
         x, d = self.state(arc, row), len(arc.states)
@@ -213,13 +213,13 @@ class RunView:
             piece = (tuple(b - a for a, b in zip(x, self.state(arc, row + 1), strict=True)),)
         index, start, end = self.index(arc.mode), t, self.times[row + 1]
 
-        def look(s: Number) -> Place:
+        def along(s: Number) -> Place:
             time = min(t + s * h, end)
             inner = self.place(index, start, x) if time == end else None  # the end belongs to the step's own segment
             place = self.place(index, time, at(x, piece, s))
             return place if inner is None else replace(inner, t=time, x=place.x)
 
-        return look
+        return along
 
     def error(self, place: Place, row: int) -> State:
         """How wrong each state of a place may be that is reached at a row."""
@@ -227,24 +227,24 @@ class RunView:
         columns = self.errors.columns
         return tuple(float(self.errors.by_row[row, columns[name]]) for name in place.mode.states)
 
-    def around(self, place: Place, row: int) -> State:
+    def safe_error(self, place: Place, row: int) -> State:
         """The same, as many times over as a margin must be."""
         return tuple(SAFE * e for e in self.error(place, row))
 
-    def shift(self, place: Place, k: int, row: int) -> Number:
+    def surface_error(self, place: Place, k: int, row: int) -> Number:
         """How much the error may move surface k."""
         assert self.errors is not None
         gradient = place.kernel.gradients[k](place.t, *place.x)
-        errors = (self.errors.late_by(place.t), *self.error(place, row))
+        errors = (self.errors.time_error_at(place.t), *self.error(place, row))
         return sum((abs(g) * e for g, e in zip(gradient, errors, strict=True) if e), self.arithmetic.zero)
 
-    def late(self, place: Place, k: int, row: int) -> float:
+    def safe_time_error(self, place: Place, k: int, row: int) -> float:
         """How wrong the time may be at which the step to a row reaches surface k, as often as a margin must be."""
         assert self.errors is not None
-        rate, shift = abs(float(place.rate(k))), SAFE * float(self.shift(place, k, row))
+        rate, shift = abs(float(place.rate(k))), SAFE * float(self.surface_error(place, k, row))
         step = float(self.times[row] - self.times[row - 1]) if row else 0.0
         moved = shift / rate if rate * step > shift else step
-        return max(SAFE * self.errors.late_by(place.t), moved)
+        return max(SAFE * self.errors.time_error_at(place.t), moved)
 
     def roundoff(self, place: Place, k: int, row: int) -> Number:
         """Round-off of surface k at a place, by the largest sizes that the states have had."""

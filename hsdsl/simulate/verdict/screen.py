@@ -1,7 +1,7 @@
-"""A run screened in C (``hsdsl/runtime/c/screen.c``): where there is surely nothing to find, nobody looks again.
+"""A run screened in C (``hsdsl/runtime/c/screen.c``): where there is surely nothing to find, Python takes no part.
 
 The screen holds for compiled runs by `located` with a tolerance, which noted nothing, end as the finer run does, and
-make the same transitions. Of others there is none, and every hypothesis is looked at here.
+make the same transitions. Of others there is none, and Python decides every hypothesis.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from hsdsl.runtime.kernel import runtime
 from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.companion import Companion, may_have_companion, order_of
 from hsdsl.simulate.verdict.correction import INSIDE, POLE, correction
 from hsdsl.simulate.verdict.finding import times
 from hsdsl.simulate.verdict.formulas import Compiled
+from hsdsl.simulate.verdict.shadow import ShadowErrors, may_have_shadow, order_of
 
 if TYPE_CHECKING:
     from hsdsl.simulate.compiled import CompiledPlan
 
 MOST_LEFT, MOST_ROOM = 4, 1 << 17  # screens that are kept, and numbers in the memory of one
-LOOK_AT_CROSSING, LOOK_AT_RESET = 1, 2
-DOUBTS = {word: 1 << bit for bit, word in enumerate(structures.DOUBTS)}
+CROSSING_UNDECIDED, RESET_UNDECIDED = 1, 2
+HYPOTHESIS_BITS = {word: 1 << bit for bit, word in enumerate(structures.HYPOTHESES)}
 
 
 class Margins(NamedTuple):
@@ -63,37 +63,37 @@ class Screen:
 
     def __init__(self, common: Any) -> None:
         self.table: Any = structures.Screen.from_buffer_copy(common)
-        self._where, self._look, self._memory = ctypes.addressof(self.table), runtime().hs_look, np.empty(0)
+        self._where, self._decide, self._memory = ctypes.addressof(self.table), runtime().hs_screen_run, np.empty(0)
         self.columns: Columns | None = None
 
-    def look(self, columns: Columns, finer: int | None = None) -> bool:
+    def decide(self, columns: Columns, finer: int | None = None) -> bool:
         """Look at a run, and say whether there is surely nothing to find; ``finer`` is the record of a finer one.
 
-        Without that, the run is held against its companion.
+        Without that, the run is held against its shadow run.
         """
         self.columns = columns
-        while (left := self._look(self._where, columns.record, finer)) > 0:
+        while (left := self._decide(self._where, columns.record, finer)) > 0:
             self._memory = np.empty(left)
             self.table.workspace, self.table.room = structures.start_of(self._memory), left
         return not left
 
     @property
-    def companion(self) -> Companion:
-        """How far the run is from its companion; only of a run that is held against one."""
+    def shadow_errors(self) -> ShadowErrors:
+        """How far the run is from its shadow run; only of a run that is held against one."""
         run = self.table.run
-        measured = self._found("measured", run.rows * run.width, np.float64)
-        return Companion(measured.reshape(run.rows, run.width), self._found("late", run.transitions, np.float64))
+        apart = self._found("shadow_errors", run.rows * run.width, np.float64)
+        return ShadowErrors(apart.reshape(run.rows, run.width), self._found("time_errors", run.transitions, np.float64))
 
     def _found(self, name: str, count: int, kind: Any) -> Array:
         """Numbers of a column that was found."""
         start = getattr(self.table, name) - self.table.workspace
         return self._memory.view(np.uint8)[start : start + count * np.dtype(kind).itemsize].view(kind)
 
-    def doubts(self, *words: str) -> bool:
-        """Whether a closer look is needed at any of these; without words, at anything."""
+    def undecided(self, *words: str) -> bool:
+        """Whether any of these hypotheses is undecided; without words, any at all."""
         if not words:
-            return bool(self.table.doubts or self.table.marks)
-        return any(self.table.doubts & DOUBTS[word] for word in words)
+            return bool(self.table.undecided or self.table.marks)
+        return any(self.table.undecided & HYPOTHESIS_BITS[word] for word in words)
 
     def marked(self, name: str) -> Array:
         """The marks of a column by transition, arc or row."""
@@ -120,26 +120,26 @@ class Screen:
     @property
     def commuting(self) -> list[float]:
         """When transitions were reached together of which every order leads to the same point."""
-        return [*structures.array_at(ctypes.c_double, self.table.together, self.table.commuting)]
+        return [*structures.array_at(ctypes.c_double, self.table.tied_times, self.table.commuting)]
 
 
 class Screens:
-    """Screens of the runs by a plan, held against companions or finer runs.
+    """Screens of the runs by a plan, held against shadow runs or finer runs.
 
     What one leaves can be used by the next.
     """
 
-    def __init__(self, problem: Problem, plan: CompiledPlan, accompanied: bool) -> None:
+    def __init__(self, problem: Problem, plan: CompiledPlan, by_shadow: bool) -> None:
         model, settings, method = plan.compiled, problem.settings, problem.settings.method
         formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
         assert method is not None
-        order = order_of(method) if accompanied else None
+        order = order_of(method) if by_shadow else None
         self._common = structures.Screen(
             model=ctypes.addressof(model.table),
             timeline=plan.timeline,
             formulas=ctypes.addressof(formulas.table),
             order=order or 0,
-            correction=ctypes.addressof(_correction()) if accompanied and order is None else 0,
+            correction=ctypes.addressof(_correction()) if by_shadow and order is None else 0,
             until=settings.until,
             relaxation=settings.relaxation,
             tolerance=settings.tolerance,
@@ -147,32 +147,32 @@ class Screens:
         self._left: list[Screen] = []
 
     def take(self) -> Screen:
-        """Return a screen that nobody looks at."""
+        """Return a screen that nobody reads."""
         try:
             return self._left.pop()
         except IndexError:
             return Screen(self._common)
 
     def leave(self, screen: Screen) -> None:
-        """Let the next look use a screen that nobody reads any more."""
+        """Let the next run use a screen that nobody reads any more."""
         if len(self._left) < MOST_LEFT and screen.table.room <= MOST_ROOM:
             screen.columns = None
             self._left.append(screen)
 
 
-def screens_of(plan: CompiledPlan, accompanied: bool) -> Screens | None:
-    """Screens of the runs by a plan, where there are any; see `has_companion` for those that are accompanied."""
-    if accompanied not in plan.of_screens:
+def screens_of(plan: CompiledPlan, by_shadow: bool) -> Screens | None:
+    """Screens of the runs by a plan, where there are any; see `has_shadow` for those with shadow runs."""
+    if by_shadow not in plan.of_screens:
         problem = plan.problem
         located = problem.settings.scheme == "located" and problem.settings.tolerance is not None
         can = located and not any(mode.slides for mode in problem.program.modes)
-        can = can and (may_have_companion(problem) or not accompanied)
-        plan.of_screens[accompanied] = Screens(problem, plan, accompanied) if can else None
-    return plan.of_screens[accompanied]
+        can = can and (may_have_shadow(problem) or not by_shadow)
+        plan.of_screens[by_shadow] = Screens(problem, plan, by_shadow) if can else None
+    return plan.of_screens[by_shadow]
 
 
 def screened(run: Execution, finer: Execution | None) -> Screen | None:
-    """Screen a run, where that can be done; without a finer run by its companion."""
+    """Screen a run, where that can be done; without a finer run by its shadow run."""
     one: Any = run.compiled
     other: Any = finer and finer.compiled
     if one is None or (finer and other is None):
@@ -185,7 +185,7 @@ def screened(run: Execution, finer: Execution | None) -> Screen | None:
     if screens is None:
         return None
     screen = screens.take()
-    screen.look(one.columns, other and other.columns.record)
+    screen.decide(one.columns, other and other.columns.record)
     return screen
 
 

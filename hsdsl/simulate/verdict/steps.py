@@ -115,12 +115,12 @@ class Parts:
         return run.problem.kernel.enclosing.bind(self.mode, self.bound_data)
 
 
-def steps_of(run: RunView, places: int | None = None, doubtful: str = "") -> Iterator[Parts]:
+def steps_of(run: RunView, places: int | None = None, marked: str = "") -> Iterator[Parts]:
     """Give the steps of all arcs of flow, or about ``places`` of a mode; those of a mode together, as memory allows.
 
-    With ``doubtful`` only those that the screen leaves open, in a column of marks, are given.
+    With ``marked``, a column of the screen's marks, only those that it leaves undecided are given.
     """
-    marks = run.screen.marked(doubtful) if doubtful and run.screen else None
+    marks = run.screen.marked(marked) if marked and run.screen else None
     if marks is not None and not marks.any():
         return
     times = np.asarray(run.execution.times, dtype=float)
@@ -129,7 +129,7 @@ def steps_of(run: RunView, places: int | None = None, doubtful: str = "") -> Ite
         if states != run.problem.program.modes[mode].states:
             continue  # a final mode flows as the one before it
         rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
-        rows = rows[(times[rows + 1] > times[rows]) & (times[rows] <= run.upto)]
+        rows = rows[(times[rows + 1] > times[rows]) & (times[rows] <= run.reliable_until)]
         rows = rows if marks is None else rows[marks[rows] != 0]
         rows = rows[:: max(1, len(rows) // places)] if places else rows
         for first in range(0, len(rows), MOST_PARTS):

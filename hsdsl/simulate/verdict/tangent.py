@@ -25,7 +25,7 @@ def leaves_along(run: RunView, arc: Arc, k: int) -> bool:
         if abs(place.value(k)) > place.roundoff_bound(k) or not _falls(run, arc, k):
             return False
         before, edge = run.before(made)
-        error = run.around(before, run.row_before(made))
+        error = run.safe_error(before, run.row_before(made))
         near = [_landed(run, made, x) for x in before.moved_by(error)]
         value, rate = (ALONG * max(abs(each(at)) for at in near) for each in (_value(k), _rate(k)))
         for x in before.along_guard(edge, error):
@@ -49,9 +49,9 @@ def _rate(k: int) -> Callable[[Place], Number]:
 
 def _falls(run: RunView, arc: Arc, k: int) -> bool:
     """Whether the surface falls on the first step of an arc, ever faster at first."""
-    look = run.between(arc, arc.first)
+    along = run.dense_output(arc, arc.first)
     shares = [run.arithmetic.zero + 2.0**-i for i in range(20, 2, -1)]
-    rates = [look(share).rate(k) for share in shares]
+    rates = [along(share).rate(k) for share in shares]
     return all(b < a < 0 for a, b in pairwise(rates))
 
 
@@ -63,7 +63,7 @@ def _kept(run: RunView, made: Transition, k: int) -> bool:
         return False
     earlier = run.transitions[arc.jump - 1]
     entered, by = run.before(earlier)
-    for x in entered.along_guard(by, run.around(entered, run.row_before(earlier))):
+    for x in entered.along_guard(by, run.safe_error(entered, run.row_before(earlier))):
         seen = _seen(run, made, earlier.time, _landed(run, earlier, x).x)
         if seen is None or abs(seen.value(k)) > seen.roundoff_bound(k):
             return False

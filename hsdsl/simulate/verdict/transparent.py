@@ -12,12 +12,12 @@ from hsdsl.execution import Arc
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
-from hsdsl.simulate.verdict.judged import closed_in, may_hold, passed_over
+from hsdsl.simulate.verdict.near_surface import may_hold, passed_over, rising_zero
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low
 
-LOOKS = 9  # at one turning point
+SHARES = 9  # at one turning point
 
 Passed = dict[str, list[Number]]  # when the surface of an edge was passed while its `if` was false
 
@@ -39,16 +39,16 @@ def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]
             arc = run.arc_of(row)
             if run.crossed.get(arc.last) == k and row + 1 == arc.last:
                 continue
-            place = closed_in(run.between(arc, row), lambda place: place.value(k))  # noqa: B023
-            level = SAFE * run.shift(place, k, row + 1) + place.roundoff_bound(k)
+            place = rising_zero(run.dense_output(arc, row), lambda place: place.value(k))  # noqa: B023
+            level = SAFE * run.surface_error(place, k, row + 1) + place.roundoff_bound(k)
             reached = place.value(k) > 0 or abs(place.value(k)) <= level
             if reached and (finding := undecided_condition(run, place, k, row + 1, passed)):
                 yield finding
 
 
-def spread(start: float, end: float) -> list[float]:
+def shares_between(start: float, end: float) -> list[float]:
     """Shares of a step at which it is looked at, from one to another."""
-    return [start + (end - start) * i / (LOOKS - 1) for i in range(LOOKS)]
+    return [start + (end - start) * i / (SHARES - 1) for i in range(SHARES)]
 
 
 def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], passed: Passed) -> Finding | None:
@@ -56,9 +56,9 @@ def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], pa
 
     ``step`` is its arc and the row where it begins; ``at`` are the shares between which such places are found.
     """
-    (arc, row), shares, look = step, sorted(at), run.between(*step)
-    start = look(run.arithmetic.zero)
-    values = [start.value(k), *(look(run.arithmetic.zero + s).value(k) for s in shares[1:])]
+    (arc, row), shares, along = step, sorted(at), run.dense_output(*step)
+    start = along(run.arithmetic.zero)
+    values = [start.value(k), *(along(run.arithmetic.zero + s).value(k) for s in shares[1:])]
     if values[0] <= start.roundoff_bound(k) and not start.rate(k) > 0:
         values[0] = run.arithmetic.zero
     seen = values[0] <= 0 < values[-1]  # by `transparent`
@@ -67,8 +67,8 @@ def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], pa
     for (a, before), (b, after) in pairwise(zip(shares, values, strict=False)):
         if not before <= 0 < after:
             continue
-        place = closed_in(lambda s: look(a + s * (b - a)), lambda place: place.value(k))  # noqa: B023
-        if place.conditions(k, run.around(place, row + 1), run.late(place, k, row + 1)) == {True}:
+        place = rising_zero(lambda s: along(a + s * (b - a)), lambda place: place.value(k))  # noqa: B023
+        if place.conditions(k, run.safe_error(place, row + 1), run.safe_time_error(place, k, row + 1)) == {True}:
             return passed_over(place, k)
         noted = any(abs(t - place.t) <= run.tie(t) for t in passed.get(place.name(k), ()))
         if finding := undecided_condition(run, place, k, row + 1, {} if seen or noted else passed):
@@ -79,7 +79,7 @@ def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], pa
 def almost_left(run: RunView, k: int, row: int, places: Sequence[Place]) -> Finding | None:
     """Look at where a step to a row turns back close to surface k and beyond it: the error may take it inside."""
     place = min(places, key=lambda place: place.value(k))
-    shift = run.shift(place, k, row)
+    shift = run.surface_error(place, k, row)
     if not 0 < place.value(k) <= SAFE * shift or not may_hold(run, place, k, row):
         return None
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
@@ -89,7 +89,7 @@ def almost_left(run: RunView, k: int, row: int, places: Sequence[Place]) -> Find
 
 def undecided_condition(run: RunView, place: Place, k: int, row: int, passed: Passed) -> Finding | None:
     """Note that a surface is passed at a place where its condition does not hold, or say that it might."""
-    if place.conditions(k, run.around(place, row), run.late(place, k, row)) == {False}:
+    if place.conditions(k, run.safe_error(place, row), run.safe_time_error(place, k, row)) == {False}:
         if not place.mode.edges[k].of_event:  # an event fires when it turns true on any of its surfaces
             passed.setdefault(place.name(k), []).append(place.t)
         return None

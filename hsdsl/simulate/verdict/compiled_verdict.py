@@ -1,4 +1,4 @@
-"""Compiled runs that the screen finds clear by their companions: sentences on their margins are written when read."""
+"""Compiled runs that the screen finds clear by their shadow runs: sentences on their margins are written when read."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
     if screens is None or columns.notes or not execution.stop.complete:
         return assess(RunView(problem, execution), under_way.diagnostics)
     screen = screens.take()
-    if not screen.look(columns):
-        return assess(RunView(problem, execution, looked=screen), under_way.diagnostics)
+    if not screen.decide(columns):
+        return assess(RunView(problem, execution, screen_made=screen), under_way.diagnostics)
     shown = problem.program, compiled.made, screen.margins, screen.commuting
     screens.leave(screen)
     return Verdict.deferred(_LATER, theorem="holds", _shown=shown)

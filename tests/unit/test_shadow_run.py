@@ -1,4 +1,4 @@
-"""The companion of a run: the errors that it shows are those of the run, and nothing else holds."""
+"""The shadow run of a run: the errors that it shows are those of the run, and nothing else holds."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import pytest
 
 import hsdsl
 from hsdsl.simulate.verdict import RunView
-from hsdsl.simulate.verdict.companion import accompany, order_of
-from hsdsl.simulate.verdict.follower import Follower
+from hsdsl.simulate.verdict.shadow import order_of, shadow_errors
+from hsdsl.simulate.verdict.shadow_run import ShadowRun
 
 DUFFING = ("v", "x - x**3 - 0.3*v + 0.5*cos(1.2*t)", "x >= 1.2", "-0.9*v")
 VAN_DER_POL = ("v", "3*(1 - x**2)*v - x", "x >= 1.5", "-v/2")
@@ -73,14 +73,16 @@ def stiff(name: str) -> Any:
 def hold_to_the_truth(run: Any, exact: Any, tolerance: float) -> None:
     """Hold what is shown against the error at ends of steps; inside them some methods are off by the tolerance."""
     close, inside = (CLOSE, 0.0) if run.method == "taylor" else (FAR, tolerance)
-    shown, true = view(run, accompanied=True).errors, view(run, against=exact).errors
+    shown, true = view(run, by_shadow=True).errors, view(run, against=exact).errors
     assert shown is not None
     assert true is not None
     assert shown.parted is None
     assert true.measured[-1].max() / close <= shown.measured[-1].max()
     assert (shown.measured[-1] <= close * true.measured[-1].max() + inside * true.sizes[-1] + 1e-11).all()
     if len(run.transitions):
-        assert true.late[-1] / close <= shown.late[-1] <= close * true.late[-1] + inside / 10 + 1e-11
+        assert (
+            true.time_errors[-1] / close <= shown.time_errors[-1] <= close * true.time_errors[-1] + inside / 10 + 1e-11
+        )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -113,10 +115,12 @@ def test_both_engines_follow_stiff_runs_alike(name: str) -> None:
 
 def alike(loaded: Any) -> None:
     run = loaded.simulate(tolerance=1e-6)
-    in_c, in_python = view(run, accompanied=True).screen, accompany(view(run).problem, run)
+    in_c, in_python = view(run, by_shadow=True).screen, shadow_errors(view(run).problem, run)
     assert in_c is not None
-    assert np.allclose(in_c.companion.apart, in_python.apart, rtol=1e-5, atol=1e-14 * abs(run.values).max())
-    assert np.allclose(in_c.companion.late, in_python.late, rtol=1e-5, atol=1e-12)
+    assert np.allclose(
+        in_c.shadow_errors.state_errors, in_python.state_errors, rtol=1e-5, atol=1e-14 * abs(run.values).max()
+    )
+    assert np.allclose(in_c.shadow_errors.time_errors, in_python.time_errors, rtol=1e-5, atol=1e-12)
     verdicts = [loaded.simulate(tolerance=1e-6, engine=engine).verdict for engine in ("c", "python")]
     assert verdicts[0] == verdicts[1]
 
@@ -128,12 +132,12 @@ def test_fewer_terms_show_growth_that_the_run_does_not() -> None:
     problem = view(run).problem
     assert problem.settings.method is not None
     most = order_of(problem.settings.method)
-    fewer, all_terms = (Follower(problem, run, most) for _ in range(2))
+    fewer, all_terms = (ShadowRun(problem, run, most) for _ in range(2))
     assert most is not None
     all_terms.order = most
     for each in (fewer, all_terms):
         each.follow(run.arcs[0], None)
-    assert np.allclose(fewer.apart, all_terms.apart, rtol=0.1, atol=1e-14)
+    assert np.allclose(fewer.state_errors, all_terms.state_errors, rtol=0.1, atol=1e-14)
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -21,12 +21,12 @@ def has_condition(place: Place, k: int) -> bool:
 
 def may_hold(run: RunView, place: Place, k: int, row: int) -> bool:
     """Whether the `if` of an edge holds at a place or at a state that the error moves it to."""
-    return place.conditions(k, run.around(place, row), run.late(place, k, row)) != {False}
+    return place.conditions(k, run.safe_error(place, row), run.safe_time_error(place, k, row)) != {False}
 
 
-def judged(run: RunView, place: Place, k: int, row: int, how: str) -> Finding | None:
+def near_surface(run: RunView, place: Place, k: int, row: int, how: str) -> Finding | None:
     """Say whether the error could make another execution of a surface that the run is close to, or beyond."""
-    value, shift = place.value(k), run.shift(place, k, row)
+    value, shift = place.value(k), run.surface_error(place, k, row)
     margin = abs(value) / shift if shift > 0 else run.arithmetic.zero + float("inf")
     beyond = value > _level(run, place, k)
     if not (beyond or margin < SAFE) or (has_condition(place, k) and not may_hold(run, place, k, row)):
@@ -52,13 +52,13 @@ def _level(run: RunView, place: Place, k: int) -> Number:
     return level
 
 
-def closed_in(look: Callable[[Number], Place], of: Callable[[Place], Number]) -> Place:
+def rising_zero(along: Callable[[Number], Place], of: Callable[[Place], Number]) -> Place:
     """Close in on where a function of the place rises through zero between the ends of a step (bisection)."""
     a = 0.0
-    b, place = 1.0, look(1.0)
+    b, place = 1.0, along(1.0)
     for _ in range(ROUNDS):
         s = (a + b) / 2
-        found = look(s)
+        found = along(s)
         if of(found) <= 0:
             a = s
         else:

@@ -1,4 +1,4 @@
-/* How wrong a recorded run is, by its companion. See hsdsl/simulate/verdict/companion.py. */
+/* How wrong a recorded run is, by its shadow run. See hsdsl/simulate/verdict/shadow.py. */
 
 #include "screen_correction.c"
 #include "screen_series.c"
@@ -8,8 +8,8 @@
 #define CLOSED_IN 0x1p-10 /* of the tie tolerance: a crossing's time is found */
 
 /* Bound what round-off of the flow and of states that move may do in the run's step, by the flow where that ends, to
-   `noise`; 0 where it has no bound. Where an arc begins, states are rounded too. */
-static int bound_noise(hs_view *v, const hs_companion *c) {
+   `roundoff`; 0 where it has no bound. Where an arc begins, states are rounded too. */
+static int bound_roundoff(hs_view *v, const hs_shadow *c) {
   const double *const start = recorded_row(&v->s->run, c->row), *const x = recorded_row(&v->s->run, c->row + 1);
   const hs_formula *const flow = &v->f->flow;
   v->rounded[0] = rounded(v->s->run.times[c->row + 1], 0.0, 0.0);
@@ -18,15 +18,15 @@ static int bound_noise(hs_view *v, const hs_companion *c) {
   for (int i = 0; i < v->n; i++) {
     const hs_rounded f = v->rounded[flow->result[i]];
     const double share = f.value != 0.0 ? ROUNDED : 0.0;
-    c->noise[i] = c->h * f.off + share * fabs(x[i]);
+    c->roundoff[i] = c->h * f.off + share * fabs(x[i]);
     if (c->begins) c->x[i] += copysign(share * start[i], c->x[i] - start[i]);
-    if (!hs_finite(c->noise[i])) return 0;
+    if (!hs_finite(c->roundoff[i])) return 0;
   }
   return 1;
 }
 
 /* Move it along a straight line to where it crosses surface k, to y. */
-static int companion_crosses(hs_view *v, hs_companion *c, int k) {
+static int shadow_crosses(hs_view *v, hs_shadow *c, int k) {
   const double tie = tie_of(v->s, c->t);
   double change = INFINITY, rate, s = 0.0;
   if (c->table->flow(c->p, c->t, c->x, v->slope)) return 0;
@@ -42,30 +42,31 @@ static int companion_crosses(hs_view *v, hs_companion *c, int k) {
   return fabs(change) <= tie;
 }
 
-/* Make transition j where the companion crosses its surface, close to where it is. */
-static int companion_jumps(hs_view *v, hs_companion *c, int64_t j, double *measured) {
+/* Make transition j where the shadow run crosses its surface, close to where it is. */
+static int shadow_jumps(hs_view *v, hs_shadow *c, int64_t j, double *errors) {
   const hs_screen *const screen = v->s;
   const hs_transition *const made = &screen->run.transition[j];
   const hs_edge *const edge = &c->table->edge[made->edge];
   const double *const before = screen->run.before + j * screen->model->width;
-  if (made->entry || !companion_crosses(v, c, made->edge)) return 0;
-  for (int i = 0; i < c->table->dimension; i++) grow(&measured[i], fabs(before[i] - c->y[i]));
-  v->late[j] = hs_max(j ? v->late[j - 1] : tie_of(screen, screen->run.times[screen->run.rows - 1]),
+  if (made->entry || !shadow_crosses(v, c, made->edge)) return 0;
+  for (int i = 0; i < c->table->dimension; i++) grow(&errors[i], fabs(before[i] - c->y[i]));
+  v->time_errors[j] = hs_max(j ? v->time_errors[j - 1] : tie_of(screen, screen->run.times[screen->run.rows - 1]),
                       fabs(made->time - c->t));
   return !hs_changed(edge, edge->reset, c->p, c->t, c->y, c->y, c->x);
 }
 
-/* Follow the run: how far each row is from the companion, to `measured`, and each transition, to `late`; 0 where that
+/* Follow the run: how far each row is from the shadow run, to `shadow_errors`, and each transition, to `time_errors`; 0 where that
    cannot be followed. */
-static int accompany(hs_view *v) {
+static int follow_run(hs_view *v) {
   const hs_screen *const s = v->s;
   const hs_record *const run = &s->run;
-  hs_companion c = {.p = s->timeline->data, .x = v->x, .y = v->y, .moved = v->z, .noise = v->noise, .lines = v->lines};
+  hs_shadow c = {.p = s->timeline->data, .x = v->x, .y = v->y, .moved = v->z, .roundoff = v->roundoff};
+  c.lines = v->lines;
   int64_t followed = 0;
   c.t = run->times[0];
   c.order = FEWEST < s->order ? FEWEST : s->order;
   copy(c.x, recorded_row(run, 0), run->width);
-  for (int64_t i = 0; i < run->rows * run->width; i++) s->measured[i] = 0.0;
+  for (int64_t i = 0; i < run->rows * run->width; i++) s->shadow_errors[i] = 0.0;
   for (int64_t a = 0; a < run->arcs; a++) {
     const int64_t last = last_row(run, a), jump = run->arc[a].jump;
     const int leaves = jump < run->transitions && (a + 1 == run->arcs || run->arc[a + 1].jump > jump);
@@ -74,22 +75,22 @@ static int accompany(hs_view *v) {
     if (c.table->final) continue;
     bind(v, run->arc[a].mode, 0);
     for (int64_t row = run->arc[a].first; row <= last; row++) {
-      double *const measured = s->measured + row * run->width;
+      double *const errors = s->shadow_errors + row * run->width;
       const double *const x = recorded_row(run, row);
       c.row = row - 1, c.h = row > run->arc[a].first ? run->times[row] - run->times[row - 1] : 0.0;
       c.begins = row == run->arc[a].first + 1;
       if (c.h > 0) {
-        if (!bound_noise(v, &c) || !(s->correction ? correct_step(v, &c, measured) : expand_step(v, &c))) return 0;
+        if (!bound_roundoff(v, &c) || !(s->correction ? correct_step(v, &c, errors) : expand_step(v, &c))) return 0;
         copy(c.x, c.y, v->n);
         c.t = run->times[row] + shift;
       }
       for (int i = 0; i < v->n; i++) {
         const double apart = fabs(x[i] - c.x[i]);
         if (!hs_finite(apart)) return 0;
-        grow(&measured[i], apart);
+        grow(&errors[i], apart);
       }
     }
-    if (leaves && (jump != followed++ || !companion_jumps(v, &c, jump, s->measured + last * run->width))) return 0;
+    if (leaves && (jump != followed++ || !shadow_jumps(v, &c, jump, s->shadow_errors + last * run->width))) return 0;
   }
   return followed == run->transitions;
 }

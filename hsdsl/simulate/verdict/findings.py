@@ -1,4 +1,4 @@
-"""Findings about a run that the screen leaves open: one look after another."""
+"""Findings about a run that the screen leaves undecided: those of one hypothesis after another."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from hsdsl.simulate.verdict.reliability import reliability
 from hsdsl.simulate.verdict.run_view import RunView
 
 
-def looked_at(run: RunView) -> tuple[list[Finding], list[str]]:
+def findings_of(run: RunView) -> tuple[list[Finding], list[str]]:
     """Return what is found, and the margins of what holds."""
     found, margins = list(reliability(run)), list[str]()
-    for look in (crossings, choices, landings, misses, flows):
-        findings, reasons = look(run)
+    for hypothesis in (crossings, choices, landings, misses, flows):
+        findings, reasons = hypothesis(run)
         found += findings
         margins += reasons
     return found, margins

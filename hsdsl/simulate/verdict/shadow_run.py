@@ -1,4 +1,4 @@
-"""The companion of a run on its way, in Python: its mode, time and state, and how far it is from the run.
+"""The shadow run of a run on its way, in Python: its mode, time and state, and how far it is from the run.
 
 Along a step its series differ from the run's by less and less from term to term. Only so many terms are made that all
 steps of the run together leave out little of the difference; of the others it has the run's own. Where the run has no
@@ -27,19 +27,19 @@ FEWEST, FURTHER = 3, 2  # the order of the first series, and by how much it grow
 
 
 class Lost(ValueError):
-    """The companion cannot follow."""
+    """The shadow run cannot follow."""
 
 
-class Follower:
-    """The companion on its way: its time and state; ``order`` is the most that its series have, None for no series."""
+class ShadowRun:
+    """The shadow run on its way: its time and state; ``order`` is the most that its series have, None for no series."""
 
     def __init__(self, problem: Problem, run: Execution, order: int | None) -> None:
         self.problem, self.run, self.most = problem, run, order
         self.order = min(FEWEST, order or 0)
         self.modes = {mode.name: k for k, mode in enumerate(problem.program.modes)}
-        self.apart = np.zeros((len(run.times), run.values.shape[1]))
+        self.state_errors = np.zeros((len(run.times), run.values.shape[1]))
         self.times: list[float] = run.times.tolist()
-        self.late: list[float] = []
+        self.time_errors: list[float] = []
         self.t: float = float(run.times[0])
         self.x: State = tuple(run.values[0, : len(run.arcs[0].states)].tolist())
         self.data = self.problem.timeline.segments[0].data
@@ -133,7 +133,7 @@ class Follower:
         if not all(map(isfinite, y)):
             raise Lost
         away = np.abs(np.asarray(x[: len(y)], dtype=float) - y)
-        self.apart[row, : len(y)] = np.fmax(self.apart[row, : len(y)], away)
+        self.state_errors[row, : len(y)] = np.fmax(self.state_errors[row, : len(y)], away)
 
     def _jump(self, arc: Arc, made: Transition) -> None:
         """Make a transition where it crosses the surface, along a straight line from where it is."""
@@ -156,5 +156,5 @@ class Follower:
             raise Lost
         self._compare(arc.last, list(made.before.values()), y)
         self.t += s
-        self.late.append(abs(float(made.time) - self.t))
+        self.time_errors.append(abs(float(made.time) - self.t))
         self.x = kernel.resets[k](self.t, *y)

@@ -1,6 +1,6 @@
-"""Errors of a run without another run: a companion takes the same steps, closer to the solution.
+"""Errors of a run without another run: a shadow run takes the same steps, closer to the solution.
 
-The companion starts where the run does. Each of its steps begins where it is itself, and takes as long as the run's.
+The shadow run starts where the run does. Each of its steps begins where it is itself, and takes as long as the run's.
 It makes each transition where it crosses the same surface. Its distance to the run is the sum of what the run's steps
 left out, carried along by the flow and by jumps, as long as that is small.
 
@@ -11,10 +11,10 @@ left out, carried along by the flow and by jumps, as long as that is small.
   a state's terms together, more are made from there on, up to as many as the run has. So growth that the run does not
   show is seen.
 - Both follow for other methods from a `correction` of the step, as long as that leaves out less than the step.
-- Round-off is much the same for both, so each step moves the companion further away from the run by the most that it
+- Round-off is much the same for both, so each step moves the shadow run further away from the run by the most that it
   may do: that of the flow, and of states that move. Where an arc begins these are rounded, too.
 
-The companion looks for no other surface: enclosures wider than the errors decide along the run's own steps that none
+The shadow run looks for no other surface: enclosures wider than the errors decide along the run's own steps that none
 is reached.
 """
 
@@ -31,7 +31,7 @@ from hsdsl.execution import Execution
 from hsdsl.integrators import Method
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.verdict.agreement import Errors
-from hsdsl.simulate.verdict.follower import Follower, Lost
+from hsdsl.simulate.verdict.shadow_run import Lost, ShadowRun
 
 Array = NDArray[np.float64]
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
@@ -39,46 +39,48 @@ MOST_CORRECTED = 5  # order of methods whose steps leave out more than correctio
 
 
 @dataclass(frozen=True)
-class Companion:
-    """How far a run is from its companion.
+class ShadowErrors:
+    """How far a run is from its shadow run.
 
     Attributes
     ----------
-    apart : array, shape (rows, states of the largest mode)
-    late : array, shape (transitions,)
+    state_errors : array, shape (rows, states of the largest mode)
+    time_errors : array, shape (transitions,)
         How far the times of transitions are apart, up to each.
     lost : float or None
         From when on it could not follow.
     """
 
-    apart: Array
-    late: Array
+    state_errors: Array
+    time_errors: Array
     lost: float | None = None
 
 
 @dataclass(frozen=True)
-class Accompanied(Errors):
-    """What a companion shows of a run."""
+class ErrorsByShadow(Errors):
+    """What a shadow run shows of a run."""
 
-    companion: Companion
+    shadow: ShadowErrors
 
     @cached_property
     def parted(self) -> float | None:
-        """From when on the companion could not follow."""
-        return self.companion.lost
+        """From when on the shadow run could not follow."""
+        return self.shadow.lost
 
     @cached_property
-    def late(self) -> Array:
+    def time_errors(self) -> Array:
         """How far times of transitions are apart, up to each of them; shape (transitions,)."""
-        return self.companion.late
+        return self.shadow.time_errors
 
     @cached_property
     def measured(self) -> Array:
-        """How far the run is from its companion in each state; shape (rows, states), nowhere falling."""
+        """How far the run is from its shadow run in each state; shape (rows, states), nowhere falling."""
         found = np.zeros(self._values.shape)
         for arc in self.run.arcs:
             columns = [self.columns[name] for name in arc.states]
-            found[arc.first : arc.last + 1, columns] = self.companion.apart[arc.first : arc.last + 1, : len(columns)]
+            found[arc.first : arc.last + 1, columns] = self.shadow.state_errors[
+                arc.first : arc.last + 1, : len(columns)
+            ]
         return np.maximum.accumulate(np.nan_to_num(found))
 
 
@@ -88,27 +90,27 @@ def is_compiled(run: Execution) -> bool:
 
 
 def order_of(method: Method) -> int | None:
-    """The most that the order of the companion's series may be: with one coefficient more, as many as the run's.
+    """The most that the order of the shadow run's series may be: with one coefficient more, as many as the run's.
 
     None where it has no series.
     """
     return method.order - 1 if method.is_series else None
 
 
-def has_companion(problem: Problem, run: Execution) -> bool:
-    """Whether a companion shows the errors of a run: one with a tolerance, without strips and samples of inputs.
+def has_shadow(problem: Problem, run: Execution) -> bool:
+    """Whether a shadow run shows the errors of a run: one with a tolerance, without strips and samples of inputs.
 
-    Strips and transitions on entry of a run made in C are found where the companion follows it.
+    Strips and transitions on entry of a run made in C are found where the shadow run follows it.
     """
     return (
-        may_have_companion(problem)
+        may_have_shadow(problem)
         and run.stop.complete
         and (is_compiled(run) or not (run.enters_beyond or any(arc.kind != "flow" for arc in run.arcs)))
     )
 
 
-def may_have_companion(problem: Problem) -> bool:
-    """Whether a companion may show the errors of runs of a problem."""
+def may_have_shadow(problem: Problem) -> bool:
+    """Whether a shadow run may show the errors of runs of a problem."""
     settings, method = problem.settings, problem.settings.method
     return (
         settings.scheme == "located"
@@ -120,20 +122,20 @@ def may_have_companion(problem: Problem) -> bool:
     )
 
 
-def accompany(problem: Problem, run: Execution) -> Companion:
-    """Follow a run that has a companion."""
+def shadow_errors(problem: Problem, run: Execution) -> ShadowErrors:
+    """Follow a run that has a shadow run."""
     assert problem.settings.method is not None
-    companion, arcs = Follower(problem, run, order_of(problem.settings.method)), run.arcs
+    shadow, arcs = ShadowRun(problem, run, order_of(problem.settings.method)), run.arcs
     lost = None
     for arc, following in zip(arcs, (*arcs[1:], None), strict=True):
-        if problem.program.modes[companion.modes[arc.mode]].final:
+        if problem.program.modes[shadow.modes[arc.mode]].final:
             break
         leaves = arc.jump < len(run.transitions) and (following is None or following.jump > arc.jump)
         try:
-            companion.follow(arc, run.transitions[arc.jump] if leaves else None)
+            shadow.follow(arc, run.transitions[arc.jump] if leaves else None)
         except (Lost, *DOMAIN_ERRORS):
             lost = float(run.times[arc.first])
             break
-    late = np.maximum.accumulate([float(problem.tie(run.times[-1])), *companion.late])[1:]
+    late = np.maximum.accumulate([float(problem.tie(run.times[-1])), *shadow.time_errors])[1:]
     missing = np.full(len(run.transitions) - len(late), np.inf)
-    return Companion(companion.apart, np.append(late, missing), lost)
+    return ShadowErrors(shadow.state_errors, np.append(late, missing), lost)
