@@ -17,6 +17,19 @@ _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
 NO_FILE = "<text>"  # the path of a model that is in no file
 WORDS = ("and", "or", "not", "true", "false")
+_SIGNS = {  # signs that Unicode does not take for the ASCII sign they look like, or not for that alone
+    **dict.fromkeys("‐‑‒–—―−", "-"),
+    **dict.fromkeys("“”„‟″", '"'),
+    **dict.fromkeys("‘’‚‛′´", "'"),
+    **dict.fromkeys("∗✱", "*"),
+    **dict.fromkeys("∕⁄", "/"),
+    **dict.fromkeys("∶꞉", ":"),
+    "¦": "|",
+}
+_LETTERS = str.maketrans(  # Cyrillic and Greek letters and the Latin ones they look like
+    "аеорсухіјѕԁһԛԝАВЕКМНОРСТУХІЈЅΑΒΕΖΗΙΚΜΝΟΡΤΥΧοανρ", "aeopcyxijsdhqwABEKMHOPCTYXIJSABEZHIKMNOPTYXoavp"
+)
+_WIDE = re.compile("<(?:wide|narrow|small|noBreak|compat)> [0-9A-F]{4,5}")
 _LONGEST_TO_COMPARE = 60
 _MOST_TO_COMPARE = 300
 
@@ -31,6 +44,26 @@ def is_identifier(name: str) -> bool:
     return normalised(name).isidentifier() and not any(sign in name for sign in LOOKALIKES)
 
 
+def in_latin(name: str) -> str:
+    """A name with the Latin letters that its Cyrillic and Greek ones look like."""
+    return name if name.isascii() else name.translate(_LETTERS)
+
+
+def plain_sign(character: str) -> str | None:
+    """The ASCII sign, digit or blank that another character is easily taken for."""
+    if character.isascii():
+        return None
+    wide = _WIDE.fullmatch(unicodedata.decomposition(character))
+    plain = _SIGNS.get(character) or (unicodedata.normalize("NFKC", character) if wide else "")
+    return plain if plain.isascii() and not plain.isalpha() and len(plain) == 1 else None
+
+
+def told_apart(character: str) -> str:
+    """A sentence about a character that looks like an ASCII sign."""
+    plain, code = plain_sign(character), f"U+{ord(character):04X}"
+    return f"this blank is {code}, not a space" if plain == " " else f"`{character}` ({code}) only looks like `{plain}`"
+
+
 def closest(name: str, candidates: Iterable[str]) -> str | None:
     """The candidate that looks most like a name, None where none looks like it."""
     if len(name) > _LONGEST_TO_COMPARE:
@@ -41,7 +74,7 @@ def closest(name: str, candidates: Iterable[str]) -> str | None:
             return candidate
     plain = _spelled(name)
     for candidate in names:
-        if _spelled(candidate) == plain:
+        if _spelled(candidate) == plain or in_latin(candidate) == in_latin(name):
             return candidate
     if len(names) > _MOST_TO_COMPARE:
         return None
@@ -84,6 +117,10 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:
     """A hint with the closest candidate, or with all of them where they are few; memory of events is none."""
     names = list(dict.fromkeys(without_memory(candidates)))
     best = closest(name, names)
+    if best is not None and best != name and in_latin(best) == in_latin(name):
+        one, other = next((a, b) for a, b in zip(name, best, strict=True) if a != b)
+        strange = other if one.isascii() else one
+        return f"did you mean '{best}'? `{strange}` is U+{ord(strange):04X}, another letter that looks the same"
     if best is not None:
         return f"did you mean '{best}'?"
     if 0 < len(names) <= 8:

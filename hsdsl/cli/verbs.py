@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
@@ -25,6 +26,10 @@ VERBS = (
 )  # fmt: skip
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
 _UNKNOWN = re.compile(r"No such (?:option|command):? '?([\w-]+)")
+_EXTRA = re.compile(r"unexpected extra argument\S* \((.+)\)")
+_OVERRIDE = re.compile(r"[\w.\[\]]+=.+")
+_PAIRS = ("--set", "--vary", "--limit")  # options of NAME=VALUE
+_MODELS = (".yaml", ".yml", ".json")
 _OF_OTHERS = {
     "run": "simulate sim solve start",
     "validate": "check verify parse",
@@ -138,23 +143,39 @@ def _report(error: Any, words: list[str]) -> int:
     else:
         error.message = visible(error.message) if words else error.message  # else the help text
         error.show(sys.stderr)
-        if meant := _meant(error):
-            print(f"  hint: write {meant}", file=sys.stderr)
+        if meant := _meant(error) or _whole(error, words):
+            print(f"  hint: write {visible(meant)}", file=sys.stderr)
     return error.exit_code
 
 
 def _meant(error: Any) -> str | None:
     """The command or option that has another name in other tools."""
     name = _UNKNOWN.search(error.message)
-    options = {each for option in getattr(getattr(error.ctx, "command", None), "params", ()) for each in option.opts}
-    known = {*VERBS, *options}
+    known = {*VERBS, *_options(error)}
     return next(
         (own for own, others in _OF_OTHERS.items() if name and name[1] in others.split() and own in known), None
     )
 
 
+def _whole(error: Any, words: list[str]) -> str | None:
+    """The command line of a model without a verb, or the override that is not one word with its option."""
+    if error.message.startswith("No such command") and (words[0].endswith(_MODELS) or os.path.isfile(words[0])):
+        return shlex.join(["hsdsl", "run", *words])
+    extra = _EXTRA.search(error.message)
+    stray = extra[1].split()[0] if extra else ""
+    before = words[words.index(stray) - 2 :][:2] if stray in words[2:] else []
+    if before and before[0] in _PAIRS and "=" not in before[1]:
+        return f"{before[0]} {before[1]}={stray}"
+    return f"--set {stray}" if _OVERRIDE.fullmatch(stray) and "--set" in _options(error) else None
+
+
+def _options(error: Any) -> set[str]:
+    return {each for option in getattr(getattr(error.ctx, "command", None), "params", ()) for each in option.opts}
+
+
 def _not_a_choice(error: Any, choices: Sequence[str]) -> UsageError:
-    from hsdsl.model.options import ELSEWHERE
+    from hsdsl.model.options import method_meant
 
     value: str = error.message.split("'")[1]
-    return UsageError(f"there is no {error.param.name} '{value}'", did_you_mean(ELSEWHERE.get(value) or value, choices))
+    hint = method_meant(value) if error.param.name == "method" else did_you_mean(value, choices)
+    return UsageError(f"there is no {error.param.name} '{value}'", hint)

@@ -17,6 +17,14 @@ _UNIT_NAMES = (
 )
 _UNITS = frozenset(_UNIT_NAMES.split())
 _QUANTITY = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*((?:[^\W\d]+\s*[*/·]\s*)*)([^\W\d]+)\s*")
+_SECONDS = {
+    **dict.fromkeys(("s", "sec", "second"), 1),
+    **{"ns": 1e-9, "us": 1e-6, "ms": 1e-3},
+    **dict.fromkeys(("min", "minute"), 60),
+    **dict.fromkeys(("h", "hr", "hour"), 3600),
+    **dict.fromkeys(("d", "day"), 86400),
+}
+_PLAIN_NUMBER = re.compile("[0-9.]{1,20}(?:[eE][-+]?[0-9]{1,2})?")
 _DERIVATIVE = "a derivative is what `flow` gives a state: write that, or name it under `let`"
 
 _HINTS = {  # what to write instead of names
@@ -133,6 +141,8 @@ def better(sign: str, text: str, at: int) -> str | None:
     name = word.group(1) if word else ""
     if sign == "'" and name:
         return f"write {name}: a reset sees the values before the jump, and derivatives are what `flow` gives"
+    if sign in "'\"" and not text[at + 1 :].strip():
+        return "remove it, or put quotes around the whole value"
     quantity = _QUANTITY.fullmatch(text[:at]) if sign == "^" and at < _FAR else None
     if quantity and quantity.group(3).lower() in _UNITS:
         return f"write {quantity.group(1)} alone: units belong under `units`"
@@ -180,11 +190,23 @@ def side_by_side(number: str, name: str) -> str | None:
         return NAMES[name]
     if re.fullmatch("[dD][0-9]{1,4}", name):
         return f"write {number}e{name[1:]}"
+    if other := _another_unit_of_time(number, name):
+        product = f"; or {number}*{name} for a product" if len(name) == 1 else ""
+        return f"write {number} where t is in {name}, {other}; `units: {{t: {name}}}` says which{product}"
     if name.lower() in _UNITS and len(name) == 1:
         return f"write {number}*{name} for a product; units belong under `units`"
     if name.lower() in _UNITS:
         return f"write {number} alone, for units belong under `units`; or {number}*{name} for a product"
     return None
+
+
+def _another_unit_of_time(number: str, name: str) -> str | None:
+    """What a number of one unit of time is in another."""
+    size = _SECONDS.get(name.rstrip("s") if len(name) > 3 else name)
+    if size is None or not _PLAIN_NUMBER.fullmatch(number):
+        return None
+    factor, unit = (1000, "ms") if size == 1 else (size, "s")
+    return f"{float(number) * factor:.12g} where it is in {unit}"
 
 
 def compared(left: str, word: str) -> str | None:

@@ -9,7 +9,7 @@ from typing import Literal
 
 from hsdsl.expression.expression_hints import SIGNS, better
 from hsdsl.expression.syntax import Expected, ExpressionError
-from hsdsl.names import LOOKALIKES, normalised, shown
+from hsdsl.names import LOOKALIKES, normalised, plain_sign, shown, told_apart
 
 LONGEST = 10_000  # characters
 LARGEST_INTEGER = 10**18
@@ -110,6 +110,8 @@ def _operator(text: str, at: int, expected: Expected) -> Token:
     for sign, code, message, hint in SIGNS:
         if text.startswith(sign, at):
             raise ExpressionError(code, message, at, at + len(sign), better(sign, text, at) or hint)
+    if plain := plain_sign(text[at]):
+        raise ExpressionError("HS101", told_apart(text[at]), at, at + 1, f"write `{plain}`")
     raise ExpressionError("HS101", f"the character `{text[at]}` has no meaning in an expression", at, at + 1)
 
 

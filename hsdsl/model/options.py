@@ -7,6 +7,7 @@ serve a later option gives way to the default; an explicit one is refused. A sch
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -30,8 +31,11 @@ SCALE = "scale."  # and a state: its given size
 FILE, DEFAULT = "the file", "default"
 # what other tools call methods of this order
 ELSEWHERE = {
-    **dict.fromkeys(("ode45", "rk45", "dopri", "dormandprince", "tsit5"), "dopri5"),
-    **dict.fromkeys(("ode78", "dop8", "ode89"), "dop853"),
+    **dict.fromkeys(("ode45", "rk45", "dopri", "dormandprince", "tsit5", "ode23", "rk23", "bs3", "rkf45"), "dopri5"),
+    **dict.fromkeys(("ode78", "dop8", "ode89", "rk78", "rk8", "vern7", "vern8", "vern9", "ode113", "adams"), "dop853"),
+    **dict.fromkeys(("ode15s", "ode15i", "ode23s", "ode23t", "ode23tb", "radau5", "radauiia", "radauiia5"), "radau"),
+    **dict.fromkeys(("bdf", "cvode", "ida", "dassl", "rodas", "rodas5", "rodas5p", "trbdf2", "stiff"), "radau"),
+    **dict.fromkeys(("lsoda", "lsodar", "odeint", "default"), "auto"),
     **dict.fromkeys(("rungekutta", "rungekutta4", "rk", "ode4"), "rk4"),
     **dict.fromkeys(("ode1", "forwardeuler", "expliciteuler"), "euler"),
     **dict.fromkeys(("rk2", "ode2"), "midpoint"),
@@ -167,11 +171,17 @@ def _unknown_method(option: Option) -> Exception:
     from hsdsl.source import Key
 
     name = option.value
-    meant = ELSEWHERE.get(str(name).lower().replace("-", "").replace("_", ""))
-    hint = f"did you mean '{meant}'?" if meant in METHODS else did_you_mean(str(name), ["auto", *METHODS])
+    hint = method_meant(str(name))
     if option.origin == FILE and isinstance(name, Key):
         return ModelError([name.place.diagnostic("HS204", f"there is no method '{name}'", hint)])
     return UsageError(f"there is no method '{name}' ({option.origin})", hint)
+
+
+def method_meant(name: str) -> str:
+    """The hint for a method that does not exist: one of its kind, or all."""
+    known = ("auto", *METHODS)
+    meant = ELSEWHERE.get(re.sub("[^a-z0-9]", "", name.lower())) or closest(name, known)
+    return f"did you mean '{meant}'?" if meant else f"choose from {', '.join(known)}"
 
 
 def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
@@ -183,7 +193,9 @@ def split_overrides(pairs: Sequence[str]) -> tuple[dict[str, str], dict[str, str
     for pair in pairs:
         name, equals, value = (part.strip() for part in pair.partition("="))
         if not (name and equals and value):
-            hint = "for example --set c=0.8 or --set initial.v=20"
+            parts = re.fullmatch(r"([\w.\[\]]+)\s*:=?\s*(\S.*)", pair)
+            meant = f"write --set {parts[1]}={parts[2]}" if parts else ""
+            hint = meant or "for example --set c=0.8 or --set initial.v=20"
             raise UsageError(f"--set: expected NAME=VALUE, got '{pair}'", hint)
         group, dot, rest = name.partition(".")
         if dot and group not in groups and closest(group, groups):

@@ -132,6 +132,9 @@ def _diagnostic(root: Node, fault: ErrorDetails) -> Diagnostic:
         return place.diagnostic(code, f"expected a model, got {described(_plain(root))}", hint)
     context = fault.get("ctx", {})
     message, hint, last = context["message"], context.get("hint"), _untagged(path)[-1]
+    if code == "HS205" and isinstance(last, int) and isinstance(name := descend(root, _untagged(path)), Scalar):
+        bare = name.value.strip("'\"")  # of a list, where nothing has a derivative
+        hint = f"write {shown(bare)}, with quotes on both sides or on none" if bare != name.value else hint
     if code == "HS121" and isinstance(last, str):
         message, hint = f"'{shown(last)}' has no value", f"write {shown(last)}: and {hint}"
     if code == "HS203" and (each := _by_modes(root, _untagged(path))):

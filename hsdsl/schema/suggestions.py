@@ -21,8 +21,9 @@ _OF_OTHERS = {
     "let": "where definitions define algebraic",
     "parameters": "constants params consts",
     "inputs": "controls signals",
-    "initial": "init start initial_state initial_conditions initial_values x0",
-    "until": "horizon end time stop stop_time duration t_end tend tf final_time t_final end_time tmax t_max",
+    "initial": "init start initial_state initial_conditions initial_values x0 y0 u0 z0 ic ics",
+    "until": "horizon end time stop stop_time duration t_end tend tf final_time t_final end_time tmax t_max"
+    " tspan t_span timespan time_span",
     "step": "dt h stepsize step_size time_step fixed_step",
     "relaxation": "epsilon eps",
     "tolerance": "tol tolerances rtol atol reltol abstol precision",

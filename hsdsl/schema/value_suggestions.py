@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import Any, cast
 
-from hsdsl.names import is_identifier, shown
+from hsdsl.names import is_identifier, plain_sign, shown, told_apart
 from hsdsl.source import Key, Scalar, is_empty
 
 _LONGEST = 1000  # of texts that are looked at for a better form
@@ -14,6 +14,7 @@ _ASSIGNMENT = re.compile(rf"\s*(?:{_TARGET})\s*:?=\s*([^=].*)")
 _REINIT = re.compile(r"reinit\(\s*([^\W\d]\w*)(?:\s*,\s*(.+)\))?")
 _DERIVATIVE = re.compile(r"([^\W\d]\w*)(?:'|\(t\)|\.)|d([^\W\d]\w*)/dt|(?:der|diff|d)\(([^\W\d]\w*)(?:, *t)?\)(?:/dt)?")
 _SECOND = re.compile(r"([^\W\d]\w*)(?:''|\.\.)|d2([^\W\d]\w*)/dt2|der\(der\(([^\W\d]\w*)\)\)")
+_WORDS = re.compile(r"([^\W\d]\w*) +(-?[\w.]+)")
 _AND = re.compile(r"\s+and\s+|\s*(?:,|&&)\s*")
 
 
@@ -59,6 +60,10 @@ def as_mapping(value: Any) -> str:
         case Scalar(value=text) if equation := assigned(text):
             name, text = equation
             return _entry(name, text) if _on_its_own_line(value) else f"write {{{name}: {shown(text)}}}"
+        case Scalar(value=text) if strange := next((sign for sign in text if plain_sign(sign) == ":"), None):
+            return f"write `:` and a space, for {told_apart(strange)}"
+        case Scalar(value=text) if words := _WORDS.fullmatch(text):
+            return _entry(words[1], words[2]) if _on_its_own_line(value) else f"write {{{words[1]}: {words[2]}}}"
         case Scalar(value=text) if ":" in text:
             return "a key is followed by a colon and a space"
         case [{"name": Scalar(value=name)}, *_]:
@@ -95,6 +100,8 @@ def in_brackets(value: Any) -> str | None:
             return f"write it without brackets: {shown(only.value)}"
         case {**entries} if len(entries) == 1 and all(is_empty(inner) for inner in entries.values()):  # pyright: ignore[reportUnknownVariableType]
             return f"write it without braces: {shown(next(iter(entries)))}"
+        case {"value": Scalar(value=number)}:
+            return f"write {shown(number)} alone: units belong under `units`"
         case dict():
             return "quote the expression, if it is one"
         case _:

@@ -16,7 +16,7 @@ from hsdsl.names import INVISIBLE, normalised, shown
 from hsdsl.source.nodes import Key, Mapping, Node, Scalar, Sequence, SourceRange, absent
 from hsdsl.source.split_expressions import rejoined_entries, rejoined_items, spaced_entries
 from hsdsl.source.text import Text
-from hsdsl.source.yaml_errors import explain, quote
+from hsdsl.source.yaml_errors import colon_missing, explain, quote, strange_blank
 
 DEEPEST = 64
 
@@ -139,6 +139,10 @@ class _Composer:
             if not isinstance(node, Scalar) or node.kind == "null":
                 self.findings.add(node.place.diagnostic("HS013", "a key must be a word", "quote it if it is one"))
                 continue
+            if node.plain and node.value[:1].isspace() and (strange := strange_blank(self.text, node.place.span.line)):
+                self._stop(strange)
+            if node.plain and "{" in node.value and (missing := colon_missing(self.text, node.place.span.line)):
+                self._stop(missing)
             key = Key.at(normalised(node.value), node.place)
             if key in unique:
                 line = unique[key][0].place.span.line

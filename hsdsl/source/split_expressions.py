@@ -5,10 +5,13 @@ The pieces are put together again, so that the rest of the model is still read, 
 
 from __future__ import annotations
 
+import re
+
 from hsdsl.errors import Findings
-from hsdsl.names import shown
+from hsdsl.names import plain_sign, shown, told_apart
 from hsdsl.source.nodes import Node, Scalar, SourceRange
 
+_WORDS = re.compile(r"([^\W\d]\w*) +(-?[\w.]+)")
 _MOST_PIECES = 100  # of one expression
 
 
@@ -63,7 +66,7 @@ def _before(node: Node) -> str:
 
 
 def spaced_entries(entries: list[tuple[Node, Node]], findings: Findings) -> list[tuple[Node, Node]]:
-    """The entries of a mapping in braces, with ``name:value``, which YAML takes for a key, apart again."""
+    """The entries of a mapping in braces, with ``name:value`` and ``name value``, keys to YAML, apart again."""
     return [_spaced(key, value, findings) for key, value in entries]
 
 
@@ -71,10 +74,23 @@ def _spaced(key: Node, value: Node, findings: Findings) -> tuple[Node, Node]:
     if not (isinstance(key, Scalar) and key.plain and isinstance(value, Scalar) and value.plain and value.value == ""):
         return key, value
     name, colon, rest = key.value.partition(":")
+    if words := _WORDS.fullmatch(key.value):
+        name, rest = words.groups()
+        findings.add(
+            key.place.diagnostic("HS004", f"a colon is missing after `{name}`", f"write {name}: {shown(rest)}")
+        )
+        return Scalar(name, True, key.place), Scalar(rest, True, key.place)
+    strange = next((sign for sign in key.value if plain_sign(sign) == ":"), "")
+    if strange:
+        name, colon, rest = key.value.partition(strange)
     if not (colon and rest and name.isidentifier()):
         return key, value
-    findings.add(key.place.diagnostic("HS004", "a space is missing after the colon", f"write {name}: {shown(rest)}"))
-    return Scalar(name, True, key.place), Scalar(rest, True, key.place)
+    message, plain = "a space is missing after the colon", rest.strip()
+    if plain_sign(rest[0]) == " ":
+        message = f"the blank after the colon is U+{ord(rest[0]):04X}, not a space"
+    message = told_apart(strange) if strange else message
+    findings.add(key.place.diagnostic("HS004", message, f"write {name}: {shown(plain)}"))
+    return Scalar(name, True, key.place), Scalar(plain, True, key.place)
 
 
 def _run(nodes: list[Node]) -> list[Scalar] | list[Node]:

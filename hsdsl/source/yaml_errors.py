@@ -7,7 +7,7 @@ import re
 import yaml
 
 from hsdsl.errors import Diagnostic
-from hsdsl.names import shown
+from hsdsl.names import plain_sign, shown, told_apart
 from hsdsl.source.text import Text
 
 _VALUE = re.compile(r"^\s*(?:- +)*(?:[^\s:{\[,'\"][^:{\[,]*:\s+)?(?P<value>\S.*)$")
@@ -34,11 +34,16 @@ _MEANS = {
 _QUOTE = "quote this expression"
 _NO_SPACE = re.compile(r"\s*(?:- +)?([^\W\d]\w*):(\S.*)")
 _EQUATION = re.compile(r"\s*(?:- +)?([^\W\d]\w*)(?:'|\(t\))?\s*=\s*([^=].*)|\s*(?:der|diff)\((\w+)\)\s*=\s*([^=].*)")
+_TWO_WORDS = re.compile(r"\s*(?:- +)?([^\W\d]\w*) +([\w.'\"+-]\S*)\s*")
 _DASH = re.compile(r"(\s*)-([^\W\d].*:.*)")
 _LAST_WORD = re.compile(r"([^\W\d]\w*)\s*$")
 _WHOLE_LINE = 9999  # characters, cut at the line's end
 _FAR = 100  # characters before a fault that are looked at
 _COMMENT = re.compile(r"//|/\*|%")
+_NOT_YAML = re.compile("\"[^\"]*\"|'[^']*'|(?<!\\S)#.*")
+_OF_YAML = ":{}[],#-\"' "  # signs and blanks that give a file its shape
+_UNCOLONED = re.compile(r"\s*(?:- +)?([^\W\d]\w*)(?: +(?=\[)| *(?={))(.*)")
+_KEY_BEFORE = re.compile(r"[{,]\s*([^\W\d]\w*) *$")
 _TEXTS = ("title", "source", "about")
 _COLON = "a key is followed by a colon and a space"
 
@@ -48,9 +53,9 @@ def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
     problem = error.problem or ""
     line, column = _mark(error.problem_mark or error.context_mark)
     opened = _mark(error.context_mark) if error.context_mark else (line, column)
-    tab = _tab(text, line) or _tab(text, opened[0])
-    if tab:
-        return tab
+    for suspect in dict.fromkeys((line, opened[0], _above(text, line))):
+        if wrong := strange_blank(text, suspect) or _lookalike(text, suspect):
+            return wrong
     if "document start" in problem:
         return text.fault("HS010", "a second document begins here", line, column, "a file holds one model")
     if "quoted scalar" in (error.context or ""):
@@ -69,12 +74,35 @@ def _mark(mark: yaml.Mark | None) -> tuple[int, int]:
     return (mark.line + 1, mark.column + 1) if mark else (1, 1)
 
 
-def _tab(text: Text, line: int) -> Diagnostic | None:
+def strange_blank(text: Text, line: int) -> Diagnostic | None:
+    """A tab, or another blank that is no space, in the indentation of a line."""
     content = text.lines[min(line, len(text.lines)) - 1]
-    blank = content[: len(content) - len(content.lstrip())]
-    if "\t" not in blank:
+    strange = next((sign for sign in content[: _indent(content)] if sign != " "), None)
+    if strange is None:
         return None
-    return text.fault("HS005", "expected spaces, got a tab", line, blank.index("\t") + 1, "indent with spaces")
+    name = "a tab" if strange == "\t" else f"the blank U+{ord(strange):04X}"
+    return text.fault("HS005", f"expected spaces, got {name}", line, content.index(strange) + 1, "indent with spaces")
+
+
+def _lookalike(text: Text, line: int) -> Diagnostic | None:
+    """A character of a line that looks like one of YAML's own signs, outside of quotes, comments and texts."""
+    content = text.lines[min(line, len(text.lines)) - 1]
+    if content.partition(":")[0].strip(" -") in _TEXTS:
+        return None
+    plain = _NOT_YAML.sub(lambda match: " " * len(match.group()), content)
+    for at, sign in enumerate(plain):
+        if (meant := plain_sign(sign)) and meant in _OF_YAML:
+            hint = "write a space" if meant == " " else f"write `{meant}`" + " and a space" * (meant in ":,")
+            return text.fault("HS004", told_apart(sign), line, at + 1, hint)
+    return None
+
+
+def _above(text: Text, line: int) -> int:
+    """The last line above another that is not empty."""
+    above = min(line, len(text.lines)) - 1
+    while above > 1 and not text.lines[above - 1].strip():
+        above -= 1
+    return max(above, 1)
 
 
 def _quoted(text: Text, problem: str, here: tuple[int, int], opened: tuple[int, int]) -> Diagnostic:
@@ -98,6 +126,9 @@ def _in_brackets(text: Text, here: tuple[int, int], opened: tuple[int, int]) -> 
     if column > len(content) or (below and (sign == ":" or outdented)):
         message = f"the `{bracket}` that opens here is never closed"
         return text.fault("HS004", message, *opened, f"close it with `{closing}`")
+    key = _KEY_BEFORE.search(content, max(0, column - _FAR), column - 1)
+    if sign in "{[" and key:
+        return _without_its_colon(text, line, key.start(1) + 1, key.group(1), f"{sign}...")
     message = f"YAML cannot read on at `{sign}` inside `{bracket}` and `{closing}`"
     hint = f"{_QUOTE} if `{sign}` belongs to one"
     name = _LAST_WORD.search(content, max(0, column - _FAR), column - 1)
@@ -116,6 +147,8 @@ def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
     if before.strip(" -") == "" and _character(text, line, column) not in "%@`*&!":
         return _indentation(text, line, column)
     if "mapping values" in problem:
+        if missing := colon_missing(text, line):
+            return missing
         if _KEY_AND_VALUE.match(before):
             message = "a value cannot contain a colon followed by a space"
             return text.fault("HS007", message, line, column, _two_colons(content, column))
@@ -125,10 +158,8 @@ def _in_block(text: Text, problem: str, line: int, column: int) -> Diagnostic:
 
 def _without_colon(text: Text, line: int) -> Diagnostic | None:
     """The line above, where it was taken for the beginning of a text because no colon follows its key."""
-    above = line - 1
-    while above > 0 and not text.lines[above - 1].strip():
-        above -= 1
-    content = text.lines[above - 1] if above > 0 else ""
+    above = _above(text, line)
+    content = text.lines[above - 1] if above < line else ""
     if not content.strip() or ":" in content or content.lstrip()[0] in "-#":
         return None
     message = "this line is neither a key nor part of a value"
@@ -140,10 +171,21 @@ def _with_colon(content: str) -> str:
     match = _NO_SPACE.fullmatch(content)
     if match:
         return f"write a space after the colon: {shown(': '.join(match.groups()))}"
-    match = _EQUATION.fullmatch(content)
+    match = _EQUATION.fullmatch(content) or _TWO_WORDS.fullmatch(content)
     if match:
         return f"write {shown(': '.join(part for part in match.groups() if part))}"
     return _COLON
+
+
+def colon_missing(text: Text, line: int) -> Diagnostic | None:
+    """The diagnostic for the line ``initial {mode: A}``."""
+    match = _UNCOLONED.fullmatch(text.lines[line - 1])
+    return _without_its_colon(text, line, match.start(1) + 1, *match.groups()) if match else None
+
+
+def _without_its_colon(text: Text, line: int, column: int, key: str, value: str) -> Diagnostic:
+    message = f"a colon is missing after `{shown(key)}`"
+    return text.fault("HS004", message, line, column, f"write {shown(key)}: {shown(value)}", len(key))
 
 
 def _two_colons(content: str, column: int) -> str:

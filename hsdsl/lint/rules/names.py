@@ -11,14 +11,12 @@ from hsdsl.lint.dependencies import Definition
 from hsdsl.lint.edits import without_entry
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
+from hsdsl.names import in_latin
 from hsdsl.source import Key
 
 _UNUSED = "remove it, or use it"
 _RENAME = "call it something else"
 _SEPARATE = "give one of them another name"
-_LOOKALIKES = str.maketrans(  # Cyrillic and Greek letters and the Latin ones they look like
-    "аеорсухіјѕԁһԛԝАВЕКМНОРСТУХІЈЅΑΒΕΖΗΙΚΜΝΟΡΤΥΧοανρ", "aeopcyxijsdhqwABEKMHOPCTYXIJSABEZHIKMNOPTYXoavp"
-)
 _ELSEWHERE = {  # names of functions and constants in other languages
     "ln": "the logarithm",
     "arcsin": "the inverse sine",
@@ -96,7 +94,7 @@ def confusable_names(subject: Subject) -> Iterator[Finding]:
 
 def _appearance(name: str) -> str:
     """Reduce a name to its letters, alike ones as one; single letters keep their case."""
-    latin = unicodedata.normalize("NFKC", name).translate(_LOOKALIKES)
+    latin = in_latin(unicodedata.normalize("NFKC", name))
     return latin if len(latin) == 1 else latin.replace("_", "").casefold()
 
 
