@@ -108,6 +108,12 @@ def counted(number: int, noun: str) -> str:
     return f"{number} {noun}{'s' * (number != 1)}"
 
 
+def listed(names: Iterable[str]) -> str:
+    """Names as a sentence has them: ``'a', 'b' and 'c'``."""
+    *some, last = (f"'{name}'" for name in names)
+    return f"{', '.join(some)} and {last}" if some else last
+
+
 def called(title: str | None, path: str) -> str:
     """What a model is called: by its title, else by its file."""
     return title or ("a model without a file" if path.rpartition("/")[2] == NO_FILE else path)

@@ -174,8 +174,8 @@ def _called(functions: Mapping, moved: set[str], findings: Findings) -> None:
         entry = f"{name}: {{of: [{', '.join(arguments)}], is: {text}}}"
         hint = f"write functions: {{{entry}}}" if key in moved else f"write {entry}"
         findings.add(key.place.diagnostic("HS205", f"'{shown(key)}' cannot be a name", hint))
-        listed = Sequence(tuple(Scalar(each, True, key.place) for each in arguments), key.place)
-        entries: dict[str, tuple[Key, Node]] = {"of": (Key.at("of", key.place), listed)}
+        names = Sequence(tuple(Scalar(each, True, key.place) for each in arguments), key.place)
+        entries: dict[str, tuple[Key, Node]] = {"of": (Key.at("of", key.place), names)}
         if body is not None:
             entries["is"] = (Key.at("is", key.place), body)
         functions.rename(str(key), name, Mapping(entries, value.place))

@@ -5,7 +5,7 @@ A case file `cases/RULE.yaml` has models under `good`, and under `bad` what the 
     good: [MODEL, ..]
     bad:
       - model: MODEL
-        finds: [{line, column, length, says, decided}, ..]   # what is given is compared; `says` is part of the message
+        finds: [{line, column, length, says, decided, severity, hint}, ..]   # what is given is compared; `says` is part of the message
         fixed: MODEL                                         # what `--fix` with this rule alone leaves, if it can
 
 A model may be a fragment; see `fragments.completed`.
@@ -85,7 +85,8 @@ def test_bad_models(name, number):
         for key in ("line", "column", "length"):
             assert str(getattr(finding.span, key)) == expected.get(key, str(getattr(finding.span, key))), finding
         assert expected.get("says", "") in finding.message
-        assert finding.decided == expected.get("decided", finding.decided)
+        for key in ("decided", "severity", "hint"):
+            assert getattr(finding, key) == expected.get(key, getattr(finding, key))
         assert finding.span.column + finding.span.length <= len(finding.text) + 1
 
 

@@ -32,10 +32,13 @@ def guard_never_crossed(subject: Subject) -> Iterator[Finding]:
         if found is None or entered_beyond(subject.dynamics, edge.edge):
             continue
         why, proof = found
-        where = within(proof.searched)
+        where, hint, severity = within(proof.searched), "turn the inequality round or correct its level", None
+        if any(s is not TIME for s, _, _ in proof.searched):  # a run may go beyond
+            hint = f"a run that leaves these bounds may cross it; where none does, {hint}"
+            severity = "note"
         crosses = f"{'does not cross' if where else 'never crosses'} the guard of '{edge.edge.name}'{where}"
-        hint = "turn the inequality round, correct its level, or remove the transition"
-        yield Finding(edge.document.when.place.span, f"the flow {crosses}: {why}", hint, proof.decided)
+        span = edge.document.when.place.span
+        yield Finding(span, f"the flow {crosses}: {why}", hint, proof.decided, severity=severity)
 
 
 def condition_beyond_surface(subject: Subject) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ from hsdsl.lint.dependencies import Definition
 from hsdsl.lint.edits import without_entry
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
-from hsdsl.names import in_latin
+from hsdsl.names import in_latin, listed
 from hsdsl.source import Key
 
 _UNUSED = "remove it, or use it"
@@ -58,10 +58,13 @@ def unused_let(subject: Subject) -> Iterator[Finding]:
 def unused_state(subject: Subject) -> Iterator[Finding]:
     """Find states that no expression uses but their own flow and resets."""
     influence = subject.influence
-    for name, key in subject.states.items() if influence.observed else ():
-        if name not in influence.read:
-            message = f"nothing depends on the state '{name}'"
-            yield Finding(key.place.span, message, "remove it, use it, or give it a purpose under `outputs`")
+    unused = [key for name, key in subject.states.items() if influence.observed and name not in influence.read]
+    if unused:
+        one = len(unused) == 1
+        message = f"nothing depends on the state{'s' * (not one)} {listed(unused)}"
+        pronoun, purpose = ("it", "a purpose") if one else ("them", "purposes")
+        hint = f"remove {pronoun}, use {pronoun}, or give {pronoun} {purpose} under `outputs`"
+        yield Finding(unused[0].place.span, message, hint)
 
 
 def shadowed_name(subject: Subject) -> Iterator[Finding]:
@@ -84,12 +87,14 @@ def unreachable_mode(subject: Subject) -> Iterator[Finding]:
 
 
 def confusable_names(subject: Subject) -> Iterator[Finding]:
-    """Find names that look alike."""
-    first: dict[str, str] = {}
+    """Find names that look alike, once for all that are taken for the same one."""
+    alike: dict[str, dict[str, Key]] = {}
     for name in _names(subject):
-        other = first.setdefault(_appearance(name), str(name))
-        if other != name:
-            yield Finding(name.place.span, f"the name '{name}' is easily taken for '{other}'", _RENAME)
+        alike.setdefault(_appearance(name), {}).setdefault(str(name), name)
+    for first, *others in (list(names.values()) for names in alike.values() if len(names) > 1):
+        taken = "is easily" if len(others) == 1 else "are easily"
+        names = f"the name{'s' * (len(others) > 1)} {listed(others)}"
+        yield Finding(others[0].place.span, f"{names} {taken} taken for '{first}'", _RENAME)
 
 
 def _appearance(name: str) -> str:

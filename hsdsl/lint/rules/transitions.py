@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from hsdsl.expression.scope import symbol
@@ -16,6 +17,7 @@ from hsdsl.lint.analysis.wording import at, within
 from hsdsl.lint.analysis.zero_time_cycle import cycle, same
 from hsdsl.lint.finding import Alike, Finding
 from hsdsl.lint.subject import EdgePart, Subject
+from hsdsl.names import listed
 from hsdsl.system import Edge, Mode
 
 
@@ -148,8 +150,9 @@ def _returns(here: ModePoint, edge: Edge, back: Edge) -> bool:
 
 
 def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
-    """Find cycles of transitions that take no time."""
+    """Find cycles of transitions that take no time, once for all that have a surface in common."""
     reported: set[frozenset[str]] = set()
+    causes: list[tuple[set[Any], Finding, list[str]]] = []
     for part, edge in subject.edges:
         if _repeats(edge.edge, part.mode):
             message = (
@@ -162,9 +165,27 @@ def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
             here = ModePoint(subject.dynamics, part.mode, answer.point)
             edges = cycle(here, edge.edge) if answer.somewhere else None
             names = frozenset(after.name for after in edges or ())
-            if edges and names not in reported:
-                reported.add(names)
-                yield _cycle_finding(subject.dynamics, part.mode, edge, answer, edges)
+            if not edges or names in reported:
+                continue
+            reported.add(names)
+            surfaces = {side for after in edges for side in _sides(subject.dynamics, after)}
+            for known, _, others in causes:
+                if known & surfaces:
+                    known |= surfaces
+                    others.append(listed(after.name for after in edges))
+                    break
+            else:
+                causes.append((surfaces, _cycle_finding(subject.dynamics, part.mode, edge, answer, edges), []))
+    for _, finding, others in causes:
+        verb = "do" if len(others) > 1 or " and " in "".join(others) else "does"
+        more = f"; so {verb} {', as well as '.join(others)}" if others else ""
+        yield replace(finding, message=finding.message + more)
+
+
+def _sides(dynamics: Dynamics, edge: Edge) -> tuple[Any, Any]:
+    """A surface function and its opposite: one surface for whoever gives it another level."""
+    residual = dynamics.residual(edge.surface)
+    return residual, -residual
 
 
 def _repeats(edge: Edge, mode: Mode) -> bool:
@@ -183,7 +204,7 @@ def _repeats(edge: Edge, mode: Mode) -> bool:
 def _cycle_finding(dynamics: Dynamics, mode: Mode, edge: EdgePart, answer: Answer, edges: tuple[Edge, ...]) -> Finding:
     about: list[Any] = [*map(symbol, mode.states), *(dynamics.residual(e.surface) for e in (edge.edge, *edges))]
     where = at(dynamics, mode, answer, about)
-    names = ", ".join(f"'{after.name}'" for after in edges)
+    names = listed(after.name for after in edges)
     follow = "follow each other" if len(edges) > 1 else "follows itself"
     message = f"once '{edge.edge.name}' has fired {where}, {names} {follow} at one instant without end"
     hint = "give them different levels" if len(edges) > 1 else "let its reset lead inside the domain"
