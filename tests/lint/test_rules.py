@@ -5,7 +5,7 @@ A case file `cases/RULE.yaml` has models under `good`, and under `bad` what the 
     good: [MODEL, ..]
     bad:
       - model: MODEL
-        finds: [{line, column, length, says, decided, severity, hint}, ..]   # what is given is compared; `says` is part of the message
+        finds: [{line, column, length, says, decided, severity, hint}, ..]   # what is given is compared; `says`: a part
         fixed: MODEL                                         # what `--fix` with this rule alone leaves, if it can
 
 A model may be a fragment; see `fragments.completed`.
