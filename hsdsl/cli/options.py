@@ -58,6 +58,9 @@ def overriding(help: str) -> Any:
     return option("NAME=VALUE", help, "--set", complete=override_names)
 
 
+COMPLETES = "Where transitions accumulate: contact follows guards, auto slides on surfaces of two modes, too; or none."
+
+
 class Experiment(NamedTuple):
     """Options that override a model's experiment and its values."""
 
@@ -68,7 +71,7 @@ class Experiment(NamedTuple):
     step: Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")] = None
     tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")] = None
     relaxation: Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")] = None
-    completion: Annotated[Completion | None, option("C", "Where transitions accumulate: contact, auto or none.")] = None
+    completion: Annotated[Completion | None, option("C", COMPLETES)] = None
 
     def settings(self, **more: Any) -> dict[str, Any]:
         """Arguments of `Model.simulate`."""

@@ -47,12 +47,15 @@ def stability(
         check_target(plot, "--plot", (".png", ".svg"))
         if not 0 < patience < 1e6 or (processes is not None and processes < 1):
             raise UsageError("--patience and --processes: expected positive numbers")
-        options: dict[str, Any] = {
-            "schemes": known_names(scheme, (*SCHEMES,), "--scheme"),
-            "methods": known_names(method, ("auto", *METHODS), "--method"),
+        options = values_of(overrides)
+        by_set: dict[str, str] = options["settings"]
+        options |= {
+            "schemes": known_names(by_set.pop("scheme", None) if scheme is None else scheme, (*SCHEMES,), "--scheme"),
+            "methods": known_names(
+                by_set.pop("method", None) if method is None else method, ("auto", *METHODS), "--method"
+            ),
             "against": known_names(",".join(PEERS) if against == "all" else against, (*PEERS,), "--against"),
         }
-        options |= values_of(overrides)
         with progress(answer.hidden) as show:
 
             def watch(done: int, count: int) -> None:

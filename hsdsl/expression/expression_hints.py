@@ -25,6 +25,7 @@ _SECONDS = {
     **dict.fromkeys(("d", "day"), 86400),
 }
 _PLAIN_NUMBER = re.compile("[0-9.]{1,20}(?:[eE][-+]?[0-9]{1,2})?")
+_SUFFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "µ": -6, "m": -3, "k": 3, "K": 3, "meg": 6, "G": 9}  # of SPICE
 _DERIVATIVE = "a derivative is what `flow` gives a state: write that, or name it under `let`"
 
 _HINTS = {  # what to write instead of names
@@ -193,6 +194,10 @@ def side_by_side(number: str, name: str) -> str | None:
     if other := _another_unit_of_time(number, name):
         product = f"; or {number}*{name} for a product" if len(name) == 1 else ""
         return f"write {number} where t is in {name}, {other}; `units: {{t: {name}}}` says which{product}"
+    power = _SUFFIXES.get(name) or _SUFFIXES.get(name.lower() if len(name) > 1 else "")
+    if power:
+        scaled = f"{number}*1e{power}" if re.search("[eE]", number) else f"{number}e{power}"
+        return f"write {scaled} for the suffix {name}, or {number}*{name} for a product"
     if name.lower() in _UNITS and len(name) == 1:
         return f"write {number}*{name} for a product; units belong under `units`"
     if name.lower() in _UNITS:

@@ -67,12 +67,13 @@ def _apart(tree: Tree, key: str, text: str) -> str:
     """The hint for several inequalities in one."""
     if key != "when":
         return "write each inequality as an item of its own"
+    event = f"write event: {_said(tree, text)}, which is made where that turns true"
     if not (isinstance(tree, Logic) and all(isinstance(operand, Comparison) for operand in tree.operands)):
-        return "put the rest under `if`"
+        return event
     if tree.operator == "or":
         return "write a transition for each: " + "; ".join(f"when: {_said(o, text)}" for o in tree.operands)
     first, *others = (_said(operand, text) for operand in tree.operands)
-    return f"write when: {first} and, on a line of its own, if: {' and '.join(others)}"
+    return f"{event}; `when: {first}` with `if: {' and '.join(others)}` reads the `if` only where the first is crossed"
 
 
 def _said(tree: Tree, text: str) -> str:

@@ -134,10 +134,10 @@ class Scope:
         assert self.states is not None
         lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
         message = f"'{node.name}' needs the state {lacking}, which {self.place} does not have"
-        hint = None
+        hint = f"give {self.place} this state; with the flow 0 it keeps its value there"
         if value.uses == {node.name}:
             message = f"{self.place} has no state '{node.name}'"
-            hint = did_you_mean(node.name, sorted(self.states - {SINCE}))
+            hint = did_you_mean(node.name, sorted(self.states - {SINCE})) or hint
         return ExpressionError.at(node, "HS117", message, hint)
 
     def _call(self, node: Call) -> ExpressionError | None:

@@ -83,8 +83,8 @@ def _largest(formula: Formula, a: Array, b: Array, begin: Array, end: Array) -> 
     below, above = formula.slopes(low, high)
     step = (end - begin)[:, None] * way
     with np.errstate(invalid="ignore"):
-        rise = _sum(np.maximum(below[:, 0] * step, above[:, 0] * step))
-        fall = _sum(np.minimum(below[:, 0] * step, above[:, 0] * step))
+        rise = _sum(np.maximum(below[:, 0] * step, above[:, 0] * step), np.inf)
+        fall = _sum(np.minimum(below[:, 0] * step, above[:, 0] * step), -np.inf)
     at_first, at_last = (formula.ranges(x, x)[1][:, 0] for x in (first, last))
     whole = formula.ranges(low, high)[1][:, 0]
     bound = np.minimum(whole, np.minimum(at_first + np.maximum(rise, 0), at_last + np.maximum(-fall, 0)))
@@ -97,13 +97,14 @@ def highest(formula: Formula, low: Array, high: Array) -> Array:
     middle, half = (low + high) / 2, (high - low) / 2
     below, above = formula.slopes(low, high)
     with np.errstate(invalid="ignore"):
-        change = _sum(np.maximum(np.abs(below[:, 0]), np.abs(above[:, 0])) * half)
+        change = _sum(np.maximum(np.abs(below[:, 0]), np.abs(above[:, 0])) * half, np.inf)
     return np.minimum(formula.ranges(low, high)[1][:, 0], formula.ranges(middle, middle)[1][:, 0] + change)
 
 
-def _sum(products: Array) -> Array:
-    """The sum of each row; what is not a number comes of a coordinate that stays and a slope without bound."""
-    return np.nan_to_num(products, nan=np.inf).sum(axis=1)
+def _sum(products: Array, unknown: float) -> Array:
+    """The sum of each row; ``unknown`` where a coordinate stays and its slope has no bound, or two have none."""
+    total = products.sum(axis=1)
+    return np.where(np.isnan(total), unknown, total)
 
 
 def _looked_at(formula: Formula, a: Array, b: Array, tolerance: Array, verdict: Array) -> Array:

@@ -24,6 +24,7 @@ from hsdsl.simulate import SCHEMES
 KEYS = (
     "until", "scheme", "method", "step", "tolerance", "relaxation", "scale", "samples", "max_transitions", "completion",
 )  # fmt: skip
+NUMERICAL = ("scheme", "method", "step", "tolerance", "relaxation", "samples")  # how; the others say what is run
 COMPLETIONS = ("contact", "auto", "none")
 ARGUMENTS = (*KEYS, "parameters", "initial", "settings", "engine", "precision")  # of a single run
 OWN_FORMULA = ("paoli-schatzman",)

@@ -16,8 +16,13 @@ def condensed(sentences: Sequence[str]) -> list[str]:
     """The same sentences, those that differ in numbers only as one."""
     groups: dict[str, list[str]] = {}
     for sentence in sentences:
-        groups.setdefault(_NUMBER.sub(_MARK, sentence), []).append(sentence)
-    return [alike[0] if len(alike) == 1 else _joined(form, alike) for form, alike in groups.items()]
+        groups.setdefault(form(sentence), []).append(sentence)
+    return [alike[0] if len(alike) == 1 else _joined(each, alike) for each, alike in groups.items()]
+
+
+def form(sentence: str) -> str:
+    """A sentence without its numbers: the same for all that are alike."""
+    return _NUMBER.sub(_MARK, sentence)
 
 
 def _joined(form: str, alike: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from typing import Any, cast
 
 from hsdsl.names import is_identifier, plain_sign, shown, told_apart
@@ -11,6 +12,7 @@ from hsdsl.source import Key, Scalar, is_empty
 _LONGEST = 1000  # of texts that are looked at for a better form
 _TARGET = r"([^\W\d]\w*)(?:'|\+|\(t\))?|d([^\W\d]\w*)/dt|der\(\s*([^\W\d]\w*)\s*\)"
 _ASSIGNMENT = re.compile(rf"\s*(?:{_TARGET})\s*:?=\s*([^=].*)")
+_BEGINNING = re.compile(rf"(?:^|(?<=\s))(?:{_TARGET})\s*:?=(?!=)")
 _REINIT = re.compile(r"reinit\(\s*([^\W\d]\w*)(?:\s*,\s*(.+)\))?")
 _DERIVATIVE = re.compile(r"([^\W\d]\w*)(?:'|\(t\)|\.)|d([^\W\d]\w*)/dt|(?:der|diff|d)\(([^\W\d]\w*)(?:, *t)?\)(?:/dt)?")
 _SECOND = re.compile(r"([^\W\d]\w*)(?:''|\.\.)|d2([^\W\d]\w*)/dt2|der\(der\(([^\W\d]\w*)\)\)")
@@ -26,6 +28,13 @@ def assigned(text: str) -> tuple[str, str] | None:
         return None
     *names, value = match.groups()
     return next(name for name in names if name), (value or "").strip()
+
+
+def _assignments(text: str) -> list[tuple[str, str]]:
+    """The names and values of several such lines, which YAML joins; empty for one, or where a line is none."""
+    starts = [match.start() for match in _BEGINNING.finditer(text[:_LONGEST])]
+    found = [assigned(text[a:b].strip()) for a, b in pairwise([*starts, len(text)])]
+    return [line for line in found if line] if len(found) > 1 and all(found) and not text[: starts[0]].strip() else []
 
 
 def undifferentiated(key: str) -> str | None:
@@ -57,6 +66,8 @@ def _entry(name: str, value: str) -> str:
 def as_mapping(value: Any) -> str:
     """The hint for what should have been names with values."""
     match value:
+        case Scalar(value=text) if lines := _assignments(text):
+            return f"write one `name: value` on each line: {'; '.join(': '.join(line) for line in lines)}"
         case Scalar(value=text) if equation := assigned(text):
             name, text = equation
             return _entry(name, text) if _on_its_own_line(value) else f"write {{{name}: {shown(text)}}}"

@@ -58,3 +58,29 @@ def test_bad_words_get_one_message(command, model, words, message):
     assert (answer.code, answer.out) == (2, "")
     assert answer.err.startswith("hsdsl: ")
     assert message in answer.err
+
+
+SLIDING = """hsdsl: 1
+parameters: {push: 2}
+modes:
+  right: {flow: {x: 0.3 - push, y: 1}, transitions: [{when: x <= 0, to: left}]}
+  left: {flow: {x: 0.3 + push, y: 1}, transitions: [{when: x >= 0, to: right}]}
+initial: {mode: right, x: 1.1, y: 0}
+experiment: {until: 3}
+"""
+
+
+def test_references_have_the_settings_of_their_runs(command, model):
+    given = [model(SLIDING), "--map", "h=1e-2:1e-1:2,push=0.7:3:3", "--no-rho"]
+    without = command("stability", *given)
+    assert without.out.splitlines()[0].split("  ")[1] == "6 no reference"
+    assert without.out.splitlines()[1].startswith("no reference, first at h = 0.01, push = 0.7: 6 times between t = ")
+    assert "completion: auto" in without.out
+    answer = command("stability", *given, "--set", "experiment.completion=auto", "--json").json
+    assert {run["outcome"] for run in answer["runs"]} == {"converged"}
+
+
+def test_scheme_and_method_of_a_map_may_come_by_set(command, model):
+    given = ["--set", "experiment.scheme=relaxed", "--set", "experiment.method=heun"]
+    answer = command("stability", model(DECAY), "--map", "h=1e-3:1e-2:2,rate=10:20:2", *given, "--no-rho")
+    assert answer.out.startswith("relaxed heun")

@@ -73,7 +73,7 @@ def stability_map(
     map : str
         Two axes as ``"h=1e-4:1e-1:20,relaxation"``, see :func:`hsdsl.chart.stability.axes.read_axes`.
     schemes, methods : sequence of str
-        Ours, a panel for each pair; left out, those of the file.
+        Ours, a panel for each pair; left out, the file's scheme, and rk4 on maps of h, auto on others.
     against : sequence of str
         Names of :data:`hsdsl.chart.PEERS`; they take no step.
     parameters, initial, settings : mapping, optional
@@ -149,15 +149,13 @@ def _tools(
     model: Model, schemes: Sequence[str], methods: Sequence[str], against: Sequence[str], kinds: set[str]
 ) -> list[Tool]:
     """Schemes with methods, and peers."""
-    options = model.resolve()
-    schemes = list(schemes) or [options.scheme]
-    fallback = "rk4" if "step" in kinds else "auto"
-    named = list(methods) or [fallback]
+    schemes = list(schemes) or [model.resolve().scheme]
+    named = list(methods) or ["rk4" if "step" in kinds else "auto"]
     if "step" in kinds and against:
         raise UsageError("--against: peers choose their own steps, so a map of h cannot show them", "map tolerance")
     for method in named if "tolerance" in kinds else ():
         if method in METHODS and not METHODS[method].adaptive:
-            raise UsageError(f"--method {method}: it has a fixed step and keeps no tolerance", "map h")
+            raise UsageError(f"method {method}: it has a fixed step and keeps no tolerance", "map h")
     found = [
         Tool(scheme, method if scheme != "paoli-schatzman" else "")
         for scheme in schemes

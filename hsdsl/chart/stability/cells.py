@@ -17,6 +17,7 @@ from hsdsl.exact import reference
 from hsdsl.execution import Execution
 from hsdsl.model import Model
 from hsdsl.model.distances import distance_of_runs
+from hsdsl.model.options import NUMERICAL
 
 CONVERGED, INACCURATE, OTHER = "converged", "inaccurate", "wrong transitions"
 BLOWN_UP, STUCK, REFUSED, UNKNOWN = "blown up", "stuck", "refused", "no reference"
@@ -102,7 +103,7 @@ class Bench:
     def _scene(self, numbers: dict[str, dict[str, Any]]) -> Scene | str:
         exact = self.exact if not any(numbers.values()) and not self.base.get("settings") else None
         if exact is None:
-            settings = {key: value for key, value in self.base.get("settings", {}).items() if key in ("until", "scale")}
+            settings = {key: value for key, value in self.base.get("settings", {}).items() if key not in NUMERICAL}
             try:
                 given: dict[str, Any] = {"tolerance": PRECISE, "settings": settings, **numbers}
                 exact = self.model.simulate(scheme="located", method="auto", **given)

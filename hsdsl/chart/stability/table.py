@@ -9,7 +9,8 @@ from typing import Any
 
 from hsdsl.chart.rows import csv_text
 from hsdsl.chart.stability import Panel, StabilityMap
-from hsdsl.chart.stability.cells import WORDS, Cell
+from hsdsl.chart.stability.cells import REFUSED, UNKNOWN, WORDS, Cell
+from hsdsl.report.alike import condensed, form
 
 COLUMNS = ("tool", "scheme", "method", "outcome", "rho", "error", "transitions", "why")
 
@@ -42,7 +43,7 @@ def as_plain(found: StabilityMap) -> dict[str, Any]:
 
 
 def as_text(found: StabilityMap) -> str:
-    """How many runs of each tool came to what."""
+    """How many runs of each tool came to what, and why there was nothing to run or to compare with."""
     width = max(len(panel.tool.label) for panel in found.panels)
     lines: list[str] = []
     for panel in found.panels:
@@ -52,4 +53,18 @@ def as_text(found: StabilityMap) -> str:
         known = f"; linearly stable up to h = {min(limits):.3g}" if limits else ""
         known += f" to {max(limits):.3g}" if limits and max(limits) > 1.001 * min(limits) else ""
         lines.append(f"{panel.tool.label:{width}}  {words}{known}")
-    return "\n".join(lines)
+    return "\n".join([*lines, *_reasons(found)])
+
+
+def _reasons(found: StabilityMap) -> Iterator[str]:
+    """Why runs have no reference or are refused: each reason once, with its first place."""
+    groups: dict[tuple[str, str], dict[tuple[float, float], str]] = {}
+    for panel in found.panels:
+        for y, row in zip(found.y.values, panel.cells, strict=True):
+            for x, cell in zip(found.x.values, row, strict=True):
+                if cell.word in (UNKNOWN, REFUSED):
+                    groups.setdefault((cell.word, form(cell.why)), {})[x, y] = cell.why
+    for (word, _), places in groups.items():
+        x, y = next(iter(places))
+        first = f"first at {found.x.name} = {x:.4g}, {found.y.name} = {y:.4g}"
+        yield f"{word}, {first}: {condensed([*places.values()])[0]}"

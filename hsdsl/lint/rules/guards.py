@@ -53,7 +53,7 @@ def condition_beyond_surface(subject: Subject) -> Iterator[Finding]:
             where = at(dynamics, part.mode, answer, about)
             name = edge.edge.name
             message = f"the `if` of '{name}' can become true beyond its surface, {where}, and nothing fires there"
-            hint = "to fire when both hold, put both into `when` with min(..., ...) >= 0"
+            hint = "to fire where both have become true, write `event: A and B` in the place of `when: A` with `if: B`"
             yield Finding(edge.document.condition.place.span, message, hint, answer.decided)
 
 

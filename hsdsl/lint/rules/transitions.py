@@ -134,7 +134,7 @@ def sliding(subject: Subject) -> Iterator[Finding]:
             where = at(dynamics, part.mode, answer, [residual, rate, landing.rate])
             names = f"'{edge.edge.name}' and '{back.name}'"
             message = f"{names} push against one surface from both sides (sliding): {where}"
-            hint = "give the two surfaces a distance, or add a mode that moves along the surface"
+            hint = "give the two surfaces a distance; where sliding is meant, experiment: {completion: auto} follows it"
             decided = "sampled" if answer.decided == "sampled" else "symbolic"
             alike.add((rate, landing.rate), Finding(edge.document.when.place.span, message, hint, decided))
     yield from alike
