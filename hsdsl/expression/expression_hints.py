@@ -197,7 +197,8 @@ def side_by_side(number: str, name: str) -> str | None:
     power = _SUFFIXES.get(name) or _SUFFIXES.get(name.lower() if len(name) > 1 else "")
     if power:
         scaled = f"{number}*1e{power}" if re.search("[eE]", number) else f"{number}e{power}"
-        return f"write {scaled} for the suffix {name}, or {number}*{name} for a product"
+        units = "; units belong under `units`" if name in _UNITS else ""
+        return f"write {scaled} for the suffix {name}, or {number}*{name} for a product{units}"
     if name.lower() in _UNITS and len(name) == 1:
         return f"write {number}*{name} for a product; units belong under `units`"
     if name.lower() in _UNITS:
