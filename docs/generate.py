@@ -11,7 +11,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from writing import codes, command_line, language, methods, mistakes, models
+from writing import codes, command_line, language, methods, mistakes, models, python_api
 
 from hsdsl.lint.rules import FAMILIES, RULES, family
 
@@ -22,6 +22,7 @@ NOTE = "<!-- Written by docs/generate.py: edit the code it reads, not this page.
 PAGES: dict[str, Callable[[], str]] = {
     "language.md": language.language,
     "command-line.md": command_line.command_line,
+    "python.md": python_api.python_api,
     "errors.md": codes.error_codes,
     "rules.md": codes.rule_index,
     **{

@@ -11,7 +11,17 @@ Decided = Literal["symbolic", "interval", "sampled"]
 
 @dataclass(frozen=True, order=True)
 class Span:
-    """A place in a text: file, 1-based line and column, and how many characters it covers."""
+    """A place in a text.
+
+    Attributes
+    ----------
+    path : str
+        The file.
+    line, column : int
+        From 1.
+    length : int
+        How many characters it covers.
+    """
 
     path: str
     line: int
@@ -32,10 +42,24 @@ class Edit:
 class Diagnostic:
     """One error in a model, or one finding about it.
 
-    ``code`` is a key of :data:`CODES`, or of a lint rule; ``message`` is one sentence, and ``hint`` the right form,
-    where that is known. ``span`` is its place (None when no single place is to blame) and ``text`` the source line of
-    it. An error makes the model unusable; warnings and notes come from lint rules, ``decided`` tells by which proof.
-    The edits ``fix`` remedy the finding without changing the model's meaning.
+    Attributes
+    ----------
+    code : str
+        That of an error (:data:`CODES`) or of a lint rule; `hsdsl explain CODE` prints its page.
+    message : str
+        One sentence.
+    span : Span or None
+        Its place; None where no single place is to blame.
+    hint : str or None
+        The right form, where that is known.
+    text : str or None
+        The line of the file.
+    severity : {"error", "warning", "note"}
+        An error makes the model unusable; warnings and notes come from lint rules.
+    decided : {"symbolic", "interval", "sampled"} or None
+        Of a finding: by which proof.
+    fix : tuple of Edit
+        Edits that remedy the finding without changing the model's meaning.
     """
 
     code: str
@@ -58,7 +82,13 @@ class Diagnostic:
 
 
 class ModelError(Exception):
-    """The model has errors (exit code 1). Carries every diagnostic, in source order."""
+    """The model has errors (exit code 1).
+
+    Attributes
+    ----------
+    diagnostics : tuple of Diagnostic
+        All of them, in source order.
+    """
 
     def __init__(self, diagnostics: list[Diagnostic] | tuple[Diagnostic, ...]) -> None:
         self.diagnostics = tuple(diagnostics)
@@ -69,7 +99,13 @@ class ModelError(Exception):
 
 
 class UsageError(Exception):
-    """The request is wrong, or a file cannot be read (exit code 2). The message is a sentence for a person."""
+    """The request is wrong, or a file cannot be read (exit code 2). The message is a sentence for a person.
+
+    Attributes
+    ----------
+    hint : str or None
+        What to write instead, where that is known.
+    """
 
     def __init__(self, message: str, hint: str | None = None) -> None:
         super().__init__(message)

@@ -46,7 +46,18 @@ class Transition:
 
 @dataclass(frozen=True)
 class Stop:
-    """Why and when a run ended: one word of :data:`REASONS`, and a sentence for a person."""
+    """Why and when a run ended.
+
+    Attributes
+    ----------
+    reason : str
+        ``until`` or ``final``; ``left_domain`` or ``zeno``, where the execution itself ends; ``transition_limit``,
+        ``memory_limit``, ``not_finite``, ``step_underflow`` or ``interrupted``.
+    time : number
+        When.
+    message : str
+        A sentence for a person.
+    """
 
     reason: str
     time: Any

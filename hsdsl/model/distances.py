@@ -35,12 +35,14 @@ def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> In
 
     Parameters
     ----------
-    first, second : Execution
-        Two runs of one model; further arguments as :func:`distance_of_runs` (``metric``, ``relaxation``, ``model``,
-        ``parameters``, ``coordinates``).
-    first : Model or path; second, third : str or SpacePoint
-        A model and two of its points, as ``"free x=13 v=5"``; further arguments as :meth:`hsdsl.Model.distance`
-        (``metric``, ``relaxation``, ``parameters``, ``hops``).
+    first : Execution, Model or path
+        One of two runs of a model; or a model, of two of its points.
+    second : Execution, str or SpacePoint
+        The other run; or a point, as ``"free x=13 v=5"``.
+    third : str or SpacePoint, optional
+        The other point.
+    **arguments
+        Further ones of :func:`distance_of_runs`, or of :meth:`hsdsl.Model.distance`.
 
     The interval has the least and the largest possible distance; :meth:`hsdsl.Model.distance` also has the path, and
     that function the time.

@@ -18,6 +18,7 @@ from __future__ import annotations
 import ast
 import contextlib
 import doctest
+import inspect
 import io
 import re
 import shlex
@@ -244,3 +245,19 @@ def test_reasons_of_verdicts_on_their_page_are_those_of_the_code():
 
 def test_tutorial_and_readme_have_examples_that_run():
     assert set(RUNNABLE) >= {"README.md", "docs/tutorial.md"}
+
+
+OF_THE_PACKAGE = ("look", "check_scene", "check", "view")  # methods that other modules call
+
+
+def test_the_reference_of_python_has_every_public_name_with_its_arguments():
+    page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    for name in set(hsdsl.__all__) - {"__version__"}:
+        assert f"### hsdsl.{name}\n" in page
+    for kind in (hsdsl.Model, hsdsl.Execution):
+        for name, member in vars(kind).items():
+            if name.startswith("_") or not inspect.isfunction(member) or name in OF_THE_PACKAGE:
+                continue
+            part = page.partition(f"#### {kind.__name__}.{name}\n")[2].partition("\n#")[0]
+            given = inspect.signature(member).parameters
+            assert all(argument in part for argument in given if argument != "self"), f"{kind.__name__}.{name}"

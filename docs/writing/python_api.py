@@ -1,0 +1,215 @@
+"""The reference of the Python interface, from signatures and docstrings."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from typing import Any
+
+from writing.markdown import code, table
+
+HEAD = """# Python
+
+`import hsdsl` gives what is on this page, or returns it. A run from a file is two lines; the
+[tutorial](../tutorial.md#from-python) has them, and [many runs](../how-to/many-and-long.md),
+[derivatives](../how-to/sensitivities.md), [orbits](../how-to/orbits.md) and [fits](../how-to/fitting.md) have a page
+each.
+
+Times and states are in the units of the model, and nothing is converted. What counts as a number may be an expression
+of the model's parameters as well, such as `"40*pi"`. Errors are [`ModelError`](#hsdslmodelerror), of a model, and
+[`UsageError`](#hsdslusageerror), of a request; their sentences are those of the command line.
+
+"""
+RUN = "hsdsl.execution.parts."
+# heading: names, each with its members where it is a class
+SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
+    "Load a model": (("hsdsl.load", ""), ("hsdsl.loads", ""), ("hsdsl.Limits", "")),
+    "Model": (
+        (
+            "hsdsl.Model",
+            "simulate ensemble sweep stream sensitivity fit orbit continuation orbital_stability distance estimate"
+            " plot animate only completed sliding columns system program resolve",
+        ),
+    ),
+    "Execution": (
+        (
+            "hsdsl.Execution",
+            "__call__ sample rows to_pandas plot save sensitivity estimated finer made shown time_span states"
+            " sample_times",
+        ),
+        *((RUN + name, "") for name in ("Transition", "Stop", "Verdict", "Point", "Arc")),
+        ("hsdsl.execution.samples.Samples", "only columns to_pandas names labels"),
+        ("hsdsl.model.estimate.Estimate", "*"),
+        ("hsdsl.model.stream.Streamed", ""),
+        ("hsdsl.store.load", ""),
+        ("hsdsl.store.read_sidecar", ""),
+    ),
+    "Ensemble": (
+        ("hsdsl.execution.ensemble.Ensemble", "reasons failed failures run to_pandas"),
+        ("hsdsl.execution.ensemble.TransitionTable", ""),
+        ("hsdsl.execution.ensemble.Failure", ""),
+    ),
+    "Sweep": (
+        ("hsdsl.sweep.load", ""),
+        ("hsdsl.sweep.Sweep", "rows done complete columns reasons batches table to_pandas plot summary"),
+    ),
+    "Derivatives, orbits, fits": (
+        ("hsdsl.sensitivity.result.Sensitivity", "*"),
+        *((f"hsdsl.sensitivity.result.{name}", "") for name in ("TransitionSlopes", "EndSlopes", "SampleSlopes")),
+        ("hsdsl.sensitivity.ties.Tie", ""),
+        ("hsdsl.fitting.fit.Fit", "*"),
+        ("hsdsl.orbits.orbit.Orbit", "*"),
+        ("hsdsl.orbits.branch.Branch", "*"),
+        ("hsdsl.orbits.continuation.Bifurcation", ""),
+        ("hsdsl.orbits.sampling.OrbitalStability", "*"),
+    ),
+    "Distances": (
+        ("hsdsl.distance", ""),
+        ("hsdsl.model.distances.distance_of_runs", ""),
+        ("hsdsl.metrics.interval.Interval", "width middle"),
+        ("hsdsl.metrics.paths.PointDistance", "status sentence"),
+        ("hsdsl.metrics.paths.PathPiece", ""),
+        ("hsdsl.metrics.paths.SpacePoint", ""),
+        ("hsdsl.exact.reference", ""),
+    ),
+    "Errors": (
+        ("hsdsl.ModelError", ""),
+        ("hsdsl.errors.Diagnostic", ""),
+        ("hsdsl.errors.Span", ""),
+        ("hsdsl.UsageError", ""),
+    ),
+}
+MADE = ("hsdsl.Limits", "hsdsl.metrics.paths.SpacePoint")  # classes that readers make themselves
+_ROLE = re.compile(r":(?:attr|class|data|func|meth|mod):`~?\.?([^`]+)`")
+_ERROR = re.compile(r"^Raises (\w+): (.+?)\s*(?=\n\n|\Z)", re.MULTILINE | re.DOTALL)
+_SECTION = re.compile(r"^([A-Z][a-z]+)\n-+\n", re.MULTILINE)
+_WIDE = 100
+
+
+def python_api() -> str:
+    """Document every public name."""
+    parts = [HEAD]
+    for heading, names in SECTIONS.items():
+        parts.append(f"## {heading}\n\n")
+        for name, members in names:
+            parts += _entry(name, _found(name), members)
+    return "".join(parts)
+
+
+def _found(name: str) -> Any:
+    module, _, last = name.rpartition(".")
+    return getattr(import_module(module), last)
+
+
+def _entry(name: str, thing: Any, members: str) -> Iterator[str]:
+    """One function, or a class with its members."""
+    yield f"### {name}\n\n"
+    if not inspect.isclass(thing):
+        yield _signature(name.rpartition(".")[2], thing)
+        yield _described(thing)
+        return
+    if name in MADE:
+        yield _signature(thing.__name__, thing)
+    yield _described(thing)
+    own = [key for key, value in vars(thing).items() if not key.startswith("_") and _is_member(value)]
+    for member in own if members == "*" else members.split():
+        value = inspect.getattr_static(thing, member)
+        value = getattr(value, "__func__", value)
+        yield f"#### {thing.__name__}.{member}\n\n"
+        getter = getattr(value, "fget", None) or getattr(value, "func", None)
+        if getter is None:
+            yield _signature("run" if member == "__call__" else member, value)
+        else:
+            yield f"Property: {code(str(inspect.signature(getter).return_annotation))}.\n\n"
+        yield _described(getter or value)
+
+
+def _is_member(value: Any) -> bool:
+    return bool(inspect.getdoc(value)) and (
+        inspect.isfunction(value) or isinstance(value, (property, classmethod, staticmethod)) or hasattr(value, "func")
+    )
+
+
+def _signature(name: str, function: Any) -> str:
+    """A call with its arguments, their types and defaults."""
+    signature = inspect.signature(function)
+    parts, starred = list[str](), False
+    for parameter in signature.parameters.values():
+        if parameter.name in ("self", "cls"):
+            continue
+        star = {parameter.VAR_POSITIONAL: "*", parameter.VAR_KEYWORD: "**"}.get(parameter.kind, "")
+        if parameter.kind is parameter.KEYWORD_ONLY and not starred:
+            parts.append("*")
+        starred = starred or star == "*" or parameter.kind is parameter.KEYWORD_ONLY
+        kind = "" if parameter.annotation is parameter.empty else f": {_annotation(parameter.annotation)}"
+        default = "" if parameter.default is parameter.empty else f" = {parameter.default!r}"
+        parts.append(f"{star}{parameter.name}{kind}{default if kind else default.replace(' ', '')}")
+    back = "" if signature.return_annotation is signature.empty else f" -> {_annotation(signature.return_annotation)}"
+    line = f"{name}({', '.join(parts)}){back}"
+    if len(line) > _WIDE:
+        line = f"{name}(\n" + "".join(f"    {part},\n" for part in parts) + f"){back}"
+    return f"```py\n{line}\n```\n\n"
+
+
+def _annotation(kind: Any) -> str:
+    return kind if isinstance(kind, str) else getattr(kind, "__name__", str(kind))
+
+
+def _described(thing: Any) -> str:
+    """A docstring: its text, and a table for each of its sections."""
+    text = _ERROR.sub(_raises, _ROLE.sub(r"`\1`", inspect.getdoc(thing) or ""))
+    body, *sections = _SECTION.split(text)
+    parts = [_prose(body)]
+    for heading, content in zip(sections[::2], sections[1::2], strict=True):
+        parts.append(_section(heading, content))
+    if is_dataclass(thing) and "Attributes" not in sections:
+        rows = [(code(f.name), code(_annotation(f.type))) for f in fields(thing) if not f.name.startswith("_")]
+        parts.append(table(("attribute", "type"), rows))
+    return "".join(parts)
+
+
+def _raises(found: re.Match[str]) -> str:
+    """The sentence of an error as a section of it."""
+    return f"Raises\n------\n{found[1]}\n    {' '.join(found[2].split())}\n"
+
+
+def _section(heading: str, content: str) -> str:
+    if heading in ("Notes", "Examples", "See"):
+        return f"**{heading}.** {_prose(content)}"
+    rows, rest = list[list[str]](), ""
+    lines = content.splitlines()
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        if line.startswith(" ") and rows and not rest:
+            rows[-1][2] += f" {line.strip()}"
+        elif line and (" : " in line or below.startswith(" ")):
+            name, _, kind = line.partition(" : ")
+            rows.append([name, kind, ""])
+        elif line or rest:  # a paragraph behind the entries
+            rest += f"{line}\n"
+    head = {"Parameters": "parameter", "Attributes": "attribute"}.get(heading)
+    if head is None:
+        kinds = False
+        columns = ("error", "when") if heading == "Raises" else (heading.lower(), "")
+    else:
+        kinds = any(kind for _, kind, _ in rows)
+        columns = (head, "type", "meaning") if kinds else (head, "meaning")
+    cells = [
+        (code(name), *((code(kind) if kind else "",) if kinds else ()), about.strip()[:1].upper() + about.strip()[1:])
+        for name, kind, about in rows
+    ]
+    return table(columns, cells) + (_prose(rest) if rest.strip() else "")
+
+
+def _prose(text: str) -> str:
+    """Paragraphs, literal blocks being code."""
+    parts, code_next = list[str](), False
+    for paragraph in re.split(r"\n\s*\n", inspect.cleandoc(text)):
+        if code_next and paragraph.startswith(" "):
+            parts.append(f"```text\n{inspect.cleandoc(paragraph)}\n```")
+            continue
+        code_next = paragraph.rstrip().endswith("::")
+        parts.append(paragraph.rstrip().removesuffix("::") + (":" if code_next else "") if code_next else paragraph)
+    return "\n\n".join(parts).strip() + "\n\n"
