@@ -6,6 +6,7 @@ Samples of a CSV file are exact numbers; its faults have their row and column.
 
 from __future__ import annotations
 
+import csv
 import re
 from fractions import Fraction
 from itertools import pairwise
@@ -15,7 +16,7 @@ from hsdsl.elaborate.symbols import Meanings, SymbolTable
 from hsdsl.errors import Diagnostic, Span
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.files import DataRefused
-from hsdsl.names import counted, did_you_mean, shown
+from hsdsl.names import closest, counted, did_you_mean, is_identifier, shown
 from hsdsl.schema import InputFile, InputSamples
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import SampledInput
@@ -47,7 +48,7 @@ def define_inputs(symbols: SymbolTable) -> tuple[SampledInput, ...]:
             continue
         symbols.values[name] = Value(symbol(name))
         in_file = isinstance(entry, InputFile)
-        samples = read_samples(symbols, name, entry.file) if in_file else _inline(symbols, name, entry, constant)
+        samples = read_samples(symbols, name, entry) if in_file else _inline(symbols, name, entry, constant)
         if samples is not None:
             unit = symbols.text(symbols.document.units.get(name))
             inputs.append(SampledInput(str(name), entry.hold, samples[0], samples[1], unit))
@@ -85,9 +86,10 @@ def _exact(value: Value) -> Any:
     return Fraction(int(value.expr.p), int(value.expr.q)) if value.expr.is_Rational else value.expr
 
 
-def read_samples(symbols: SymbolTable, name: Key, file: Scalar) -> Samples | None:
-    """Times and values of the column ``name``; None where the file has faults, which are reported."""
-    if file.value == ABSENT:
+def read_samples(symbols: SymbolTable, name: Key, entry: InputFile) -> Samples | None:
+    """Times and values of the input's column; None where the file has faults, which are reported."""
+    file, column = entry.file, entry.column
+    if file.value == ABSENT or (column is not None and column.value == ABSENT):
         return None
     try:
         data = symbols.content(file.value)
@@ -99,19 +101,32 @@ def read_samples(symbols: SymbolTable, name: Key, file: Scalar) -> Samples | Non
         symbols.report(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
         return None
     table = _Table(str(symbols.files.folder / file.value), lines)
-    table.read(name)
+    table.read(name if column is None else column.value.strip(), file.value if column is None else None)
     for diagnostic in table.faults:
         symbols.resolver.findings.add(diagnostic)
     return None if table.faults else (tuple(table.times), tuple(table.values))
 
 
-def _hint(name: str, columns: list[str]) -> str | None:
-    """The hint for a wrong header."""
+def _hint(name: str, columns: list[str], file: str | None) -> str | None:
+    """The hint for a wrong header; ``file`` where the model may say which column it is."""
     if any(mark in column for column in columns for mark in ";\t"):
         return "columns are separated by commas, and numbers have decimal points"
     if name in columns:
         return "the column of times is called `time`"
-    return did_you_mean(name, columns)
+    others = [column for column in columns if column and column != "time"]
+    if file is None or not others or "time" not in columns:
+        return did_you_mean(name, others)
+    column = shown(closest(name, others) or "...")
+    column = column if is_identifier(column) or column == "..." else f'"{column}"'
+    return f"name its column: {{file: {shown(file)}, column: {column}}}"
+
+
+def _header(line: str) -> list[str]:
+    """The names of the columns; a name in quotes may have commas."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], skipinitialspace=True), [])]
+    except csv.Error:  # a name of more than a hundred thousand letters
+        return [cell.strip() for cell in line.split(",")]
 
 
 class _Table:
@@ -123,14 +138,14 @@ class _Table:
         self.values: list[Fraction] = []
         self.faults: list[Diagnostic] = []
 
-    def read(self, name: str) -> None:
-        """Read the columns ``time`` and ``name``."""
+    def read(self, name: str, file: str | None) -> None:
+        """Read the columns ``time`` and ``name``; ``file`` where the model may say which column it is."""
         header = self.lines[0] if self.lines else ""
-        columns = [cell.strip().strip('"') for cell in header.split(",")] if self.lines else []
+        columns = _header(header)
         if "time" not in columns or name not in columns:
             present = ", ".join(f"'{shown(c)}'" for c in columns if c) or "nothing"
             message = f"expected the columns `time` and `{name}`, got {present}"
-            self.fault(1, 1, len(header) if self.lines else 1, message, _hint(name, columns))
+            self.fault(1, 1, len(header) if self.lines else 1, message, _hint(name, columns, file))
             return
         for number, line in enumerate(self.lines[1:], start=2):
             if line.strip() and len(self.faults) < _MOST_FAULTS:

@@ -56,10 +56,10 @@ NAMES_OF_FILES = ("csv", "data", "path", "filename", "filepath", "source")  # in
 def _kind_of_input(value: Any) -> str:
     if not isinstance(value, dict):
         return "<expression>"
-    fields = ("file", "times", "values")
+    fields = ("file", "column", "times", "values")
     keys = list(map(str, cast("dict[Any, Any]", value)))
     meant = {closest(key, (*fields, *NAMES_OF_FILES)) if key not in fields else key for key in keys}
-    return "<file>" if meant & {"file", *NAMES_OF_FILES} and not meant & {"times", "values"} else "<samples>"
+    return "<file>" if meant & {"file", "column", *NAMES_OF_FILES} and not meant & {"times", "values"} else "<samples>"
 
 
 AsExpression = Annotated[Expression, Tag("<expression>")]
@@ -91,9 +91,10 @@ class InputFile(Document):
     """An input given by samples in a CSV file."""
 
     file: Label = required(
-        "A CSV file with columns `time` and the input's name, by its path from the model's own folder, inside it.",
+        "A CSV file with a column `time`, by its path from the model's own folder, inside it.",
         "u.csv",
     )
+    column: Label | None = optional("The name of its column with the values. Left out, the name of the input.", "u (V)")
     hold: Hold = optional(_HOLD, "linear", default="zero")
 
 

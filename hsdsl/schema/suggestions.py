@@ -31,6 +31,7 @@ _OF_OTHERS = {
     "scale": "scales nominal nominals",
     "experiment": "simulation settings options config run",
     "file": " ".join(NAMES_OF_FILES),
+    "column": "col field header column_name variable series",
     "of": "args arguments params parameters inputs variables vars",
     "is": "expr expression body formula value returns return",
     "title": "name",
@@ -44,7 +45,6 @@ for _key, _others in _OF_OTHERS.items():
 _NOT_NEEDED = {
     "states": "the states are the keys of `flow`, and `initial` gives their values",
     "variables": "the states are the keys of `flow`, and `initial` gives their values",
-    "column": "leave it out: the column has the name of the input",
     "from": "leave it out: a transition is in the mode that it leaves",
     "<<": "mappings are not merged in YAML 1.2",
     "terminal": "leave it out, and let `to` name a mode with final: true",

@@ -189,6 +189,34 @@ def test_sampled_inputs(tmp_path):
     assert system(text, tmp_path / "m.yaml").digest != before
 
 
+@pytest.mark.parametrize("column", ["p (kPa)", "flow, of air", 'the "third"', "ü_4", "q"])
+def test_an_input_takes_the_column_that_it_names(tmp_path, column):
+    header = '"p (kPa)",time, "flow, of air" ,"the ""third""",ü_4,q'
+    (tmp_path / "log.csv").write_text(f"{header}\n11,0,21,31,41,51\n12,2.5,22,32,42,52\n", encoding="utf-8")
+    quoted = column.replace('"', '\\"')
+    text = f'{HEAD}inputs: {{q: {{file: log.csv, column: "{quoted}"}}}}\nmodes: {{A: {{flow: {{x: q, v: 1}}}}}}\n{TAIL}'
+    (made,) = system(text, tmp_path / "m.yaml").inputs
+    number = 1 + ["p (kPa)", "flow, of air", 'the "third"', "ü_4", "q"].index(column)
+    assert (made.name, made.times, made.values) == ("q", (0, Fraction(5, 2)), (10 * number + 1, 10 * number + 2))
+
+
+@pytest.mark.parametrize(
+    ("entry", "hint"),
+    [
+        ("{file: log.csv, column: Forse}", "did you mean 'Force'?"),
+        ("{file: log.csv}", "name its column: {file: log.csv, column: ...}"),
+        ("{file: log.csv, col: Force}", "did you mean 'column'?"),
+        ("{column: Force}", "write file: and the name of a CSV file"),
+    ],
+)
+def test_a_column_that_is_not_there_is_answered_with_what_to_write(tmp_path, entry, hint):
+    (tmp_path / "log.csv").write_text("time,Force,Torque (N m),p,q,r,s,w,z\n0,1,1,1,1,1,1,1,1\n")
+    text = f"{HEAD}inputs: {{u: {entry}}}\nmodes: {{A: {{flow: {{x: u, v: 1}}}}}}\n{TAIL}"
+    with pytest.raises(ModelError) as refusal:
+        elaborate(tmp_path / "m.yaml", text=text.encode())
+    assert hint in [fault.hint for fault in refusal.value.diagnostics]
+
+
 def test_data_may_not_be_linked_from_outside(tmp_path):
     folder = tmp_path / "model"
     folder.mkdir()
@@ -320,7 +348,7 @@ def test_ways_to_write_a_file(before, line_end, end):
         ("time;u", "separated by commas"),
         ("time\tu", "separated by commas"),
         ("t,u", "called `time`"),
-        ("time,v", "'v'"),
+        ("time,v", "column: ..."),
     ],
 )
 def test_a_header_of_samples_is_told_what_it_should_be(tmp_path, header, hint):
