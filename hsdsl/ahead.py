@@ -1,7 +1,8 @@
 """A model that is elaborated and lowered in another process, while this one loads what runs it.
 
 The other process is a copy of this one from before anything large was loaded. It answers with the program or with the
-errors of the model; where it ends without an answer, this process does the work itself.
+errors of the model; where it ends without an answer, this process does the work itself. Large
+models are lowered in two processes.
 """
 
 from __future__ import annotations
@@ -9,32 +10,42 @@ from __future__ import annotations
 import atexit
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import NoReturn
+from types import ModuleType
+from typing import Generic, NoReturn, TypeVar
 
 from hsdsl import interrupts, program_cache
 from hsdsl.errors import ModelError, UsageError
 from hsdsl.files import ModelFiles
-from hsdsl.limits import applied, cores
+from hsdsl.limits import applied, cores, current
 from hsdsl.program import Program
 
+First = TypeVar("First")
+Second = TypeVar("Second")
+Result = TypeVar("Result")
 Lowered = tuple[Program, Program | None, ModelFiles]  # as it is, with modes of sliding where it has them, its bytes
 Answer = Lowered | ModelError | None
+LARGE = 0.03  # seconds to elaborate a model, from which on a copy takes less time than half of the lowering
+# what pydantic and SymPy load where they first look for plugins and tensors, of which no model has any: for nothing
+_UNUSED: dict[str, dict[str, type]] = {
+    "pydantic.plugin._loader": {"get_plugins": tuple},
+    "sympy.tensor.tensor": {name: type(name, (), {}) for name in ("TensAdd", "TensExpr")},
+}
 
 
 @dataclass(frozen=True)
-class _Other:
-    """The process that lowers a model, and where its answer is read."""
+class _Copy(Generic[Result]):
+    """A copy of this process that does some work, and where its answer is read."""
 
-    files: ModelFiles
     process: int
     answer: int
 
-    def wait(self) -> Answer:
+    def wait(self) -> Result | None:
+        """Its answer; None where it ends without one."""
         import pickle  # what was compiled before needs none
 
         with open(self.answer, "rb", closefd=False) as stream:
@@ -54,7 +65,7 @@ class _Other:
             os.waitpid(self.process, 0)
 
 
-_begun: list[_Other] = []
+_begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
 _seen: list[ModelFiles] = []
 
 
@@ -63,19 +74,9 @@ def begin(files: ModelFiles) -> None:
     if files in _seen:
         return
     _seen.append(files)
-    if not _saves_time() or program_cache.is_kept(files):
-        return
-    answer, to_answer = os.pipe()
-    try:
-        process = os.fork()
-    except OSError:  # there may be no more processes
-        os.close(answer)
-    else:
-        if process == 0:
-            os.close(answer)  # else a large answer is waited with for ever where the reader has ended
-            _work(files, to_answer)
-        _begun.append(_Other(files, process, answer))
-    os.close(to_answer)
+    if _saves_time() and not program_cache.is_kept(files):
+        with suppress(OSError):  # there may be no more processes
+            _begun.append((files, _copy(lambda: _lowered(files))))
 
 
 def begin_run(words: list[str]) -> None:
@@ -105,50 +106,99 @@ def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
 
     Raises ModelError: the model has errors.
     """
-    for other in [other for other in _begun if other.files == files]:
+    for begun in [begun for begun in _begun if begun[0] == files]:
         for name in needed:
             import_module(name)
-        answer = other.wait()
-        _begun.remove(other)
-        other.end()
+        answer = begun[1].wait()
+        _begun.remove(begun)
+        begun[1].end()
         if isinstance(answer, ModelError):
             raise answer
         return answer
     return None
 
 
-def _work(files: ModelFiles, to_answer: int) -> NoReturn:
+def _copy(work: Callable[[], Result]) -> _Copy[Result]:
+    """Begin some work in a copy of this process.
+
+    Raises OSError: there may be no more processes.
+    """
+    answer, to_answer = os.pipe()
+    try:
+        process = os.fork()
+    except OSError:
+        os.close(answer)
+        raise
+    else:
+        if process == 0:
+            os.close(answer)  # else a large answer is waited with for ever where the reader has ended
+            _work(work, to_answer)
+        return _Copy(process, answer)
+    finally:
+        os.close(to_answer)
+
+
+def _work(work: Callable[[], object], to_answer: int) -> NoReturn:
     """Answer, and end this process without what its copy does at its end."""
+    import ctypes
     import pickle
     import signal
 
     try:
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: nobody reads what it answers then
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # the other one says that it was interrupted
-        content = pickle.dumps(_lowered(files))
+        content = pickle.dumps(work())
         with open(to_answer, "wb") as stream:
             stream.write(content)
     finally:
         os._exit(0)
 
 
+def _both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
+    """Do two things at once, the second in a copy of this process, and here where that gives no answer."""
+    try:
+        other = _copy(lambda: _in_time(second))
+    except OSError:  # there may be no more processes
+        return first(), second()
+    try:
+        done, answer = first(), other.wait()
+    finally:
+        other.end()
+    return done, second() if answer is None else answer
+
+
+def _in_time(work: Callable[[], Result]) -> Result:
+    """Do some work within the limits in force, which are watched in each process."""
+    from hsdsl.expression.timebox import timebox
+
+    with timebox(current().seconds):
+        return work()
+
+
 def _lowered(files: ModelFiles) -> Answer:
     import gc
+    import time
 
+    for name, names in _UNUSED.items():
+        sys.modules[name] = module = ModuleType(name)
+        vars(module).update(names)
     gc.disable()  # imports leave no garbage; to look for it costs time
     from hsdsl.completion import with_sliding
     from hsdsl.elaborate import elaborate_files
-    from hsdsl.lower import lower
+    from hsdsl.lower import in_turn, lower
 
     gc.freeze()
     gc.enable()
     try:
+        began = time.process_time()
         system = elaborate_files(files).system
+        both = _both if time.process_time() - began > LARGE else in_turn
         with applied(files.limits):
-            program = sliding = lower(system)
+            program = sliding = lower(system, both)
             if system.experiment.completion != "auto":
                 sliding = None
             elif (slides := with_sliding(system)) is not system:
-                sliding = lower(slides)
+                sliding = lower(slides, both)
             return program, sliding, files.with_data(system.files)
     except ModelError as error:
         return error
@@ -157,7 +207,7 @@ def _lowered(files: ModelFiles) -> Answer:
 @atexit.register
 def _end_all() -> None:
     while _begun:
-        _begun.pop().end()
+        _begun.pop()[1].end()
 
 
 interrupts.before_leaving.append(_end_all)

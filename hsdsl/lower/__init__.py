@@ -6,7 +6,9 @@ The pipeline is in :func:`lower`. `hsdsl.program.ModeProgram` lists the routines
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, Protocol, TypeVar
 
 import sympy as sp
 
@@ -27,6 +29,14 @@ from hsdsl.parts import numbered
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput
 
 _NAN = symbol("nan")
+First = TypeVar("First")
+Second = TypeVar("Second")
+
+
+class Both(Protocol):
+    """What does two things and answers with both results."""
+
+    def __call__(self, first: Callable[[], First], second: Callable[[], Second], /) -> tuple[First, Second]: ...
 
 
 @dataclass(frozen=True)
@@ -43,26 +53,31 @@ class Names:
     inputs: tuple[sp.Symbol, ...] = ()
 
 
-def lower(system: HybridSystem) -> lowered.Program:
-    """Lower a system; the result needs no SymPy to run.
+def in_turn(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
+    """Do one thing, then the other."""
+    return first(), second()
+
+
+def lower(system: HybridSystem, both: Both = in_turn) -> lowered.Program:
+    """Lower a system; the result needs no SymPy to run. Both halves of the work are done by ``both``.
 
     Raises ModelError: the symbolic work takes longer than the limits allow.
     """
     try:
         with deep_stack(), timebox(limits.current().seconds):
-            return _lower(system)
+            return _lower(system, both)
     except OutOfTime:
         message = "deriving and writing out the expressions of this model takes too long"
         hint = "make parts of its expressions states, or allow more time with --limit seconds=600"
         raise ModelError([Diagnostic(TOO_LONG, message, None, hint)]) from None
 
 
-def _lower(system: HybridSystem) -> lowered.Program:
+def _lower(system: HybridSystem, both: Both) -> lowered.Program:
     system, switches = with_switches(system)
     names = number(system, switches.symbols)
     experiment = system.experiment
     indices = {mode.name: i for i, mode in enumerate(system.modes)}
-    modes, contacts = _modes(system, names, indices)
+    modes, contacts = _modes(system, names, indices, both)
     return lowered.Program(
         path=system.path,
         digest=system.digest,
@@ -88,19 +103,24 @@ def _lower(system: HybridSystem) -> lowered.Program:
     )
 
 
-def _modes(system: HybridSystem, names: Names, indices: dict[str, int]):
+def _modes(system: HybridSystem, names: Names, indices: dict[str, int], both: Both):
     """The modes, and those with motion along their guards."""
-    modes: list[lowered.ModeProgram] = []
-    held: list[lowered.ModeProgram] = []
-    for mode in system.modes:
-        program = LoweredMode(mode, names).program(indices)
-        if found := overlay(mode, numbered(system.parts)):
-            program = replace(program, held=len(system.modes) + len(held), edges=_with_contacts(program.edges, found))
-            whole = lowered_overlay(found, names).program(indices)
-            pairs = zip(whole.edges, found.releases, strict=True)
-            held.append(replace(whole, edges=tuple(replace(edge, releases=number) for edge, number in pairs)))
-        modes.append(program)
-    return tuple(modes), tuple(held)
+    modes = [LoweredMode(mode, names) for mode in system.modes]
+    found = [overlay(mode, numbered(system.parts)) for mode in system.modes]
+    held = [lowered_overlay(each, names) for each in found if each]
+    every = (*modes, *held)
+    routines, others = both(lambda: [each.routines() for each in every], lambda: [each.others() for each in every])
+    programs = iter([each.program(indices, *pair) for each, *pair in zip(every, routines, others, strict=True)])
+    whole = [next(programs) for _ in modes]
+    contacts: list[lowered.ModeProgram] = []
+    for i, motion in enumerate(found):
+        if motion:
+            edges = _with_contacts(whole[i].edges, motion)
+            whole[i] = replace(whole[i], held=len(modes) + len(contacts), edges=edges)
+            along = next(programs)
+            pairs = zip(along.edges, motion.releases, strict=True)
+            contacts.append(replace(along, edges=tuple(replace(edge, releases=number) for edge, number in pairs)))
+    return tuple(whole), tuple(contacts)
 
 
 def _with_contacts(edges: tuple[lowered.EdgeProgram, ...], found: Overlay) -> tuple[lowered.EdgeProgram, ...]:
@@ -220,10 +240,27 @@ class LoweredMode:
         """Expressions of the file's names over numbered symbols."""
         return tuple(replaced(sp.sympify(e), self._mapping, self._done) for e in expressions)
 
-    def program(self, indices: dict[str, int]) -> lowered.ModeProgram:
-        """The mode's routines, and its data for a loop."""
+    def routines(self) -> lowered.Routines:
+        """What a step computes, and the outputs."""
+        return print_routines(self._routines(), self.names.data)
+
+    def others(self) -> dict[str, Any]:
+        """The other fields of a mode that are derived from its expressions."""
         mode, data = self.mode, self.names.data
         texts, expressions = zip(*_labelled(mode), strict=True) if mode.states or mode.surfaces else ((), ())
+        return {
+            "affine": all(map(self._is_affine, self.residuals, self._slopes)),
+            "jacobian": self._jacobian(),
+            "tape": make_tape(self.flow, self.residuals, self.states, data),
+            "expressions": tuple(texts),
+            "diagnosis": print_routines(self._diagnosis(expressions), data),
+        }
+
+    def program(
+        self, indices: dict[str, int], routines: lowered.Routines, others: Mapping[str, Any]
+    ) -> lowered.ModeProgram:
+        """The mode's routines, and its data for a loop."""
+        mode = self.mode
         return lowered.ModeProgram(
             name=mode.name,
             states=mode.states,
@@ -231,15 +268,11 @@ class LoweredMode:
             edges=tuple(_edge(edge, mode, indices) for edge in mode.edges),
             walls=tuple(wall.text for wall in mode.walls),
             flow_texts=mode.flow_texts,
-            routines=print_routines(self._routines(), data),
+            routines=routines,
             slopes=tuple(tuple(self._places[a] for a in slopes.sparse[0]) for slopes in self._slopes),
-            affine=all(map(self._is_affine, self.residuals, self._slopes)),
-            jacobian=self._jacobian(),
-            tape=make_tape(self.flow, self.residuals, self.states, data),
-            expressions=tuple(texts),
-            diagnosis=print_routines(self._diagnosis(expressions), data),
             slides=mode.slides or (),
             measured=mode.measured,
+            **others,
         )
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:

@@ -1,4 +1,4 @@
-"""A model lowered in another process is the one lowered here, and its errors are the same."""
+"""A model lowered in other processes is the one lowered here, and its errors are the same."""
 
 from __future__ import annotations
 
@@ -28,14 +28,28 @@ def loaded(monkeypatch, tmp_path):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
 
-def test_the_program_and_its_files_are_those_made_here():
-    files = ModelFiles.read(MODELS / "digital-control.yaml")
+@pytest.mark.parametrize("large", [0.0, float("inf")])
+@pytest.mark.parametrize("name", ["digital-control", "oscillator-with-stop-2", "parts/balls"])
+def test_the_program_and_its_files_are_those_made_here(name, large, monkeypatch):
+    monkeypatch.setattr(ahead, "LARGE", large)
+    files = ModelFiles.read(MODELS / f"{name}.yaml")
     ahead.begin(files)
     program, sliding, complete = ahead.taken(files) or pytest.fail("no answer")
     system = elaborate_files(files).system
     assert program == lower(system) and sliding is None
     assert complete == files.with_data(system.files)
     assert ahead.taken(files) is None
+
+
+def test_a_half_without_an_answer_is_done_here():
+    here, place = os.getpid(), []
+    assert ahead._both(lambda: 1, lambda: place.append(0) or (2 if os.getpid() == here else os._exit(1))) == (1, 2)
+    assert place == [0]
+
+
+def test_errors_of_a_half_are_raised_here():
+    with pytest.raises(ZeroDivisionError):
+        ahead._both(lambda: 1, lambda: 1 // 0)
 
 
 def test_errors_are_those_found_here():
@@ -53,7 +67,7 @@ def test_errors_are_those_found_here():
 def test_without_an_answer_there_is_none():
     files = ModelFiles.read(MODELS / "thermostat.yaml")
     ahead.begin(files)
-    (other,) = ahead._begun
+    ((_, other),) = ahead._begun
     os.kill(other.process, signal.SIGKILL)
     assert ahead.taken(files) is None
 
@@ -61,7 +75,7 @@ def test_without_an_answer_there_is_none():
 def test_a_large_answer_that_nobody_reads_keeps_no_process(monkeypatch):
     monkeypatch.setattr(ahead, "_lowered", lambda files: bytes(1 << 22))  # more than any pipe holds
     ahead.begin(ModelFiles.read(MODELS / "thermostat.yaml"))
-    other = ahead._begun.pop()
+    _, other = ahead._begun.pop()
     os.close(other.answer)
     ended, _, _ = select.select([os.pidfd_open(other.process)], [], [], 60)
     os.kill(other.process, signal.SIGKILL)
@@ -72,7 +86,7 @@ def test_a_large_answer_that_nobody_reads_keeps_no_process(monkeypatch):
 def test_another_model_is_not_taken_for_it_and_nothing_is_left():
     files = ModelFiles.read(MODELS / "thermostat.yaml")
     ahead.begin(files)
-    (other,) = ahead._begun
+    ((_, other),) = ahead._begun
     assert ahead.taken(ModelFiles.read(MODELS / "bouncing-ball.yaml")) is None
     ahead._end_all()
     assert not ahead._begun
@@ -85,9 +99,11 @@ def test_a_plain_run_begins_before_its_words_are_read(options):
     model = str(MODELS / "thermostat.yaml")
     ahead.begin_run(["run", model, *options])
     ahead.begin(ModelFiles.read(Path(model)))  # as the command does
-    (other,) = ahead._begun
+    ((_, other),) = ahead._begun
     assert ahead.taken(ModelFiles.read(Path(model))) is not None
-    assert other not in ahead._begun
+    assert not ahead._begun
+    with pytest.raises(ProcessLookupError):
+        os.kill(other.process, 0)
 
 
 @pytest.mark.parametrize("words", [[], ["run"], ["lint", "m.yaml"], ["run", "m.yaml", "--until", "1"], ["run", "none"]])
