@@ -10,7 +10,7 @@ from typer import Argument, Option
 from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import say
 from hsdsl.cli.options import AllowPath, Limit, Phases, answering, option
-from hsdsl.cli.saved import run_of
+from hsdsl.cli.saved import drawn
 from hsdsl.cli.texts import check_target, names_of, pairs_of
 from hsdsl.errors import UsageError
 
@@ -18,7 +18,7 @@ RUNS = "Saved runs (.npz), or model files, each of which is run as its own exper
 OUT = "The picture: .png, .svg, or .html, an interactive page."
 OUTPUTS = "Only these states and outputs over time, in this order."
 LABEL = "The name of a run in the legend, in the order of the runs; else its file's. Once for each run."
-MODEL = "The model of saved runs: for units, and levels of guards where all runs have one."
+MODEL = "The model of saved runs: for units, levels of guards where all runs have one, and outputs."
 TITLE = "The title; else that of the model."
 
 
@@ -38,17 +38,19 @@ def plot(
         check_target(out, "--out", (".png", ".svg", ".html"))
         if labels and len(labels) != len(runs):
             raise UsageError(f"--label: expected {len(runs)}, one for each run, got {len(labels)}")
-        found = [run_of(path, {}) for path in runs]
-        executions = [run for run, _ in found]
+        loaded = None if model is None else _loaded(model)
+        columns = None if outputs is None else names_of(outputs)
+        used = None if columns is None else [*columns, *(name for pair in phase or () for name in names_of(pair))]
+        executions = [drawn(path, loaded, used) for path in runs]
         from hsdsl.plot import plot
         from hsdsl.plot.view import names_of as known_names
 
-        options: dict[str, Any] = {} if model is None else _look(model, executions)
-        if model is None and len(executions) == 1:
+        options: dict[str, Any] = {} if loaded is None else _look(loaded, executions)
+        if loaded is None and len(executions) == 1:
             options = executions[0].view()
         known = known_names(executions)
         options |= {
-            "columns": None if outputs is None else names_of(outputs),
+            "columns": columns,
             "phases": pairs_of(phase, known),
             "labels": labels or _labels(runs),
             "title": title,
@@ -57,12 +59,16 @@ def plot(
         say(f"wrote {out}")
 
 
-def _look(path: Path, runs: list[Any]) -> dict[str, Any]:
-    """Units, and the levels of guards where all runs have the same; those of runs with other parameters differ."""
+def _loaded(path: Path) -> Any:
     from hsdsl.model import load
+
+    return load(path)
+
+
+def _look(model: Any, runs: list[Any]) -> dict[str, Any]:
+    """Units, and the levels of guards where all runs have the same; those of runs with other parameters differ."""
     from hsdsl.model.options import parameters_of
 
-    model = load(path)
     looks = [model.look(parameters_of(run.overrides)) for run in runs]
     same = all(look["guards"] == looks[0]["guards"] for look in looks)
     return looks[0] | ({} if same else {"guards": ()})

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.errors import UsageError
+from hsdsl.cli.console import say
+from hsdsl.errors import ModelError, UsageError
 
 if TYPE_CHECKING:
     from hsdsl.execution import Execution
@@ -26,3 +27,26 @@ def run_of(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | P
 
     model = load_model(path)  # read once: it may come through a pipe
     return model.simulate(parameters=parameters), model
+
+
+def drawn(path: Path, model: Model | None, columns: list[str] | None) -> Execution:
+    """Return a run with its outputs between rows, as far as ``columns`` has some, or is None.
+
+    Those of a saved run are computed by its model. Where that is not known, a message says that they are straight.
+    """
+    run, other = run_of(path, {})
+    outputs = run.output_names if columns is None else set(columns) & set(run.output_names)
+    if run.output_function is not None or not outputs:
+        return run
+    try:
+        return (model or _recorded(run.model, other)).with_outputs(run)
+    except (UsageError, ModelError) as error:
+        first = str(error).splitlines()[0]
+        say(f"hsdsl: {path}: outputs are drawn straight from row to row: {first}; give its model with --model")
+        return run
+
+
+def _recorded(path: str, other: Model | Path | None) -> Model:
+    from hsdsl.model import load
+
+    return load(other if isinstance(other, Path) else path)

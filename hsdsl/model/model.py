@@ -13,10 +13,10 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.limits import Limits
 from hsdsl.model.call_cache import CallCache, call_key
-from hsdsl.model.options import ARGUMENTS, Options, overrides_of
+from hsdsl.model.options import ARGUMENTS, Options, arguments_of, overrides_of
 from hsdsl.model.pipeline import Pipeline, pipeline_of
 from hsdsl.model.values import with_parameters
-from hsdsl.model.visible import visible_run
+from hsdsl.model.visible import visible_run, with_output_function
 from hsdsl.names import NO_FILE, called, did_you_mean, visible
 from hsdsl.program import Program
 from hsdsl.progress import counted, in_notebook, running
@@ -622,6 +622,21 @@ class Model:
 
         self.check_scene()
         return Model(scene_as_outputs(self.system))
+
+    def with_outputs(self, run: Execution) -> Execution:
+        """Return a run of this model that was read from a file, with its outputs between rows as the model has them.
+
+        A file holds the outputs at rows only.
+
+        Raises UsageError: the run is not one of this model as it is now.
+        """
+        if run.digest != self.program.digest:
+            hint = "run it again, or give the model as it was"
+            raise UsageError(f"{self.program.path} is not the model that the run is of, or was edited since", hint)
+        if "left_out" in run.settings or run.output_names != self.program.outputs:
+            return run
+        arguments = arguments_of(run.overrides) | {"precision": run.digits, "engine": "python"}
+        return with_output_function(run, self.pipeline.prepare(arguments))
 
     def look(self, parameters: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """What a picture shows of the model: its units, levels of its guards, and the program of its mode graph."""

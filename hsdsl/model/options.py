@@ -225,6 +225,16 @@ def as_written(value: Any) -> Any:
     return value if isinstance(value, (str, int, float)) or decimals.is_multiprecision(value) else str(value)
 
 
+def arguments_of(overrides: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The arguments of a run with recorded overrides."""
+    found: dict[str, dict[str, Any]] = {"parameters": parameters_of(overrides), "initial": {}, "settings": {}}
+    for name, value in overrides.items():
+        if name not in found["parameters"]:
+            group, _, rest = name.partition(".")
+            found["initial" if group == "initial" else "settings"][rest] = value
+    return found
+
+
 def parameters_of(overrides: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters among recorded overrides."""
     return {name: value for name, value in overrides.items() if not name.startswith(("initial.", "experiment."))}

@@ -49,6 +49,14 @@ def visible_run(run: Execution, prepared: Prepared) -> Execution:
     )
 
 
+def with_output_function(run: Execution, prepared: Prepared) -> Execution:
+    """A run as it was shown, with the function that gives its outputs between rows."""
+    function = prepared.output_values
+    if prepared.program.parts:
+        function = _View(replace(run, output_function=function), prepared).output_values
+    return replace(run, output_function=function)
+
+
 def _same(run: Execution, name: str, _: Any) -> Any:
     return getattr(run, name)
 

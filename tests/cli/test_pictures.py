@@ -7,6 +7,8 @@ import re
 
 import pytest
 
+import hsdsl
+
 BALL = """
 hsdsl: 1
 title: Ball
@@ -70,6 +72,47 @@ def test_saved_runs_and_models_share_a_picture(command, model, tmp_path):
     assert [run["label"] for run in runs] == ["saved", "model"] and shown["shown"] == ["h"]
     assert shown["units"] == {"h": "m"} and shown["guards"] and "<title>Both</title>" in page.read_text("utf-8")
     assert command("plot", saved, saved, "--out", tmp_path / "same.svg").code == 0
+
+
+WAVES = """
+hsdsl: 1
+parameters: {a: 3, late: 0.6}
+inputs: {r: {times: [0, late, 2], values: [0, 1, 1], hold: zero}}
+modes:
+  on:
+    flow: {x: y, y: -x}
+    transitions: [{name: off, when: x >= 0.9, to: off}]
+  off: {flow: {x: -x}, outputs: {u: sin(20*x)}}
+outputs: {u: sin(a*20*t)*y + r, z: x**2}
+initial: {mode: on, x: 0, y: 1}
+experiment: {until: 2}
+"""
+
+
+def test_outputs_of_saved_runs_are_drawn_as_those_of_runs(command, model, tmp_path):
+    file, saved = model(WAVES), tmp_path / "saved.npz"
+    given = ("--set", "a=2", "--set", "initial.y=1.1", "--set", "experiment.until=1.7", *ENGINE)
+    command("run", file, *given, "--out", saved, "--plot", tmp_path / "live.html")
+    assert command("plot", saved, "--out", tmp_path / "saved.html", "--label", "model").code == 0
+    (_, (live,)), (_, (read,)) = (data_of(tmp_path / f"{name}.html") for name in ("live", "saved"))
+    assert read["columns"] == live["columns"] and len(live["columns"][-1]) > 300
+    file.write_text(file.read_text() + "# edited", encoding="utf-8")
+    straight = command("plot", saved, "--out", tmp_path / "straight.html")
+    assert straight.code == 0 and "outputs are drawn straight from row to row" in straight.err
+    assert "straight" not in command("plot", saved, "--outputs", "x", "--out", tmp_path / "x.html").err
+
+
+@pytest.mark.parametrize("digits", [None, 25])
+def test_a_model_gives_a_saved_run_its_outputs_again(model, tmp_path, digits):
+    loaded = hsdsl.load(model(WAVES))
+    run = loaded.simulate(engine="python", parameters={"a": "7/3"}, until="late + 1", precision=digits)
+    run.save(tmp_path / "run.npz")
+    read = hsdsl.store.load(tmp_path / "run.npz")
+    times = [k / 97 for k in range(155)]
+    assert max(abs(read.sample(times)["u"] - run.sample(times)["u"])) > 0.1
+    again = loaded.with_outputs(read)
+    assert again == run
+    assert again.sample(times)["u"].tolist() == run.sample(times)["u"].tolist()
 
 
 def test_guards_that_differ_are_not_drawn(command, model, tmp_path):
