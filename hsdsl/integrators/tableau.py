@@ -8,7 +8,7 @@ only says to how many digits its conditions hold; it is checked to those.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
@@ -93,6 +93,18 @@ class ButcherTableau:
                 self._check("coarse", (self.coarse,), self.estimated_order - 2, weights)
             if self.dense is not None:
                 self._check("dense", tuple(zip(*self.dense, strict=True)), self.dense_order, weights)
+
+    def places(
+        self, flow: Callable[..., Sequence[Any]], t: Any, x: Sequence[Any], h: Any
+    ) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+        """The times and states at which a step evaluates the flow, up to round-off; each is given before it does."""
+        slopes: list[Sequence[Any]] = []
+        for row in self.a:
+            weights = [float(w) for w in row]
+            moved = [sum(w * k[i] for w, k in zip(weights, slopes, strict=True)) for i in range(len(x))]
+            place = t + h * sum(weights), tuple(a + h * d for a, d in zip(x, moved, strict=True))
+            yield place
+            slopes.append(flow(place[0], *place[1]))
 
     def _check(self, what: str, powers: tuple[Vector, ...], order: int, weights: _Weights) -> None:
         """Check weights sum_m s**m powers[m-1]: at s = 1 alone if there is one power, else for every s."""

@@ -6,6 +6,7 @@ With a fixed step it is the table `dopri5`. With a tolerance it is
 `radau`   where the mode of the start, or one that its edges lead to, is stiff (below)
 `taylor`  where every flow is smooth
 `dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor` of a state, or no derivatives at the start
+`dop853`  where one has no derivatives at the start, and `dopri5` a stage without a value in the shortest steps
 ========= ============================================================================================
 
 A mode is stiff where both hold at the last points of a short way along the flow from the start:
@@ -30,7 +31,7 @@ import numpy as np
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Array
-from hsdsl.integrators import AUTO, METHODS, Method
+from hsdsl.integrators import AUTO, METHODS, ButcherTableau, Method
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate import Settings
@@ -40,6 +41,8 @@ LEAST_STEPS = 1000
 REACH = 3.3  # the length of an explicit step, in times of decay, that is still stable (dopri5 on the real axis)
 APART = 100
 STEPS, LENGTH = 64, 2.0  # along the way, and their greatest length in times of decay
+OTHER_STAGES = "dop853"
+SHORT = (20, 30, 40)  # halvings of the run: the lengths of first steps that are tried
 LAST = 16  # of these, at which a mode must be stiff
 MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longer to look at than to run
 
@@ -77,7 +80,13 @@ def _adaptive(
         if stiff is not None:
             return METHODS["radau"], str(stiff)
     if mode in near and not _has_derivatives(kernel, timeline, mode, x):
-        return METHODS[AUTO], f"the flow of {program.modes[mode].name} has no derivatives at the start"
+        without = f"the flow of {program.modes[mode].name} has no derivatives at the start"
+        if _begins(METHODS[AUTO], kernel, timeline, mode, x, until):
+            return METHODS[AUTO], without
+        other = METHODS[OTHER_STAGES]
+        if _begins(other, kernel, timeline, mode, x, until):
+            return other, f"{without}, and a stage of {AUTO} no value"
+        return METHODS[AUTO], without
     kinked = next((each.name for each in program.flows if each.tape is None), None)
     if kinked is not None:
         return METHODS[AUTO], f"the flow of {kinked} has abs, sign, min, max, floor or select of a state"
@@ -90,6 +99,20 @@ def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[
         return bool(np.isfinite(_Look(kernel, timeline, mode, np.array(x, float)).jacobian()).all())
     except DOMAIN_ERRORS:
         return False
+
+
+def _begins(
+    method: Method, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number], until: float
+) -> bool:
+    """Whether the flow has values at all stages of short steps from the start: the root of a state below 0 has none."""
+    assert isinstance(method, ButcherTableau)
+    flow = kernel.bind(mode, timeline.at(0.0).data).flow
+    try:
+        for n in SHORT:
+            list(method.places(flow, 0.0, x, until / 2**n))
+    except DOMAIN_ERRORS:
+        return False
+    return True
 
 
 def _near(program: Program, mode: int, states: int) -> Iterator[int]:

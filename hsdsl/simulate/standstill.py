@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
+from hsdsl.integrators.tableau import ButcherTableau
 from hsdsl.integrators.taylor import NoSeries, terms
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.chatter import jump_between
@@ -17,6 +18,7 @@ from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.stops import LEFT, left_domain, show
 from hsdsl.simulate.surfaces import StepFailure
 
+SHORTEST = 40  # halvings of a step, at which expressions without a value are looked for
 NEAR = 8  # doublings and halvings of a step: how far a jump of the flow is looked for
 
 
@@ -38,11 +40,13 @@ class Standstill:
         return self.problem.program.modes[self.index]
 
     def not_finite(self, places: Iterable[tuple[Number, State]]) -> Stop:
-        """Stop and name the first expression without a finite value at one of ``places``."""
+        """Stop and name the first expression without a finite value at one of ``places``, or in a stage of a step."""
         t, name, unit = self.t, self.mode.name, self.problem.arithmetic.unit
         for place in places:
             if found := self._without_value(*place):
                 return Stop("not_finite", t, found)
+        if found := self._without_value_in_a_stage():
+            return Stop("not_finite", t, found)
         missing = "Taylor series" if self._has_no_series() else "derivatives" if self._has_no_jacobian() else None
         if missing:
             sentence = f"the flow of mode {name} has no {missing} at t = {show(t)}; another method may go on"
@@ -64,7 +68,7 @@ class Standstill:
         if failure.kind == "not finite" or (failure.kind in ("error", "unsolved", "creeping") and faster_than_time):
             ahead = (
                 (t + h / 2**n, tuple(a + h * f / 2**n for a, f in zip(x, slope, strict=True)))
-                for n in range(40, -1, -1)
+                for n in range(SHORTEST, -1, -1)
             )
             return self.not_finite(ahead)
         if failure.kind in ("error", "unsolved", "creeping", "jump") and (jump := self._jump_near(slope)):
@@ -88,6 +92,19 @@ class Standstill:
                 finite = False
             if not finite:
                 return f"{name}, has no finite value at t = {show(t)} ({self._state(x)})"
+        return None
+
+    def _without_value_in_a_stage(self) -> str | None:
+        """Name the first expression without a value in a stage of the method's steps, the shortest first."""
+        method, kernel = self.problem.settings.method, self.problem.kernel
+        if not isinstance(method, ButcherTableau):
+            return None
+        flow = kernel.bind(self.index, self.segment.data).flow
+        for n in range(SHORTEST, -1, -1):
+            for place in method.places(flow, self.t, self.x, self.h / 2**n):
+                if found := self._without_value(*place):
+                    others = "a method with other stages may go on, such as dop853, rk4 or heun"
+                    return f"{found}, where a stage of {method.name} from t = {show(self.t)} is; {others}"
         return None
 
     def _without_value_later(self) -> str | None:

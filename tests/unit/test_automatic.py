@@ -37,6 +37,13 @@ CASES = {
         "1e4",
         "taylor",
     ),
+    "a root that a stage of dopri5 has no value of": (
+        "{a: -2*sqrt(a - b), b: sqrt(a - b) - 3*sqrt(b - c), c: sqrt(b - c) - sqrt(c)/2}",
+        "a: 5, b: 0, c: 0",
+        "0.1",
+        "dop853",
+    ),
+    "a root that stages have values of": ("{a: -sqrt(a - b), b: sqrt(a - b) - sqrt(b)}", "a: 2, b: 0", "0.1", "dopri5"),
     "a fast decay in a nanosecond": ("{x: -1e14*(x - cos(1e9*t))}", "x: 3", "1e-8", "radau"),
     "a decay to rest": ("{x: -x}", "x: 1", "1e6", "radau"),
     "kinked": ("{x: v, v: -abs(x)}", "x: 1, v: 0", "1", "dopri5"),
@@ -109,5 +116,18 @@ def test_a_stiff_run_takes_few_steps() -> None:
 
 def test_every_method_it_picks_is_one_that_can_be_named() -> None:
     picked = {method for *_, method in CASES.values()}
-    assert picked == {"taylor", "dopri5", "radau"} and picked <= set(automatic.METHODS)
+    assert picked == {"taylor", "dopri5", "dop853", "radau"} and picked <= set(automatic.METHODS)
     assert yaml.safe_load(ROOT.format(flow="{x: 1}", initial="x: 1", until=1))["experiment"]["method"] == "auto"
+
+
+@pytest.mark.parametrize("engine", ["python", "c"])
+def test_a_stage_without_a_value_is_named(engine: str) -> None:
+    flow, initial, until, _ = CASES["a root that a stage of dopri5 has no value of"]
+    model = made(flow, initial, until)
+    stop = model.simulate(engine=engine, method="dopri5").stop
+    assert stop.reason == "not_finite"
+    assert stop.message.startswith("the flow of c, sqrt(b - c) - sqrt(c)/2, has no finite value at t = ")
+    assert "where a stage of dopri5 from t = 0 is; a method with other stages may go on, such as dop853" in stop.message
+    found, fine = model.simulate(engine=engine), model.simulate(engine=engine, method="rk4", step=1e-5)
+    assert found.stop.complete and fine.stop.complete
+    assert [found.final[x] for x in "abc"] == pytest.approx([fine.final[x] for x in "abc"], rel=1e-4)
