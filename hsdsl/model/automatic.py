@@ -101,9 +101,7 @@ def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[
         return False
 
 
-def _begins(
-    method: Method, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number], until: float
-) -> bool:
+def _begins(method: Method, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number], until: float) -> bool:
     """Whether the flow has values at all stages of short steps from the start: the root of a state below 0 has none."""
     assert isinstance(method, ButcherTableau)
     flow = kernel.bind(mode, timeline.at(0.0).data).flow
