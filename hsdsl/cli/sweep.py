@@ -24,6 +24,7 @@ VARY = (
 )
 RECORD = "What is kept of a run: final, transitions, outputs:every=TIME, outputs:count=N, verdict."
 OF = "What --plot draws: a column, such as final.x or transitions; before.v and sample.x give a bifurcation diagram."
+OVER = "Draw samples, such as --of sample.x, over time: a curve for each row, in colours of what varies."
 CHUNK = "Rows of a file; left out, it follows from a few runs that are timed."
 TAIL = "The share of each run, at its end, whose transitions and samples are in the bifurcation diagram."
 
@@ -45,6 +46,7 @@ def sweep(
     show: Annotated[Path | None, option("DIR", "Summarise and draw a dataset, without running anything.")] = None,
     plot: Annotated[Path | None, option("FILE", "Draw it: .png or .svg; --show draws to DIR/_picture.png.")] = None,
     of: Annotated[str | None, option("COLUMN", OF)] = None,
+    over: Annotated[str | None, option("time", OVER)] = None,
     tail: Annotated[float, option("SHARE", TAIL)] = 0.5,
     answer: Answer,
 ) -> None:
@@ -65,7 +67,7 @@ def sweep(
             found = _run(model, vary, out, settings, answer.hidden)
         target = plot or (show and show / "_picture.png")
         if target is not None:
-            _draw(found, target, of, tail, plot is not None or of is not None)
+            _draw(found, target, of, {"tail": tail, "over": over}, any(x is not None for x in (plot, of, over)))
         answer.give(found.as_json, lambda: found.summary)
 
 
@@ -131,9 +133,9 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
-def _draw(found: Any, plot: Path, of: str | None, tail: float, needed: bool) -> None:
+def _draw(found: Any, plot: Path, of: str | None, options: dict[str, Any], needed: bool) -> None:
     try:
-        found.plot(plot, of, tail=tail)
+        found.plot(plot, of, **options)
         say(f"wrote {plot}")
     except UsageError as error:
         if needed:

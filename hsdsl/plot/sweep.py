@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Pictures of sweeps: a curve over one name, a map or points over two, a bifurcation diagram."""
+"""Pictures of sweeps: a curve over one name, a map or points over two, a bifurcation diagram, curves over time."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_WORDS = 20  # of which each has a colour
+MARGIN = 0.01  # beside the first and the last column of dots
 DOT = 40_000  # dots from which on they are small and pale
 
 
@@ -66,9 +67,25 @@ def plot_dots(x: Axis, of: Quantity, where: Any, title: str) -> Figure:
     dots: dict[str, Any] = {"markersize": size, "alpha": alpha, "markeredgewidth": 0, "rasterized": True}
     axes.plot(x.values[where], of.values, "o", color=curve(PALETTE[5]), **dots)
     axes.set_ylabel(of.label, parse_math=False)
-    if len(x.values):
-        axes.set_xlim(x.values.min(), x.values.max())
+    axes.margins(x=MARGIN)
     return _labelled(figure, axes, x, title)
+
+
+@to_file
+def plot_family(curves: Sequence[tuple[Any, Any]], by: Axis, label: str, title: str) -> Figure:
+    """Draw a curve (times, values) for each row, in colours that rise with a name."""
+    from matplotlib.collections import LineCollection
+
+    figure, axes = _empty()
+    known = by.values[np.isfinite(by.values)]
+    low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
+    lines = LineCollection([np.column_stack(each) for each in curves], cmap="viridis", linewidths=0.9)
+    lines.set(array=by.values, norm="log" if by.logarithmic else None, clim=(low, high), rasterized=True)
+    axes.add_collection(lines)
+    axes.autoscale_view()
+    figure.colorbar(lines, ax=axes).set_label(by.label, parse_math=False)
+    axes.set_ylabel(label, parse_math=False)
+    return _labelled(figure, axes, Axis("time t", None, None, False), title)
 
 
 @to_file

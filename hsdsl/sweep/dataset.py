@@ -108,7 +108,9 @@ class Sweep:
             counts.update(table.column(0).to_pylist())
         return dict(counts.most_common())
 
-    def plot(self, path: str | os.PathLike[str], of: str | None = None, *, tail: float = 0.5) -> None:
+    def plot(
+        self, path: str | os.PathLike[str], of: str | None = None, *, tail: float = 0.5, over: str | None = None
+    ) -> None:
         """Draw a column over what varies, to a .png or .svg file: a curve, a map, or a bifurcation diagram.
 
         Parameters
@@ -119,12 +121,14 @@ class Sweep:
             recorded over one name, the state before them that they change most, else ``transitions``.
         tail : float
             The share of each run, at its end, whose transitions and samples are drawn there.
+        over : {"time"}, optional
+            Draw a column of samples, such as ``sample.x``, over time: a curve for each row, in colours of what varies.
 
         Raises UsageError: no such column, or more names that vary than a picture has axes.
         """
         from hsdsl.sweep.picture import draw
 
-        draw(self, path, of, tail)
+        draw(self, path, of, tail, over)
 
     def as_json(self) -> dict[str, Any]:
         """Its numbers, and where it is."""

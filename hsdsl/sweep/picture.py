@@ -1,7 +1,7 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """What a picture of a sweep is of: which columns, over which of the names that vary.
 
-A column of lists gives a bifurcation diagram over one name. A column of numbers or words gives a curve over one name, a
+A column of lists gives a bifurcation diagram over one name, and samples curves over time. A column of numbers or words gives a curve over one name, a
 map over two. More names are refused: their rows would lie on each other.
 """
 
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.errors import UsageError
-from hsdsl.names import SINCE, called, did_you_mean
+from hsdsl.names import SINCE, called, did_you_mean, shown
 from hsdsl.sweep.manifest import Manifest
 from hsdsl.sweep.rows import LISTS, column_of
 
@@ -22,22 +22,27 @@ if TYPE_CHECKING:
     from hsdsl.plot.sweep import Axis
     from hsdsl.sweep.dataset import Sweep
 
+TIME, SAMPLED = "time", "sample.time"
 TIMES = {"transition": "transition.time", "before": "transition.time", "after": "transition.time"}
 
 
-def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float) -> None:
-    """Draw a column of a sweep; left out, the one of :func:`telling`.
+def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float, over: str | None = None) -> None:
+    """Draw a column of a sweep; left out, the one of :func:`telling`. ``over`` may be ``time``, for samples.
 
     Raises UsageError: no such column, one that cannot be drawn, or more than two names that vary.
     """
     from hsdsl.plot import sweep as plots
 
-    column = of or telling(sweep)
+    if over not in (None, TIME):
+        raise UsageError(f"--over: expected {TIME}, got '{shown(over)}'", "pictures are over what varies without it")
+    column = of or (next((c for c in sweep.columns if _is_sampled(c)), "sample.x") if over else telling(sweep))
     names = sweep.manifest.variation.names
     if column not in sweep.columns or column in ("row", "message", "verdict.reasons", *map(column_of, names)):
         raise UsageError(f"--of: the sweep has no column '{column}' to draw", _hint(sweep, column))
     listed = column.partition(".")[0] in LISTS
-    if len(names) > (1 if listed else 2):
+    if over and not _is_sampled(column):
+        raise UsageError(f"--over {TIME}: '{column}' has no samples", "choose one with --of sample.NAME")
+    if not over and len(names) > (1 if listed else 2):
         most = "a bifurcation diagram has one name that varies" if listed else "a map has two"
         raise UsageError(f"{most}, and here {', '.join(names)} vary", "read the dataset with pandas, and draw a part")
     if not 0 < tail <= 1:
@@ -48,6 +53,9 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
     )
     label = f"{column} [{unit}]" if unit else column
     axes = [_axis(sweep, name) for name in names]
+    if over:
+        plots.plot_family(path, _curves(sweep, column), axes[0], label, title)
+        return
     if listed:
         values, where = _dots(sweep, column, tail)
         plots.plot_dots(path, axes[0], plots.Quantity(label, values), where, title)
@@ -110,9 +118,23 @@ def _numbers(sweep: Sweep, column: str) -> Array:
     return values if values.dtype == object else values.astype(float)
 
 
+def _is_sampled(column: str) -> bool:
+    return column.startswith("sample.") and column != SAMPLED
+
+
+def _curves(sweep: Sweep, column: str) -> list[tuple[Array, Array]]:
+    """The times and the values of the samples of each row."""
+    found: list[tuple[Array, Array]] = []
+    for table in sweep.batches([SAMPLED, column]):
+        counts = table.column(SAMPLED).combine_chunks().value_lengths().fill_null(0).to_numpy().astype(int)
+        ends = np.cumsum(counts)[:-1]
+        found += zip(np.split(_flat(table, SAMPLED), ends), np.split(_flat(table, column), ends), strict=True)
+    return found
+
+
 def _dots(sweep: Sweep, column: str, tail: float) -> tuple[Array, Array]:
     """The numbers of lists in the last part of each run, and the row of each among those that there are."""
-    times = TIMES.get(column.partition(".")[0], "sample.time")
+    times = TIMES.get(column.partition(".")[0], SAMPLED)
     values: list[Any] = [np.empty(0)]
     where, rows = [np.empty(0, int)], 0
     for table in sweep.batches(list(dict.fromkeys([column, times, "time"]))):

@@ -309,6 +309,24 @@ def test_pictures(model, tmp_path, vary, of, kind):
     assert kind in (tmp_path / "p.svg").read_text()
 
 
+@pytest.mark.parametrize("vary", [["c=0.5:0.9:3"], ["g=0.1:1:3:log", "initial.v=4,20"], ["c~uniform(0.5, 0.9)"]])
+def test_samples_are_drawn_over_time(model, tmp_path, vary):
+    random = 4 if "~" in vary[0] else None
+    found = model.sweep(vary, tmp_path / "s", record="final,outputs:count=7", random=random, processes=1)
+    curves = picture._curves(found, "sample.x")
+    assert len(curves) == found.rows
+    for k, (times, values) in enumerate(curves):
+        assert times[0] == 0 and len(times) == len(values)
+        if found["stop"][k] == "until":
+            assert (times[-1], values[-1]) == (found["time"][k], found["final.x"][k])
+    for of in ("sample.x", None):
+        found.plot(tmp_path / "p.svg", of, over="time")
+        assert "time t" in (tmp_path / "p.svg").read_text() or "<image" in (tmp_path / "p.svg").read_text()
+    for of, over, sentence in (("final.x", "time", "has no samples"), ("sample.x", "t", "expected time")):
+        with pytest.raises(UsageError, match=sentence):
+            found.plot(tmp_path / "p.svg", of, over=over)
+
+
 def test_where_no_column_is_named_the_most_telling_one_is_drawn(model, tmp_path):
     telling = picture.telling
     one = {"c": [0.7, 0.8]}
