@@ -1,8 +1,8 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
 """What a picture of a sweep is of: which columns, over which of the names that vary.
 
-A column of lists gives a bifurcation diagram over one name, and samples curves over time. A column of numbers or words gives a curve over one name, a
-map over two. More names are refused: their rows would lie on each other.
+A column of lists gives a bifurcation diagram over one name, and samples curves over time. A column of numbers or words
+gives a curve over one name, a map over two. More names are refused: their rows would lie on each other.
 """
 
 from __future__ import annotations
