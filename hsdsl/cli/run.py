@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 STOPPED = 3
 PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
 ESTIMATE = "Run again, finer, and give the distance of the runs."
+SAMPLES = "Rows of tables: every=TIME or count=N; jumps are always written. Else the file's, or those of the integrator."
 EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
 DRAW = "Draw it: .png, .svg, or .html, an interactive page; with --outputs only these."
 FILM = "Write the model's scene as a film: .gif, or .mp4 where ffmpeg is there. It is of a second, equal run."
@@ -44,6 +45,7 @@ def run(
     outputs: Annotated[str | None, option("A,B", "Only these states and outputs in files and final outputs.")] = None,
     estimate: Annotated[bool, Option("--estimate", help=ESTIMATE)] = False,
     out: Annotated[Path | None, option("FILE", "Save the execution: .csv, .parquet or .npz.")] = None,
+    samples: Annotated[str | None, option("N", SAMPLES)] = None,
     every: Annotated[int | None, option("K", EVERY)] = None,
     plot: Annotated[Path | None, option("FILE", DRAW)] = None,
     phase: Phases = None,
@@ -58,7 +60,7 @@ def run(
         if outputs is None and plot is None and animate is None and experiment.in_numbers():
             ahead.begin(ModelFiles.read(model, None, text))
         loaded = _load(model, text, engine, precision, experiment.scheme)
-        settings = experiment.settings(engine=engine, precision=precision)
+        settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns)
         shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
         result: Any

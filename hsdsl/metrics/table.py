@@ -102,5 +102,6 @@ def check_same_model(a: Execution, b: Execution) -> None:
         raise UsageError(
             f"the runs are of different models ({a.model} and {b.model}, or an edited file): "
             "a distance is defined in one space only",
-            "run both again with the same model file",
+            "run both with one file: what differs is a parameter of it, as k or select(variant, a, b), given by "
+            "--set variant=1",
         )

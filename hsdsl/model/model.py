@@ -159,7 +159,8 @@ class Model:
         scale : mapping, optional
             Sizes of states by name: the scale of a state is this size until the state has been larger.
         samples : int, str or sequence, optional
-            How many equally spaced samples, or their times; what files are written at.
+            How many equally spaced samples, their times, or ``every=TIME`` for its multiples; what files are written
+            at.
         max_transitions : int or str, optional
             Stop rather than make more.
         completion : {"contact", "auto", "none"}, optional

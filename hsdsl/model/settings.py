@@ -21,7 +21,9 @@ from hsdsl.parts import meant
 from hsdsl.program import Program
 from hsdsl.simulate import Settings
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.surfaces import TIE
 
+EVERY, COUNT = "every=", "count="  # before the time between samples, and before their number, which may do without
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000
 
 
@@ -50,7 +52,7 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
         completion=options.values["completion"].value,
         method=method,
         **numbers,
-        samples=_samples(options, values),
+        samples=_samples(options, values, until),
         overrides=overrides,
         memory=current().memory,
     )
@@ -110,8 +112,8 @@ def following_digits(settings: Settings, options: Options, arithmetic: Arithmeti
     return replace(settings, tolerance=tolerance, method=method.for_tolerance(tolerance, arithmetic))
 
 
-def _samples(options: Options, values: Values) -> int | tuple[Number, ...] | None:
-    """The times a run is sampled at, or how many equally spaced ones."""
+def _samples(options: Options, values: Values, until: Number) -> int | tuple[Number, ...] | None:
+    """The times a run is sampled at, or how many equally spaced ones; `every=TIME` are its multiples."""
     option = options.values.get("samples")
     if option is None:
         return None
@@ -119,14 +121,30 @@ def _samples(options: Options, values: Values) -> int | tuple[Number, ...] | Non
     given: Any = value.tolist() if type(value) is np.ndarray else value  # pyright: ignore[reportUnknownMemberType]
     if option.origin == FILE and values.has("sample_times"):
         return values.constant("sample_times")
+    if isinstance(given, str) and given.startswith(EVERY):
+        return _multiples(values.number(given.removeprefix(EVERY), "samples"), until, values)
+    given = given.removeprefix(COUNT) if isinstance(given, str) else given
     if isinstance(given, Sequence) and not isinstance(given, str):
         return tuple(values.number(t, "samples") for t in given)  # pyright: ignore[reportUnknownVariableType]
     count = values.constant("sample_count")[0] if option.origin == FILE else values.number(given, "samples")
     if count != int(count) or count < 2:
         raise UsageError(f"samples must be a list of times or a whole number of at least 2, not {show(count)}")
-    width = max(len(mode.states) for mode in values.program.modes)
-    check_memory(current().memory, int(count), "samples", 1 + width + len(values.program.outputs))
+    _check_samples(int(count), values)
     return int(count)
+
+
+def _multiples(step: Number, until: Number, values: Values) -> tuple[Number, ...]:
+    """The multiples of a time up to the end."""
+    if not step > 0:
+        raise UsageError(f"the time between samples must be positive, not {show(step)}")
+    count = int(until / step * (1 + TIE)) + 1
+    _check_samples(count, values)
+    return tuple(min(k * step, until) for k in range(count))
+
+
+def _check_samples(count: int, values: Values) -> None:
+    width = max(len(mode.states) for mode in values.program.modes)
+    check_memory(current().memory, count, "samples", 1 + width + len(values.program.outputs))
 
 
 def check_method(method: Method | None, program: Program, arithmetic: Arithmetic) -> None:

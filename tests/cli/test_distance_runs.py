@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -80,3 +81,19 @@ def test_wrong_use_is_refused_with_a_sentence(sentence, ask):
     asked = ask(*WRONG[sentence])
     assert asked.code == 2
     assert sentence in asked.err
+
+
+def test_variants_of_a_model_are_compared_as_runs_of_one_file(command, model, tmp_path):
+    text = "hsdsl: 1\nparameters: {drag: 0}\nmodes: {m: {flow: {v: 'select(drag, -v/4, -2)'}}}\n"
+    file, runs = (
+        model(text + "initial: {mode: m, v: 3}\nexperiment: {until: 1}\n"),
+        [tmp_path / "a.npz", tmp_path / "b.npz"],
+    )
+    for run, given in zip(runs, ((), ("--set", "drag=1")), strict=True):
+        command("run", file, "--engine", "python", *given, "--out", run)
+    found = command("distance", *runs, "--json").json
+    assert found["lower"] <= 3 * math.exp(-1 / 4) - 1 <= found["upper"]
+    file.write_text(file.read_text() + "# other", encoding="utf-8")
+    command("run", file, "--engine", "python", "--out", runs[1])
+    refused = command("distance", *runs)
+    assert refused.code == 2 and "select(variant, a, b), given by --set variant=1" in refused.err

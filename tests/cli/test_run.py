@@ -266,3 +266,29 @@ def test_interrupt_keeps_what_was_computed(tmp_path):
     assert process.returncode == 130, stderr.decode()
     assert json.loads(stdout)["stop"]["reason"] == "interrupted"
     assert out.stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "times"),
+    [
+        (("--samples", "every=gap/2"), [0, 0.15, 0.3, 0.45, 0.6, 0.75]),
+        (("--set", "experiment.samples=every=0.2"), [0, 0.2, 0.4, 0.6]),
+        (("--samples", "count=3"), [0, 0.375, 0.75]),
+        (("--samples", "2"), [0, 0.75]),
+    ],
+)
+def test_tables_have_rows_at_samples(command, model, tmp_path, words, times):
+    text = "hsdsl: 1\nparameters: {gap: 0.3}\nmodes: {m: {flow: {x: x}}}\ninitial: {mode: m, x: 1}\n"
+    table = tmp_path / "run.csv"
+    answer = command("run", model(text + "experiment: {until: 0.75}\n"), *words, "--engine", "python", "--out", table)
+    assert answer.code == 0
+    rows = [line.split(",") for line in table.read_text().splitlines()[1:]]
+    assert [float(row[0]) for row in rows] == pytest.approx(times, rel=1e-15)
+    assert [float(row[3]) for row in rows] == pytest.approx([math.exp(t) for t in times], rel=1e-8)
+
+
+@pytest.mark.parametrize("text", ["every=0", "every=-gap", "every=", "every=x", "count=1", "often"])
+def test_samples_that_are_none_are_refused(command, model, tmp_path, text):
+    model_text = "hsdsl: 1\nparameters: {gap: 0.3}\nmodes: {m: {flow: {x: x}}}\ninitial: {mode: m, x: 1}\n"
+    answer = command("run", model(model_text + "experiment: {until: 1}\n"), "--samples", text, "--engine", "python")
+    assert (answer.code, answer.out) == (2, "") and "samples" in answer.err
