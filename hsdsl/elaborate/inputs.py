@@ -21,6 +21,7 @@ from hsdsl.schema import InputFile, InputSamples
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import SampledInput
 
+_STEP = "for a step leave out the first of the two: with `hold: zero`, the default, values step at their times"
 _MOST_FAULTS = 10  # of one file: a wrong column would bury everything else
 _NUMBER = re.compile(r"[+-]?(?:[0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})(?:[eE][+-]?[0-9]{1,3})?")
 
@@ -77,7 +78,8 @@ def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) 
     for (before, after), scalar in zip(pairwise(times), entry.times[1:], strict=True):
         if before.constant and after.constant and not before.number < after.number:
             message = f"the times of the input '{name}' do not increase here"
-            symbols.report(scalar.place, "HS310", message, "give each time once, the earliest first")
+            hint = _STEP if before.number == after.number else "give each time once, the earliest first"
+            symbols.report(scalar.place, "HS310", message, hint)
     return tuple(map(_exact, times)), tuple(map(_exact, values))
 
 
@@ -163,7 +165,8 @@ class _Table:
         if time is None or value is None:
             return
         if self.times and time <= self.times[-1]:
-            self.fault(number, _start(cells, at), len(cells[at]), "the times do not increase here")
+            hint = _STEP if time == self.times[-1] else None
+            self.fault(number, _start(cells, at), len(cells[at]), "the times do not increase here", hint)
             return
         self.times.append(time)
         self.values.append(value)
