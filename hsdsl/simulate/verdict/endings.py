@@ -90,4 +90,5 @@ def at_the_end(run: RunView) -> Iterator[Finding]:
 
 
 def _undecided(name: str) -> str:
-    return f"a transition of {name} within the error of the end is undecided: the end is too close to it"
+    undecided = f"a transition of {name} within the error of the end is undecided"
+    return f"{undecided}, and the last state with it: take `until` a little earlier or later, as between two samples"
