@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 STOPPED = 3
 PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
 ESTIMATE = "Run again, finer, and give the distance of the runs."
-SAMPLES = "Rows of tables: every=TIME or count=N; jumps are always written. Else the file's, or those of the integrator."
+SAMPLES = "Rows of tables: every=TIME or count=N; jumps are always written. Else the file's, or the integrator's."
 EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
 DRAW = "Draw it: .png, .svg, or .html, an interactive page; with --outputs only these."
 FILM = "Write the model's scene as a film: .gif, or .mp4 where ffmpeg is there. It is of a second, equal run."
