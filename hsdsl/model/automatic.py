@@ -17,7 +17,11 @@ A mode is stiff where both hold at the last points of a short way along the flow
   of that decay.
 
 The way has linearly implicit steps of order 2, each at most twice as long as the fast decay and as the straight part of
-the curve: fast decays decay on it, and oscillations go on. Guards do not count, and nothing far from the start is seen.
+the curve: fast decays decay on it, and oscillations go on. Guards do not count.
+
+What lies far from the start is seen by the run itself (`hsdsl.simulate.review`): where its steps are at least as long
+as the fastest decay at its last row, and the mode is stiff from there on, the run is made again by `radau`.
+
 A run with a precision is not examined, and counts as not stiff.
 """
 
@@ -25,6 +29,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, isfinite
 
 import numpy as np
@@ -34,8 +39,9 @@ from hsdsl.execution import Array
 from hsdsl.integrators import AUTO, METHODS, ButcherTableau, Method
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
-from hsdsl.simulate import Settings
+from hsdsl.simulate import Prepared, Settings, prepare
 from hsdsl.simulate.input_segments import Timeline
+from hsdsl.simulate.review import BecomesStiff
 
 LEAST_STEPS = 1000
 REACH = 3.3  # the length of an explicit step, in times of decay, that is still stable (dopri5 on the real axis)
@@ -52,11 +58,13 @@ class Stiffness:
     """A decay that is fast in comparison: its time, and for how long the curve is straight to a hundredth."""
 
     mode: str
+    time: float
     decay: float
     straight: float
 
     def __str__(self) -> str:
-        fast = f"{self.mode} is stiff near the start: something decays within {self.decay:.2g}"
+        near = f"at t = {self.time:.3g}" if self.time else "near the start"
+        fast = f"{self.mode} is stiff {near}: something decays within {self.decay:.2g}"
         return fast + (f", the curve is straight for {self.straight:.2g}" if isfinite(self.straight) else ", to rest")
 
 
@@ -93,10 +101,63 @@ def _adaptive(
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 
+def judged(prepared: Prepared, plain: Prepared | None = None) -> Prepared:
+    """The run, which ends with `BecomesStiff` where it comes to a stiff stretch, if `auto` has chosen its method.
+
+    Of a run with more states ``plain`` is the one that the choice was made for: its modes are judged.
+    """
+    plain = plain or prepared
+    settings, digits = prepared.settings, prepared.arithmetic.digits
+    chosen = settings.tolerance is not None and plain.settings.method_chosen is not None
+    if chosen and digits is None and settings.method is not None and not settings.method.implicit:
+        prepared.judges.append(partial(_judge, plain, prepared.program))
+    return prepared
+
+
+def _judge(
+    plain: Prepared, program: Program, mode: int, t: Number, x: Sequence[Number], step: Number
+) -> Stiffness | None:
+    """The stiffness of a mode of a program at a state of a run whose steps were so long on average."""
+    name, values = program.modes[mode].name, dict(zip(program.modes[mode].states, x, strict=False))
+    index = next((k for k, each in enumerate(plain.program.modes) if each.name == name), None)
+    states = () if index is None else plain.program.modes[index].states
+    if index is None or not 0 < len(states) <= MOST_STATES or not values.keys() >= set(states):
+        return None
+    here, until = [float(values[each]) for each in states], float(plain.settings.until)
+    try:
+        look = _Look(plain.kernel, plain.timeline, index, float(t), np.array(here))
+        decay = look.decay()
+        if decay * float(step) < 1 or look.straight(decay) * decay < APART:
+            return None
+    except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
+        return None
+    return stiffness(plain.kernel, plain.timeline, name, index, here, until, float(t))
+
+
+def settled(prepared: Prepared) -> Prepared:
+    """The run by the method that it ends with: it is made once for that, in constant memory."""
+    judged(prepared)
+    try:
+        if prepared.plan is not None and prepared.judges:
+            prepared.stream(lambda chunk: None)
+    except BecomesStiff as found:
+        return instead(prepared, found)
+    prepared.judges.clear()
+    return prepared
+
+
+def instead(prepared: Prepared, found: BecomesStiff) -> Prepared:
+    """The same run by the method for stiff modes."""
+    settings = prepared.settings
+    method = METHODS["radau"].for_tolerance(settings.tolerance, prepared.arithmetic)
+    settings = replace(settings, method=method, method_chosen=f"{method.name}: {found}")
+    return prepare(prepared.with_settings(settings), prepared.plan and prepared.plan.compiled)
+
+
 def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]) -> bool:
     """Whether the flow has finite derivatives at the start: the square root of 0 has none, and so no Taylor series."""
     try:
-        return bool(np.isfinite(_Look(kernel, timeline, mode, np.array(x, float)).jacobian()).all())
+        return bool(np.isfinite(_Look(kernel, timeline, mode, 0.0, np.array(x, float)).jacobian()).all())
     except DOMAIN_ERRORS:
         return False
 
@@ -122,22 +183,20 @@ def _near(program: Program, mode: int, states: int) -> Iterator[int]:
 
 
 def stiffness(
-    kernel: Kernel, timeline: Timeline, name: str, mode: int, x: Sequence[Number], until: float
+    kernel: Kernel, timeline: Timeline, name: str, mode: int, x: Sequence[Number], until: float, t: float = 0.0
 ) -> Stiffness | None:
-    """The stiffness of a mode near x at t = 0, None where it is not stiff."""
+    """The stiffness of a mode near x at a time, None where it is not stiff."""
     try:
-        look = _Look(kernel, timeline, mode, np.array(x, float))
-        if look.decay() * until < LEAST_STEPS * REACH:
-            return None
+        look = _Look(kernel, timeline, mode, t, np.array(x, float))
         stiff = None
         for count in range(STEPS):
             decay = look.decay()
-            if decay * until < LEAST_STEPS * REACH:
+            if decay * (until - t) < LEAST_STEPS * REACH:
                 return None
             straight = look.straight(decay)
             if count >= STEPS - LAST and straight * decay < APART:
                 return None
-            stiff = Stiffness(name, 1 / decay, straight)
+            stiff = Stiffness(name, t, 1 / decay, straight)
             look.step(min(LENGTH / decay, straight))
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
         return None  # unknown
@@ -145,14 +204,14 @@ def stiffness(
 
 
 class _Look:
-    """A mode's flow and Jacobian as arrays, with the inputs of the start, and a point on the way from there."""
+    """A mode's flow and Jacobian as arrays, with the inputs of a time, and a point on the way from there."""
 
     x: Array
 
-    def __init__(self, kernel: Kernel, timeline: Timeline, mode: int, x: Array) -> None:
-        data = timeline.at(0.0).data
+    def __init__(self, kernel: Kernel, timeline: Timeline, mode: int, t: float, x: Array) -> None:
+        data = timeline.at(t).data
         self._flow, self._jacobian = kernel.bind(mode, data).flow, kernel.jacobian(mode, data)
-        self.t, self.x = 0.0, x
+        self.t, self.x = t, x
         self._scales: Array = np.abs(x)
 
     def flow(self, t: float, x: Array) -> Array:

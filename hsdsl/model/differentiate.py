@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.arithmetic import Number
 from hsdsl.defaults import DEFAULT_TOLERANCE
 from hsdsl.errors import UsageError
+from hsdsl.execution import Execution
 from hsdsl.integrators import AUTO, METHODS
+from hsdsl.model import automatic
 from hsdsl.model.call_cache import CallCache, call_key
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.pipeline import Pipeline
@@ -21,6 +23,7 @@ from hsdsl.parts import Part, present
 from hsdsl.sensitivity.names import Target, targets
 from hsdsl.sensitivity.result import Sensitivity, Setting, Slopes
 from hsdsl.sensitivity.state_names import ERROR, SPAN, UNIT
+from hsdsl.simulate.review import BecomesStiff
 from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.agreement import SAFE
 
@@ -53,12 +56,10 @@ class Differentiator:
         ready = self._prepared.find(key)
         if ready is None:
             ready = self._ready(wrt, arguments, tuple(firsts))
-            self._prepared.keep(key, ready)
-        run = ready.setting.augmented.simulate()
+        ready, run = self._run(ready)
         if not ready.entries and (run.stop.reason == "not_finite" or run.enters_beyond):
-            ready = self._with_entries(ready)
-            self._prepared.keep(key, ready)
-            run = ready.setting.augmented.simulate()
+            ready, run = self._run(self._with_entries(ready))
+        self._prepared.keep(key, ready)
         return Sensitivity(
             tuple(t.label for t in ready.by),
             run,
@@ -99,6 +100,15 @@ class Differentiator:
         )
         return self._prepare(_Ready(by, change, call, setting, firsts, exact=arguments.get("tolerance") is not None))
 
+    def _run(self, ready: _Ready) -> tuple[_Ready, Execution]:
+        """Run the augmented system; by the method for stiff modes where it comes to a stiff stretch."""
+        try:
+            return ready, ready.setting.augmented.simulate()
+        except BecomesStiff as found:
+            plain = automatic.instead(ready.setting.plain, found)
+            ready = self._prepare(replace(ready, setting=replace(ready.setting, plain=plain)))
+            return ready, ready.setting.augmented.simulate()
+
     def _with_entries(self, ready: _Ready) -> _Ready:
         return self._prepare(replace(ready, entries=True))
 
@@ -132,6 +142,7 @@ class Differentiator:
             "precision": ready.call.get("precision"),
         }
         prepared = self._written(ready, method).prepare(arguments)
+        automatic.judged(prepared, ready.setting.plain)
         return replace(ready, setting=replace(ready.setting, augmented=prepared))
 
     def _written(self, ready: _Ready, method: str) -> Pipeline:

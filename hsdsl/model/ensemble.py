@@ -16,6 +16,7 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Array, Ensemble, Execution, TransitionTable
 from hsdsl.execution.sampling import columns_by_name
 from hsdsl.limits import cores
+from hsdsl.model import automatic
 from hsdsl.model.ensemble_request import EnsembleRequest
 from hsdsl.model.options import KEYS, Options
 from hsdsl.model.settings import check_memory, setting_columns, whole
@@ -163,7 +164,7 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
     if first is None:
         why = next(iter(columns.refused.values()), "there is none" if len(finite) == 0 else "a value is not finite")
         raise NothingToRunError(why)
-    base = pipeline.prepare(request.single(first))
+    base = automatic.settled(pipeline.prepare(request.single(first)))
     varied = request.arrays(initial=True)
     shared = start_of_parts(pipeline.program, dict.fromkeys(varied) | call["initial"])
     shared = {name: value for name, value in shared.items() if name not in varied}

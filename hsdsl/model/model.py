@@ -12,6 +12,7 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.limits import Limits
+from hsdsl.model import automatic
 from hsdsl.model.call_cache import CallCache, call_key
 from hsdsl.model.options import ARGUMENTS, Options, arguments_of, overrides_of
 from hsdsl.model.pipeline import Pipeline, pipeline_of
@@ -22,6 +23,7 @@ from hsdsl.program import Program
 from hsdsl.progress import counted, in_notebook, running
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
+from hsdsl.simulate.review import BecomesStiff
 from hsdsl.written import written_modes
 
 if TYPE_CHECKING:
@@ -189,10 +191,16 @@ class Model:
         key = call_key(*arguments)
         ready = self._prepared.find(key)
         if ready is None:
-            ready = self.pipeline.prepare(dict(zip(ARGUMENTS, arguments, strict=True)))
+            ready = automatic.judged(self.pipeline.prepare(dict(zip(ARGUMENTS, arguments, strict=True))))
             self._prepared.keep(key, ready)
         with in_notebook() as show:
-            run = ready.simulate(watch or (show and partial(running, show)), self.pipeline.seconds)
+            watch = watch or (show and partial(running, show))
+            try:
+                run = ready.simulate(watch, self.pipeline.seconds)
+            except BecomesStiff as found:
+                ready = automatic.instead(ready, found)
+                self._prepared.keep(key, ready)
+                run = ready.simulate(watch, self.pipeline.seconds)
         run = visible_run(run, ready)
         run.__dict__["differentiation"] = partial(self._differentiate, arguments)
         run.__dict__["look"] = partial(self.look, parameters)
@@ -403,7 +411,11 @@ class Model:
 
         self._flat("rows in a file while a run goes on")
         target = check(path, every, columns, arguments, self)
-        return stream(self.pipeline.prepare(arguments | {"engine": "c"}), target, every, columns, watch)
+        prepared = automatic.judged(self.pipeline.prepare(arguments | {"engine": "c"}))
+        try:
+            return stream(prepared, target, every, columns, watch)
+        except BecomesStiff as found:
+            return stream(automatic.instead(prepared, found), target, every, columns, watch)
 
     def ensemble(
         self,

@@ -131,6 +131,7 @@ def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | 
     """Run to the end, rows going to a CSV file.
 
     Raises UsageError: the file cannot be written, or not on to its end (a full disk); what was written stays.
+    Raises BecomesStiff: the method that `auto` has chosen does not serve.
     """
     plan, settings = prepared.plan, prepared.settings
     assert plan is not None and settings.method is not None

@@ -17,6 +17,7 @@
 `paoli_schatzman`       the rival: a two-step formula for one mass and one stop
 `settings`, `problem`   the settings of a run; an initial value problem with them
 `run`                   a problem under way, and the state of its mode
+`review`                when the method of a run under way is judged again
 `recorder`              rows, arcs and transitions, and the execution's columns
 `stops`                 how runs end; `standstill` says why one cannot go on
 `diagnostics`           departures from the theorem, and what is undecided

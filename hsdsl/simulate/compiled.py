@@ -27,6 +27,7 @@ from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.interpolation import along_steps, interpolation
 from hsdsl.simulate.output_buffers import Sink
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.review import Review
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.state_layouts import StateLayouts
 from hsdsl.simulate.workspace import Workspace, Workspaces
@@ -61,9 +62,9 @@ class CompiledPlan:
         self.of_screens: dict[bool, Any] = {}  # those of its runs, by whether they are held against shadow runs
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
-    def lay(self, workspace: Workspace) -> None:
+    def lay(self, workspace: Workspace, review: Review | None = None) -> None:
         """Put everything on a workspace, unless it lies there from the run before."""
-        workspace.clear(0 if workspace.chunks.sink else self._rows, self.memory)
+        workspace.clear(0 if workspace.chunks.sink else self._rows, self.memory, review)
         if workspace.plan is self:
             return
         task, workspace.plan = workspace.task, self
@@ -128,6 +129,7 @@ class CompiledRun:
 
     plan: CompiledPlan
     workspace: Workspace
+    review: Review | None = None
     _columns: Columns | None = None
     _accumulated: Stop | None = None
 
@@ -174,7 +176,7 @@ class CompiledRun:
         return self._stop(), rest
 
     def _run(self) -> None:
-        self.plan.lay(self.workspace)
+        self.plan.lay(self.workspace, self.review)
         with Noted(self.workspace.press):
             self.workspace.simulate()
         if self.workspace.failed:

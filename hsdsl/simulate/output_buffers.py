@@ -13,6 +13,7 @@ from hsdsl.limits import DEFAULT
 from hsdsl.program import Program
 from hsdsl.runtime import structures
 from hsdsl.simulate.columns import Columns, Counts, Gathered, Packed, Shape
+from hsdsl.simulate.review import Review
 from hsdsl.simulate.state_layouts import StateLayouts
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
@@ -38,10 +39,15 @@ class OutputBuffers:
         self._memory, self._taken = DEFAULT.memory, 0  # bytes that the chunks of a run may take, and do
         self.full = False
         self.sink: Sink | None = None  # takes what is written, which then is not kept
+        self.review: Review | None = None
+        self._passed, self._mode = 0, 0  # rows of earlier chunks, and the mode of the last one
 
-    def clear(self, rows: float, memory: int) -> None:
+    def clear(self, rows: float, memory: int, review: Review | None = None) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
         self._memory, self._taken, self.full = memory, 0, False
+        if review is not None or self.review is not None:
+            self.review, self._passed = review, 0
+            self._stop_at_review()
         if max(rows, self._before, LEAST_ROWS) <= self._rows:
             return
         wanted = min(max(rows, self._before), MOST_ROWS, memory // self._row_bytes)
@@ -54,6 +60,7 @@ class OutputBuffers:
 
     def flush(self) -> None:
         """Keep what was written and open another chunk, twice as large; a small one where no more may be kept."""
+        self._look()
         if self.sink is not None:
             self.sink(self._written())
             return self._reset()
@@ -96,12 +103,30 @@ class OutputBuffers:
             "note": np.empty(notes, structures.NOTE),
         }
         table, self._rows = self.table, rows
-        table.row_room, table.arc_room, table.transition_room, table.note_room = rows, arcs, transitions, notes
+        table.arc_room, table.transition_room, table.note_room = arcs, transitions, notes
         for name, column in self._columns.items():
             setattr(table, name, column.ctypes.data)
         self._reset()
 
+    def _look(self) -> None:
+        """Review the run where its rows are due."""
+        rows, arcs = self.counts[:2]
+        self._passed += rows
+        if self.review is None:
+            return
+        begun = self._columns["arc"][:arcs]
+        begun = begun[begun["first"] < self._passed]
+        self._mode = int(begun["mode"][-1]) if len(begun) else self._mode
+        if self._passed == self.review.due:
+            row: list[float] = self._columns["values"][rows - 1].tolist()
+            self.review.look(self._mode, float(self._columns["times"][rows - 1]), row)
+
+    def _stop_at_review(self) -> None:
+        due = self._rows if self.review is None else self.review.due - self._passed
+        self.table.row_room = min(self._rows, due)
+
     def _reset(self) -> None:
+        self._stop_at_review()
         table = self.table
         table.rows = table.arcs = table.transitions = table.notes = table.alternatives_used = 0
 

@@ -18,6 +18,7 @@ from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.recorder import OutOfRoom, Progress, Recorder, Room
 from hsdsl.simulate.refinement import finer_settings
 from hsdsl.simulate.result import about, from_recorder, written
+from hsdsl.simulate.review import Judge, Review
 from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.stops import interrupted, memory
 
@@ -54,6 +55,7 @@ class Prepared(Problem):
     """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it."""
 
     plan: CompiledPlan | None
+    judges: list[Judge] = field(default_factory=list[Judge])  # of the method, until a run has passed
     finer: dict[int, Prepared] = field(default_factory=dict[int, "Prepared"])  # by the rows of the run
 
     def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] | None = None) -> Execution:
@@ -61,19 +63,24 @@ class Prepared(Problem):
 
         ``watch`` is given something to look at before the run starts, so that another thread can show how far it is.
         An interrupt (Ctrl-C) ends the run with what was computed. ``seconds`` is what was spent before.
+
+        Raises BecomesStiff: by the judge.
         """
         spent = dict(seconds or {})
         if self.plan is not None:
-            return self._by_compiled_loop(self.plan, watch, spent)
-        return self._by_python_loop(self._fresh(), watch, spent)
+            execution = self._by_compiled_loop(self.plan, watch, spent)
+        else:
+            execution = self._by_python_loop(self._fresh(), watch, spent)
+        self.judges.clear()
+        return execution
 
     def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Stop, int, dict[str, Array]]:
         """Run the compiled loop to the end and hand over what it writes, chunk by chunk.
 
-        Returns why it stopped, how many transitions it made, and the last chunk.
+        Returns why it stopped, how many transitions it made, and the last chunk. Raises BecomesStiff: by the judge.
         """
         assert self.plan is not None
-        under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()))
+        under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), self._review())
         if watch is not None:
             watch(under_way)
         stop, rest = under_way.stream(sink)
@@ -92,13 +99,20 @@ class Prepared(Problem):
         assert self.plan is not None
         return about(self.plan.problem, "c")
 
+    def _review(self) -> Review | None:
+        return Review(self.judges[0]) if self.judges else None
+
     def _fresh(self) -> Run:
         """A run that nothing is recorded of yet."""
         settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
         degree = settings.method.degree if settings.method else 0
         outputs, width = len(program.outputs), max(len(mode.states) for mode in program.modes)
         room = Room.of(settings.memory, width, degree, outputs, arithmetic.digits)
-        recorder = Recorder(arithmetic, settings.until, degree, outputs, room, scales=dict(settings.scale))
+        modes = tuple(mode.name for mode in program.modes)
+        recorder = Recorder(
+            arithmetic, settings.until, degree, outputs, room,
+            scales=dict(settings.scale), modes=modes, review=self._review(),
+        )  # fmt: skip
         problem = vars(self.with_settings(settings))
         return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder)
 
@@ -123,7 +137,7 @@ class Prepared(Problem):
         return from_recorder(run, stop, spent, self.again)
 
     def _by_compiled_loop(self, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]) -> Execution:
-        under_way = CompiledRun(plan, plan.workspaces.take())
+        under_way = CompiledRun(plan, plan.workspaces.take(), self._review())
         if watch is not None:
             watch(under_way)
         began = time.perf_counter()

@@ -15,6 +15,7 @@ import numpy as np
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.execution import Arc, Array, Transition
 from hsdsl.integrators.stepper import Polynomial, State
+from hsdsl.simulate.review import Review
 
 Outputs = Callable[..., State]
 FLOAT, DIGITS, TUPLE = 32, 250, 56  # bytes of a number in a list: a float, one of many digits; and of an empty tuple
@@ -26,12 +27,21 @@ class OutOfRoom(Exception):
 
 @dataclass
 class Room:
-    """How many more rows a run may keep; it says once that there is none."""
+    """How many more rows a run may keep; it says once that there is none.
+
+    Where ``taken`` of them are ``due`` the recorder reviews the run.
+    """
 
     left: float = inf
+    taken: int = 0
+    due: float = inf
+    look: Callable[[], float] = lambda: inf
 
     def take(self) -> None:
         """Take a row."""
+        if self.taken == self.due:
+            self.due = self.look()
+        self.taken += 1
         self.left -= 1
         if -1 <= self.left < 0:
             raise OutOfRoom
@@ -111,6 +121,18 @@ class Recorder:
     arcs: list[OpenArc] = field(default_factory=list[OpenArc])
     transitions: list[Transition] = field(default_factory=list[Transition])
     scales: dict[str, Number] = field(default_factory=dict[str, Number])  # of states in the arcs before the last
+    modes: tuple[str, ...] = ()  # of the model, in order
+    review: Review | None = None
+
+    def __post_init__(self) -> None:
+        if self.review is not None:
+            self.room.due, self.room.look = self.review.due, self._look
+
+    def _look(self) -> float:
+        assert self.review is not None
+        arc = self.arcs[-1]
+        self.review.look(self.modes.index(arc.mode), arc.times[-1], arc.values[-1])
+        return self.review.due
 
     @property
     def now(self) -> Number:

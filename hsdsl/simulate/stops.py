@@ -50,7 +50,8 @@ def limit(most: int, t: Number) -> Stop:
 def memory(most: int, t: Number) -> Stop:
     """As many rows as the run may keep."""
     full = f"the rows up to t = {show(t)} fill the {most:.3g} bytes that a run may keep (limit 'memory')"
-    ways = f"take longer steps, stream the rows to a file, or allow more with --limit memory={10 * most:.0e}"
+    longer = "take longer steps (by a larger tolerance, or by --method radau where a mode is stiff)"
+    ways = f"{longer}, stream the rows to a file, or allow more with --limit memory={10 * most:.0e}"
     return Stop("memory_limit", t, f"{full}: {ways}")
 
 

@@ -17,6 +17,7 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel, runtime
 from hsdsl.simulate.columns import Shape
 from hsdsl.simulate.output_buffers import OutputBuffers, grown
+from hsdsl.simulate.review import Review
 
 VISITED = 64
 MOST_KEPT = 4  # workspaces of one model and method
@@ -44,11 +45,11 @@ class Workspace:
         self._runtime, self._where = runtime(), ctypes.addressof(self.task)
         _workspaces[self._where] = self
 
-    def clear(self, rows: float, memory: int) -> None:
+    def clear(self, rows: float, memory: int, review: Review | None = None) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
         self.pressed = False
         self.failed.clear()
-        self.chunks.clear(rows, memory)
+        self.chunks.clear(rows, memory, review)
         if len(self._visited) > 1:  # a large set takes long to forget
             self._visited = [grown(self.task.visited, VISITED, self._width)]
         self.task.now, self.task.made = 0.0, 0

@@ -131,3 +131,74 @@ def test_a_stage_without_a_value_is_named(engine: str) -> None:
     found, fine = model.simulate(engine=engine), model.simulate(engine=engine, method="rk4", step=1e-5)
     assert found.stop.complete and fine.stop.complete
     assert [found.final[x] for x in "abc"] == pytest.approx([fine.final[x] for x in "abc"], rel=1e-4)
+
+
+# flow, start, until: nothing is stiff near the start, and a thousand steps on all is
+LATER = {
+    "Robertson's reactions, nothing there yet": (
+        "{a: -0.04*a + 1e4*b*c, b: 0.04*a - 1e4*b*c - 3e7*b**2, c: 3e7*b**2}",
+        "a: 1, b: 0, c: 0",
+        "1e4",
+    ),
+    "a decay that grows with time": ("{x: -1e3*t*(x - cos(t))}", "x: 1", "100"),
+    "kinked, and a decay that grows": ("{x: -1e3*y*(x - abs(cos(y))), y: 1}", "x: 1, y: 0", "100"),
+}
+FAST = """
+hsdsl: 1
+parameters: {rate: 1e5}
+modes:
+  first: {flow: {x: 1, y: 0}, transitions: [{when: x >= 1, to: second}]}
+  second: {flow: {x: 1, y: 1}, transitions: [{when: y >= 1, to: fast}]}
+  fast: {flow: {x: -rate*(x - cos(t)), y: -y}}
+initial: {mode: first, x: 0, y: 0}
+experiment: {until: 12, tolerance: 1e-6}
+"""
+
+
+@pytest.mark.parametrize("engine", ("c", "python"))
+@pytest.mark.parametrize("name", LATER)
+def test_a_run_that_becomes_stiff_is_made_again(name: str, engine: str) -> None:
+    model = made(*LATER[name])
+    run = model.simulate(engine=engine)
+    assert prepared(model).method.name != "radau" and run.method == "radau"
+    assert "is stiff at t = " in run.settings["method_chosen"]
+    assert run.settings["method_chosen"] == model.simulate(engine="c").settings["method_chosen"]
+    named = model.simulate(method="radau", engine=engine)
+    assert np.array_equal(run.times, named.times) and run.final == named.final
+
+
+def test_streams_ensembles_and_derivatives_of_such_runs(tmp_path: Path) -> None:
+    model = hsdsl.loads(FAST)
+    run = model.simulate()
+    assert run.method == "radau"
+    streamed = model.stream(tmp_path / "rows.csv")
+    assert streamed.method == "radau" and streamed.steps == len(run.times)
+    assert len((tmp_path / "rows.csv").read_text().splitlines()) == len(run.times) + 1
+    ensemble = model.ensemble(parameters={"rate": [1e5, 2e5]})
+    assert ensemble.method == "radau" and ensemble.state["x"][0] == run.final["x"]
+    fresh = hsdsl.loads(FAST).sensitivity("rate")
+    assert fresh.execution.method == "radau" == fresh.run.method
+
+
+# many rows that no decay asks for
+BUSY = {
+    "a clock beside a decay that has ended": """
+hsdsl: 1
+modes:
+  run:
+    flow: {x: y*(1 - x), y: 1, s: 1}
+    transitions: [{when: s >= 1/1000, to: run, reset: {s: 0}}]
+initial: {mode: run, x: 1, y: 0, s: 0}
+experiment: {until: 4000, max_transitions: 10000, tolerance: 1e-6}
+""",
+    "chaos": ROOT.format(
+        flow="{x: 10*(y - x), y: x*(28 - z) - y, z: x*y - 8/3*z}", initial="x: 1, y: 1, z: 1", until="1000"
+    ),
+    "a driven oscillator": ROOT.format(flow="{x: v, v: -x - v + cos(t)}", initial="x: 1, v: 0", until="4000"),
+}
+
+
+@pytest.mark.parametrize("name", BUSY)
+def test_many_rows_are_not_stiffness(name: str) -> None:
+    run = hsdsl.loads(BUSY[name]).simulate()
+    assert len(run.times) > 2048 and run.method == "taylor"
