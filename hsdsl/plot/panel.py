@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.names import shown
 from hsdsl.parts import short_names
 from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, modes_of
-from hsdsl.plot.style import ALARM, FAINT, LETTER, Look, fills, looks
+from hsdsl.plot.style import ALARM, FAINT, INK, LETTER, Look, fills, looks
 from hsdsl.plot.view import View
 
 if TYPE_CHECKING:
@@ -53,7 +53,8 @@ def _draw_curve(axis: Axes, run: Curves, name: str, look: Look, ends: tuple[floa
     if len(time) == 1:
         axis.plot(time, values, "o", color=look["color"], markersize=4)
     if run.ends_badly:
-        axis.axvline(run.span[1], color=ALARM, linewidth=1.2, linestyle=look["linestyle"])
+        colour = ALARM if look["color"] == INK else look["color"]  # of several runs each has its own
+        axis.axvline(run.span[1], color=colour, linewidth=1.2, linestyle=look["linestyle"])
 
 
 def label(name: str, units: Mapping[str, str]) -> str:
@@ -153,13 +154,14 @@ def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tu
         axis.hlines([guard.value] * len(spans), begins, stops, colors="#444444", linestyles="dotted", linewidth=1.1)
         close = (at for at in labels if abs(at[0] - stops[-1]) < near[0] and abs(at[1] - guard.value) < near[1])
         labels.setdefault(next(close, (stops[-1], guard.value)), []).append(guard.label)
+    start, whole = data.span[0], (data.span[1] - data.span[0]) or 1
     for (end, level), texts in labels.items():
-        above = level > (low + high) / 2
-        fits = (end - data.span[0]) / ((data.span[1] - data.span[0]) or 1) * room / LETTER
-        joined = _joined(list(dict.fromkeys(texts)), int(fits))
+        above, distinct = level > (low + high) / 2, list(dict.fromkeys(texts))
+        before = len(distinct[0]) <= (end - start) / whole * room / LETTER  # else the axis would cut it off
+        joined = _joined(distinct, int(((end - start) / whole if before else 1) * room / LETTER))
         text = axis.annotate(
-            joined, (end, level), xytext=(-3, 4 if above else -4), textcoords="offset points",
-            ha="right", va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
+            joined, (end if before else start, level), xytext=(-3 if before else 3, 4 if above else -4),
+            textcoords="offset points", ha="right" if before else "left", va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
         )  # fmt: skip
         text.set_bbox({"facecolor": "white", "alpha": 0.55, "linewidth": 0, "pad": 0.8})
         text.set_in_layout(False)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.names import did_you_mean, without_memory
+from hsdsl.names import SINCE, did_you_mean, without_memory
 from hsdsl.plot.curves import GuardLine
 from hsdsl.program import Program
 
@@ -21,7 +21,7 @@ class View:
     Attributes
     ----------
     columns : sequence of str or None
-        The states and outputs over time, in this order; None for all.
+        The states and outputs over time, in this order; None for all but those that only tell the time.
     phases : sequence of pairs or None
         States or outputs against each other, across and up; None for one pair where all modes have the same two states.
     guards : sequence of GuardLine
@@ -53,7 +53,9 @@ class View:
             A run has none of the name; the closest one is suggested.
         """
         known = names_of(runs)
-        return known if self.columns is None else [checked(name, known) for name in dict.fromkeys(self.columns)]
+        if self.columns is None:
+            return [name for name in known if name not in self._timers(known)]
+        return [checked(name, known) for name in dict.fromkeys(self.columns)]
 
     def pairs(self, runs: Sequence[Execution]) -> list[Pair]:
         """Return the pairs of phase plots.
@@ -66,9 +68,26 @@ class View:
         known = names_of(runs)
         if self.phases is not None:
             return [(checked(across, known), checked(up, known)) for across, up in dict.fromkeys(self.phases)]
-        states = list(dict.fromkeys(name for run in runs for name in without_memory(run.states)))
-        shown = len(states) == 2 and all(len(without_memory(arc.states)) == 2 for run in runs for arc in run.arcs)
+        timers = self._timers(known)
+        layouts = {states: [name for name in without_memory(states) if name not in timers]
+                   for states in {arc.states for run in runs for arc in run.arcs}}  # fmt: skip
+        states = list(dict.fromkeys(name for run in runs for name in without_memory(run.states) if name not in timers))
+        shown = len(states) == 2 and all(len(own) == 2 for own in layouts.values())
         return [(states[0], states[1])] if shown and set(states) <= set(self.names(runs)) else []
+
+    def _timers(self, known: Sequence[str]) -> set[str]:
+        """Names that only tell the time: `since`, and clocks that transitions set back; none where no other is known.
+
+        A clock has the flow 1 wherever it flows, and a transition that sets it to a number.
+        """
+        modes = () if self.program is None else self.program.modes
+        flows = [(name, text) for mode in modes for name, text in zip(mode.states, mode.flow_texts, strict=False)]
+        made = [(edge.target_states[k], text) for mode in modes for edge in mode.edges
+                for k, text in zip(edge.changes, edge.change_texts, strict=True)]  # fmt: skip
+        others = {name for name, text in flows if number_of(text) != 1}
+        set_back = {name for name, text in made if number_of(text) is not None} & {name for name, _ in flows}
+        found = {name for name in known if name.rpartition(".")[2] == SINCE or name in set_back - others}
+        return found if found < set(known) else set()
 
     def called(self, runs: Sequence[Execution]) -> list[str]:
         """Return a label for each run.
@@ -81,6 +100,14 @@ class View:
         if self.labels and len(self.labels) != len(runs):
             raise UsageError(f"expected {len(runs)} labels, one for each run, got {len(self.labels)}")
         return list(self.labels) or [f"run {k}" for k in range(1, len(runs) + 1)]
+
+
+def number_of(text: str) -> float | None:
+    """The number that a text is, or None."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 def names_of(runs: Iterable[Execution]) -> list[str]:

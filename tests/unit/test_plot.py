@@ -12,12 +12,14 @@ import hand_made
 import numpy as np
 import pytest
 
+import hsdsl
 from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.execution import Stop
 from hsdsl.plot import GuardLine, View, plot
 from hsdsl.plot.curves import CELLS, SEVERAL, curves, limits, line
 from hsdsl.plot.figure import picture
+from hsdsl.plot.style import RUNS as RUN_COLOURS
 from hsdsl.plot.style import colours
 
 FIFTY = decimals.context_of(50)
@@ -280,3 +282,52 @@ def test_nobody_s_matplotlib_is_disturbed(tmp_path):
 def test_importing_the_plot_costs_no_matplotlib():
     code = "import sys, hsdsl.plot, hsdsl.report, hsdsl.store\nassert 'matplotlib' not in sys.modules\n"
     subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)})
+
+
+CLOCKED = """hsdsl: 1
+modes:
+  wait:
+    flow: {x: v, clock: 1, v: -x, way: 1}
+    transitions:
+      - {name: tick, when: clock >= 0.4, to: hold, reset: {clock: 0}}
+  hold:
+    flow: {x: v, clock: 1, v: 1, way: 1}
+    transitions: [{name: late, when: since >= 0.7, to: wait, reset: {way: way/2}}]
+initial: {mode: wait, x: 1, v: 0, clock: 0, way: 0}
+experiment: {until: 2}
+"""
+
+
+def test_what_tells_the_time_is_shown_only_by_name():
+    """`way` has the flow 1, too, but no transition sets it to a number."""
+    run = hsdsl.loads(CLOCKED).simulate(engine="python")
+    view = View(**run.view())
+    assert view.names([run]) == ["x", "v", "way"] and view.pairs([run]) == []
+    assert View(columns=("clock", "since"), program=view.program).names([run]) == ["clock", "since"]
+    flat = hsdsl.loads(CLOCKED.replace(", way: 1", "").replace(", way: 0", "").replace("way: way/2", "x: 1"))
+    run = flat.simulate(engine="python")
+    assert View(**run.view()).pairs([run]) == [("x", "v")]
+    assert View().names([run]) == ["x", "clock", "v"]  # of a saved run nothing else is known
+    timer = hsdsl.loads(
+        "hsdsl: 1\nmodes: {m: {flow: {c: 1}, transitions: [{when: c >= 1, to: m, reset: {c: 0}}]}}\n"
+        "initial: {mode: m, c: 0}\nexperiment: {until: 2.5}\n"
+    ).simulate(engine="python")
+    assert View(**timer.view()).names([timer]) == ["c"]
+
+
+@pytest.mark.parametrize("label", ["up", "from the first gear to the second, and on", "a" * 200])
+def test_labels_of_guards_begin_inside_their_axis(label):
+    run = hand_made.bouncing_ball(bounces=3)
+    figure = _figure(run, guards=[GuardLine("fly", "h", 1.9, label), GuardLine("fly", "v", -1.9, label)])
+    axis = figure.axes[0]
+    figure.canvas.draw()
+    for text in axis.texts:
+        if text.get_text().startswith(label[:2]):
+            assert text.get_window_extent().x0 >= axis.get_window_extent().x0
+
+
+def test_ends_of_several_runs_have_their_colours():
+    runs = [replace(hand_made.bouncing_ball(bounces=n), stop=Stop("zeno", 1.0, "why")) for n in (1, 2, 3)]
+    axis = _figure(*runs).axes[1]
+    ends = [drawn for drawn in axis.get_lines() if list(drawn.get_ydata()) == [0, 1] and len(drawn.get_xdata()) == 2]
+    assert [drawn.get_color() for drawn in ends] == list(RUN_COLOURS[:3])

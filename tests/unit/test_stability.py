@@ -16,6 +16,7 @@ from hsdsl.chart.stability import stability_map
 from hsdsl.chart.stability.axes import read_axes
 from hsdsl.chart.stability.cells import Bench, Tool
 from hsdsl.chart.stability.limits import eigenvalues, grows_on_the_axis, largest_step, stability_polynomial
+from hsdsl.chart.stability.picture import plot_stability
 from hsdsl.chart.stability.table import as_csv, as_plain, as_text
 from hsdsl.errors import UsageError
 from hsdsl.integrators import INTEGRATORS
@@ -235,3 +236,12 @@ def test_processes_end_what_hangs_and_go_on() -> None:
 def test_processes_pass_errors_on() -> None:
     with pytest.raises(ValueError, match="no"):
         list(in_processes(hanging, ["a", "raise"], 1, 5.0))
+
+
+def test_cells_without_a_reference_are_hatched(tmp_path: Path) -> None:
+    text = DECAY.replace("flow: {x: -x, y: 0}", "flow: {x: -x, y: 0}\n    domain: [x >= rate/1e9]")
+    found = stability_map(hsdsl.loads(text), "h=1e-3:1e-2:2,rate=10:40:2", with_rho=False, processes=1)
+    words = {cell.word for cell in found.panels[0].cells[1]}
+    assert words == {"no reference"}
+    plot_stability(tmp_path / "map.svg", found)
+    assert "<pattern" in (tmp_path / "map.svg").read_text()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.chart.stability import Axis, Panel, StabilityMap
-from hsdsl.chart.stability.cells import CONVERGED, Cell
+from hsdsl.chart.stability.cells import CONVERGED, UNKNOWN, Cell
 from hsdsl.plot.style import to_file
 from hsdsl.plot.sweep import edges
 
@@ -26,6 +26,7 @@ COLOURS: dict[str, str] = {
     "refused": "#bbbbbb",
     "no reference": "#ffffff",
 }
+HATCH, HATCHED = "////", "#999999"  # of what has no reference: white alone is the paper's
 LIMIT = "#f0e442"
 PALEST = 0.75  # how much white is in the colour of the least accurate converged run
 
@@ -69,10 +70,15 @@ def _shade(cell: Cell, measure: str) -> float | None:
 
 
 def _draw(axes: Axes, found: StabilityMap, panel: Panel, measure: str, span: tuple[float, float]) -> None:
+    from matplotlib.collections import PolyCollection
+
     x, y = found.x, found.y
     across, up = (edges(axis.values, axis.logarithmic) for axis in (x, y))
     colours = [[_shaded(cell.word, _shade(cell, measure), span) for cell in row] for row in panel.cells]
     axes.pcolormesh(across, up, np.array(colours), rasterized=True)
+    unknown = [(i, j) for j, row in enumerate(panel.cells) for i, cell in enumerate(row) if cell.word == UNKNOWN]
+    boxes = [[(across[i + a], up[j + b]) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))] for i, j in unknown]
+    axes.add_collection(PolyCollection(boxes, facecolor="none", edgecolor=HATCHED, hatch=HATCH, linewidth=0))
     if x.logarithmic:
         axes.set_xscale("log")
     if y.logarithmic:
@@ -109,7 +115,9 @@ def _legend(figure: Figure, found: StabilityMap, columns: int, shades: str) -> N
 
     present = {cell.word for panel in found.panels for row in panel.cells for cell in row}
     handles: list[Any] = [
-        Patch(facecolor=colour, edgecolor="#888888", label=word) for word, colour in COLOURS.items() if word in present
+        Patch(facecolor=colour, edgecolor="#888888", label=word, hatch=HATCH if word == UNKNOWN else None)
+        for word, colour in COLOURS.items()
+        if word in present
     ]
     if shades and handles:
         handles[0].set_label(f"converged, {shades}")

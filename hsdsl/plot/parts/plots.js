@@ -112,7 +112,7 @@ function drawPanels() {
       const [arcOf, times, ys] = clipped(run, run.arcOf, run.times, column(run, name));
       trace(made, arcOf, times, ys, looks()[k]);
       marks(made, run, arcOf, times, ys, looks()[k]);
-      if (run.failed) ending(made, last(run.times));
+      if (run.failed) ending(made, last(run.times), runs.length > 1 ? looks()[k].colour : palette.alarm);
     });
     kept.set(canvas, made);
   });
@@ -133,9 +133,9 @@ function level({context, box, y}, {value, label}) {
   context.fillText(fitted(context, label, (box.right - box.left) / 2), box.right - 3, at + (high ? -2 : 2));
 }
 
-function ending({context, box, x}, t) {
+function ending({context, box, x}, t, colour) {
   if (x(t) < box.left || x(t) > box.right + 1) return;
-  context.strokeStyle = palette.alarm;
+  context.strokeStyle = colour;
   context.lineWidth = 1.5;
   context.beginPath(); context.moveTo(x(t), box.top); context.lineTo(x(t), box.bottom); context.stroke();
 }
