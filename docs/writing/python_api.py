@@ -30,8 +30,8 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
     "Model": (
         (
             "hsdsl.Model",
-            "simulate ensemble sweep stream sensitivity fit orbit continuation orbital_stability distance estimate"
-            " plot animate only completed sliding columns system program resolve",
+            "simulate with_outputs ensemble sweep stream sensitivity fit orbit continuation orbital_stability distance "
+            "estimate plot animate only completed sliding columns system program resolve",
         ),
     ),
     "Execution": (

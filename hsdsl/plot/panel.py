@@ -159,9 +159,10 @@ def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tu
         above, distinct = level > (low + high) / 2, list(dict.fromkeys(texts))
         before = len(distinct[0]) <= (end - start) / whole * room / LETTER  # else the axis would cut it off
         joined = _joined(distinct, int(((end - start) / whole if before else 1) * room / LETTER))
+        at, shift, side = (end, -3, "right") if before else (start, 3, "left")
         text = axis.annotate(
-            joined, (end if before else start, level), xytext=(-3 if before else 3, 4 if above else -4),
-            textcoords="offset points", ha="right" if before else "left", va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
+            joined, (at, level), xytext=(shift, 4 if above else -4), textcoords="offset points",
+            ha=side, va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
         )  # fmt: skip
         text.set_bbox({"facecolor": "white", "alpha": 0.55, "linewidth": 0, "pad": 0.8})
         text.set_in_layout(False)
