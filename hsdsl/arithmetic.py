@@ -67,7 +67,7 @@ def below(number: Any, bound: Any, one: Any, other: Any) -> Any:
 
 
 def _float_sign(x: float) -> float:
-    return float((x > 0.0) - (x < 0.0))
+    return float(x > 0.0) - float(x < 0.0)  # also of numbers of NumPy, whose truths cannot be subtracted
 
 
 def _float_heaviside(x: float) -> float:

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import sympy as sp
@@ -12,6 +13,7 @@ import sympy as sp
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.chart.result import Refused
 from hsdsl.chart.scene import Scene
+from hsdsl.lower.printer import KernelPrinter
 from hsdsl.model.values import with_parameters
 from hsdsl.system import TIME, Edge, Mode
 
@@ -91,7 +93,7 @@ def _mode(mode: Mode, index: dict[str, int], numbers: dict[sp.Symbol, Any]) -> P
     names = dict(zip((sp.Symbol(name, real=True) for name in mode.states), symbols, strict=True))
 
     def plain(expression: Any) -> sp.Expr:
-        return _in_floats(sp.sympify(expression).xreplace(names | numbers | {TIME: T}))
+        return in_floats(sp.sympify(expression).xreplace(names | numbers | {TIME: T}))
 
     def edge(e: Edge) -> PlainEdge:
         guard, condition = plain(e.surface.residual), plain(sp.true if e.condition is None else e.condition)
@@ -101,13 +103,45 @@ def _mode(mode: Mode, index: dict[str, int], numbers: dict[sp.Symbol, Any]) -> P
     return PlainMode(mode.name, mode.states, symbols, flow, tuple(map(edge, mode.edges)), mode.final)
 
 
-def _in_floats(expression: Any) -> Any:
+def in_floats(expression: Any) -> Any:
     """Write constants as floats, except those that are floats anyway (integer exponents, square roots)."""
     constants = [a for a in expression.atoms(sp.Number, sp.NumberSymbol) if not a.is_Integer]
     rounded = {a: sp.Float(a, 17) for a in constants if not (a.is_Rational and a.q & (a.q - 1) == 0)}
     return expression.xreplace(rounded)
 
 
-def as_function(mode: PlainMode, expressions: tuple[sp.Expr, ...], modules: Any = "math") -> Callable[..., Any]:
-    """Return ``f(t, x0, x1, ...) -> tuple``; the symbols are ours, so nothing of the file is ever evaluated."""
-    return sp.lambdify((T, *mode.symbols), expressions, modules=modules, cse=True)
+Functions = Mapping[str, Any]
+"""A tool's own functions by their names in kernels."""
+
+
+class _Printer(KernelPrinter):
+    """The operations of a kernel with numbers as Python writes them, for a tool that has some of the functions."""
+
+    def __init__(self, functions: Functions) -> None:
+        super().__init__()
+        self.functions = functions
+
+    def constant(self, value: Fraction) -> str:
+        number = float(value)
+        return f"{number:.0f}" if number.is_integer() and abs(number) < 2**53 else repr(number)
+
+    def call(self, name: str, arguments: list[str]) -> str:
+        if name not in self.functions:
+            raise Refused(f"`{'select' if name == 'below' else name}` is not translated")
+        return super().call(name, arguments)
+
+    def _print_solution(self, expr: Any) -> str:
+        raise Refused("`solve` is not translated")
+
+
+def as_function(
+    mode: PlainMode, expressions: tuple[sp.Expr, ...], functions: Functions = FLOAT64.functions
+) -> Callable[..., Any]:
+    """Return ``f(t, x0, x1, ...) -> tuple``; the symbols are ours, so nothing of the file is ever evaluated.
+
+    Raises
+    ------
+    Refused
+        The tool lacks a function of the model.
+    """
+    return sp.lambdify((T, *mode.symbols), expressions, [dict(functions)], printer=_Printer(functions), cse=True)

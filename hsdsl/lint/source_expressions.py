@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
-from typing import Any, Literal
+from typing import Literal
 
 from hsdsl.errors import Span
 from hsdsl.expression import Expected, parse
 from hsdsl.expression.scope import functions_called
 from hsdsl.expression.syntax import Name, Tree, walk
 from hsdsl.schema import (
+    ExperimentDocument,
     InputFile,
     InputSamples,
     ModeDocument,
@@ -21,7 +22,7 @@ from hsdsl.schema import (
     ReferenceDocument,
     SolveDocument,
 )
-from hsdsl.source import Scalar
+from hsdsl.source import Key, Scalar
 
 Role = Literal[
     "parameter",  # the value, or a bound, of the parameter `name`
@@ -42,8 +43,9 @@ Role = Literal[
     "initial",  # the initial value of the state `name`
     "scale",  # the size of the state `name`
     "experiment",  # the setting `name`
-    "reference",  # a number in `reference`
+    "reference",  # a number in `reference`: of the state, output or setting `name`, if of any
 ]
+TIME = "t"
 _WANTED: dict[Role, Expected] = {
     "domain": "inequality",
     "when": "inequality",
@@ -59,6 +61,7 @@ class SourceExpression:
 
     ``name`` is what it defines; empty for walls, surfaces and conditions. ``index`` says of `domain`, `when`, `event`,
     `if` and `reset` which wall or which transition of the mode it is. ``arguments`` are those of a function.
+    ``unit_of`` is the name whose unit it has, where that is not its own.
     """
 
     role: Role
@@ -67,6 +70,7 @@ class SourceExpression:
     mode: str | None = None
     index: int = -1
     arguments: tuple[str, ...] = ()
+    unit_of: str | None = None
 
     @cached_property
     def tree(self) -> Tree:
@@ -96,7 +100,8 @@ def written(document: ModelDocument) -> Iterator[SourceExpression]:
         yield SourceExpression("function", function.expression, name, arguments=tuple(map(str, function.of)))
     for name, entry in document.inputs.items():
         if isinstance(entry, InputSamples):
-            yield from _each("input", (*entry.times, *entry.values), name)
+            yield from _each("input", entry.times, name, TIME)
+            yield from _each("input", entry.values, name)
         elif not isinstance(entry, InputFile):
             yield SourceExpression("input", entry, name)
     for name, scalar in document.let.items():
@@ -110,19 +115,29 @@ def written(document: ModelDocument) -> Iterator[SourceExpression]:
         yield from _each("scene", (*chain.from_iterable(shape.points), *shape.sizes), "")
     for name, scalar in document.initial.__pydantic_extra__.items():
         yield SourceExpression("initial", scalar, name)
-    experiment = document.experiment
-    for name in ("until", "step", "tolerance", "relaxation", "max_transitions"):
+    yield from _of_experiment(document.experiment)
+    for reference in document.reference:
+        yield from _of_reference(reference)
+
+
+def _of_experiment(experiment: ExperimentDocument) -> Iterator[SourceExpression]:
+    for name in ("until", "step"):
+        yield from _each("experiment", (getattr(experiment, name),), name, TIME)
+    for name in ("tolerance", "relaxation", "max_transitions"):
         yield from _each("experiment", (getattr(experiment, name),), name)
     for name, scalar in experiment.scale.items():
         yield SourceExpression("scale", scalar, name)
     samples = experiment.samples
-    yield from _each("experiment", samples if isinstance(samples, list) else (samples,), "samples")
-    for reference in document.reference:
-        yield from _each("reference", _of_reference(reference), "")
+    if isinstance(samples, list):
+        yield from _each("experiment", samples, "samples", TIME)
+    else:
+        yield from _each("experiment", (samples,), "samples")
 
 
-def _each(role: Role, scalars: Iterable[Scalar | None], name: str) -> Iterator[SourceExpression]:
-    return (SourceExpression(role, scalar, name) for scalar in scalars if scalar is not None)
+def _each(
+    role: Role, scalars: Iterable[Scalar | None], name: str, unit_of: str | None = None
+) -> Iterator[SourceExpression]:
+    return (SourceExpression(role, scalar, name, unit_of=unit_of) for scalar in scalars if scalar is not None)
 
 
 def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
@@ -138,8 +153,10 @@ def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
             yield SourceExpression("when", transition.when, "", name, index)
         else:
             yield SourceExpression("event", transition.event, "", name, index)
-        further: dict[Role, Any] = {"delay": transition.delay, "priority": transition.priority}
-        yield from (SourceExpression(k, s, "", name, index) for k, s in further.items() if isinstance(s, Scalar))
+        if transition.delay is not None:
+            yield SourceExpression("delay", transition.delay, "", name, index, unit_of=TIME)
+        if isinstance(transition.priority, Scalar):
+            yield SourceExpression("priority", transition.priority, "", name, index)
         if transition.condition is not None:
             yield SourceExpression("if", transition.condition, "", name, index)
         for key, scalar in transition.reset.items():
@@ -153,14 +170,20 @@ def _of_solve(solve: SolveDocument | None, mode: str | None) -> Iterator[SourceE
     yield from (SourceExpression("equation", scalar, "", mode, index) for index, scalar in enumerate(equations))
 
 
-def _of_reference(reference: ReferenceDocument) -> Iterator[Scalar | None]:
+def _of_reference(reference: ReferenceDocument) -> Iterator[SourceExpression]:
     words = ("initial.mode", "experiment.scheme", "experiment.method")
-    yield from (scalar for key, scalar in reference.settings.items() if key not in words)
-    yield reference.trust
+    settings = {key: scalar for key, scalar in reference.settings.items() if key not in words}
+    yield from _of_states(settings)
+    yield from _each("reference", (reference.trust,), "")
     for event in reference.transitions:
-        if isinstance(event, Scalar):
-            yield event
-        else:
-            yield from (event.time, *event.before.values(), *event.after.values())
+        yield from _each("reference", (event if isinstance(event, Scalar) else event.time,), "", TIME)
+        if not isinstance(event, Scalar):
+            yield from _of_states(event.before)
+            yield from _of_states(event.after)
     for state in reference.states:
-        yield from (state.time, *state.__pydantic_extra__.values())
+        yield from _each("reference", (state.time,), "", TIME)
+        yield from _of_states(state.__pydantic_extra__)
+
+
+def _of_states(values: Mapping[Key, Scalar]) -> Iterator[SourceExpression]:
+    return (SourceExpression("reference", value, str(key).removeprefix("initial.")) for key, value in values.items())

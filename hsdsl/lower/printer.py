@@ -47,8 +47,16 @@ class KernelPrinter(PythonCodePrinter):
         """Print an expression; SymPy's own method loads what prints assignments."""
         return self._print(sp.sympify(expr))
 
+    def constant(self, value: Fraction) -> str:
+        """Print an exact constant."""
+        return constant_name(value)
+
+    def call(self, name: str, arguments: list[str]) -> str:
+        """Print a call of a function of kernels."""
+        return f"{name}({', '.join(arguments)})"
+
     def _print_Rational(self, expr):
-        return constant_name(Fraction(int(expr.p), int(expr.q)))
+        return self.constant(Fraction(int(expr.p), int(expr.q)))
 
     _print_Integer = _print_Rational
 
@@ -66,25 +74,25 @@ class KernelPrinter(PythonCodePrinter):
 
     def _print_Function(self, expr):
         if type(expr).__name__ in _RECIPROCALS:
-            return f"({constant_name(Fraction(1))}/{_RECIPROCALS[type(expr).__name__]}({self._print(expr.args[0])}))"
-        name = _NAMES[type(expr).__name__]
-        return f"{name}({', '.join(self._print(a) for a in expr.args)})"
+            inverse = self.call(_RECIPROCALS[type(expr).__name__], [self._print(expr.args[0])])
+            return f"({self.constant(Fraction(1))}/{inverse})"
+        return self.call(_NAMES[type(expr).__name__], [self._print(a) for a in expr.args])
 
     _print_Abs = _print_sign = _print_floor = _print_log = _print_Min = _print_Max = _print_Function
 
     def _print_Heaviside(self, expr):
-        return f"heaviside({self._print(expr.args[0])})"
+        return self.call("heaviside", [self._print(expr.args[0])])
 
     def _print_Pow(self, expr, rational=False):
         base, exponent = expr.base, expr.exp
         if exponent == sp.Rational(1, 2):
-            return f"sqrt({self._print(base)})"
+            return self.call("sqrt", [self._print(base)])
         if exponent.is_Integer and 2 <= exponent <= LARGEST_PRODUCT:
             factor = self.parenthesize(base, PRECEDENCE["Pow"])
             return "(" + "*".join([factor] * int(exponent)) + ")"
         if exponent.is_Number and exponent < 0:
-            return f"({constant_name(Fraction(1))}/{self.parenthesize(base**-exponent, PRECEDENCE['Pow'])})"
-        return f"pow({self._print(base)}, {self._print(exponent)})"
+            return f"({self.constant(Fraction(1))}/{self.parenthesize(base**-exponent, PRECEDENCE['Pow'])})"
+        return self.call("pow", [self._print(base), self._print(exponent)])
 
     def _print_Mul(self, expr):
         """Left-to-right: sign, then numerator factors, then one division by the product of the denominators."""
@@ -102,7 +110,7 @@ class KernelPrinter(PythonCodePrinter):
     def _product(self, coefficients, factors, negative):
         terms = [self._print(c) for c in coefficients]
         terms += [self.parenthesize(f, PRECEDENCE["Mul"]) for f in factors]
-        return ("-" if negative else "") + ("*".join(terms) if terms else constant_name(Fraction(1)))
+        return ("-" if negative else "") + ("*".join(terms) if terms else self.constant(Fraction(1)))
 
     def _print_Add(self, expr, order=None):
         text = ""

@@ -430,7 +430,9 @@ class InstanceDocument(Document):
     parameters: OpenTable[Expression] = mapping("Parameters that differ from the automaton's.", {"power": 20})
     count: Whole | None = optional("How many: `NAME[1]`, `NAME[2]` and so on, with `index` in expressions.", 20)
     at_ends: OpenTable[Expression] = mapping(
-        "Name: what `NAME[0].name` and those behind the last one are; `index` is the number beyond the end.", {"x": 0}
+        "Name: what `NAME[0].name` and those behind the last one are; `index` is the number beyond the end. For the "
+        "name of a transition, the one that `on` means there.",
+        {"x": 0, "spike": "neuron[5].spike"},
     )
 
 

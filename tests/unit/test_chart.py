@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import json
+import math
 from functools import partial
 from importlib.util import find_spec
 from math import isnan
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from sympy import Symbol
 
 import hsdsl
 from hsdsl.chart import PEERS, Refused, Scene, work_precision
@@ -18,6 +21,8 @@ from hsdsl.chart.peers import prepare
 from hsdsl.chart.result import Attempt, Result
 from hsdsl.chart.rows import COLUMNS, as_csv
 from hsdsl.chart.stopwatch import race
+from hsdsl.chart.translation import as_function, in_floats, translate
+from hsdsl.functions import FUNCTIONS
 
 MODELS = Path(hsdsl.__file__).parent.parent / "models"
 PACKAGES = {"sksundae": "sksundae", "casadi": "casadi", "heyoka": "heyoka", "diffrax": "diffrax", "scipy": "scipy"}
@@ -192,6 +197,125 @@ def test_a_condition_decides_between_edges_of_one_guard(name):
     judgement = judge(scene, prepare(name, scene)(1e-10))
     assert (judgement.verdict, judgement.transitions) == ("right", 4)
     assert judgement.error < 1e-7
+
+
+OPERATIONS = {
+    **{name: f"{name}(0.3 + x/4)" for name in FUNCTIONS if FUNCTIONS[name][1] == 1},
+    **{"acosh": "acosh(1.2 + x)", "floor": "floor(2*x + 0.25)", "sign": "sign(x - 0.4)", "abs": "abs(x - 0.4)"},
+    **{"atan2": "atan2(x, 0.7)", "min": "min(x, 0.4, 2)", "max": "max(x, 0.4)", "select": "select(x - 0.4, 2, x)"},
+    **{"a power": "x**1.3", "a square": "x**2/3", "a constant": "sqrt(2)*pi", "of time": "select(t - 0.6, 1, 0.3)"},
+}
+"""Expressions by what they use: every function of the language."""
+KINKED = ("floor", "sign", "abs", "min", "max", "select", "of time")
+NAMES = {name: getattr(math, name, None) for name in (*FUNCTIONS, "pi")} | {"abs": abs, "min": min, "max": max}
+NAMES |= {"sign": lambda x: (x > 0) - (x < 0), "select": lambda c, a, b: a if c > 0 else b}
+POINTS = ((0.1, 0.15), (0.45, 0.4), (0.7, 1.3))
+KINKS = """
+hsdsl: 1
+inputs: {u: "select(0.9 - t, 1, 0.6)"}
+modes:
+  up:
+    flow: {x: "u - min(x, 0.3)"}
+    transitions: [{when: "max(x - 0.55, abs(x - 0.1) - 4) >= 0", to: down}]
+  down:
+    flow: {x: -u - floor(t/50)}
+    transitions: [{when: x <= 0.2, to: up, reset: {x: "0.3*sign(x)"}}]
+initial: {mode: up, x: 0}
+experiment: {until: 2.3}
+"""
+
+
+@pytest.fixture(scope="module")
+def operations():
+    """A mode over x, and the operations as expressions of it."""
+    text = SHEDDING.replace("modes:", f"outputs: {json.dumps(dict(enumerated(OPERATIONS)))}\nmodes:")
+    model = hsdsl.loads(text)
+    mode = translate(Scene.of(hsdsl.loads(SHEDDING), samples=2)).modes[0]
+    names = {Symbol(name, real=True): plain for name, plain in zip("xy", mode.symbols, strict=True)}
+    plain = [in_floats(value.xreplace(names)) for value in model.system.modes[0].outputs]
+    return mode, dict(zip(OPERATIONS, plain, strict=True))
+
+
+def enumerated(operations):
+    return ((f"o{i}", text) for i, text in enumerate(operations.values()))
+
+
+def by_casadi(mode, value, points):
+    import casadi as ca
+
+    from hsdsl.chart.peers.casadi_rosenbrock import FUNCTIONS
+
+    t, x = ca.SX.sym("t"), ca.SX.sym("x")
+    function = ca.Function("f", [t, x], [as_function(mode, (value,), FUNCTIONS)(t, x, x)[0]])
+    return [float(function(*point)) for point in points]
+
+
+def by_diffrax(mode, value, points):
+    import jax.numpy as jnp
+
+    from hsdsl.chart.peers.diffrax_event import FUNCTIONS, jax
+
+    jax.config.update("jax_enable_x64", True)
+    function = as_function(mode, (value,), FUNCTIONS)
+    return [float(function(jnp.asarray(t), jnp.asarray(x), x)[0]) for t, x in points]
+
+
+def by_heyoka(mode, value, points):
+    import heyoka as hy
+
+    from hsdsl.chart.peers.heyoka_taylor import FUNCTIONS
+
+    x = hy.expression("x")
+    function = hy.cfunc([hy.expression(as_function(mode, (value,), FUNCTIONS)(hy.time, x, x)[0])], [x])
+    return [function([x], time=t)[0] for t, x in points]
+
+
+def by_numbers(mode, value, points):
+    return [as_function(mode, (value,))(t, x, x)[0] for t, x in points]
+
+
+def test_every_function_is_among_the_operations():
+    assert FUNCTIONS.keys() <= OPERATIONS.keys()
+
+
+@pytest.mark.parametrize("operation", OPERATIONS)
+@pytest.mark.parametrize("evaluate", [by_numbers, by_casadi, by_diffrax, by_heyoka])
+def test_a_peer_has_a_function_or_refuses_it_in_words(operations, evaluate, operation):
+    if find_spec(evaluate.__name__.removeprefix("by_").replace("numbers", "math")) is None:
+        pytest.skip("not installed")
+    mode, values = operations
+    if evaluate is by_heyoka and operation in KINKED:
+        with pytest.raises(Refused, match=r"`[a-z]+` is not translated"):
+            evaluate(mode, values[operation], POINTS)
+        return
+    known = [eval(OPERATIONS[operation], NAMES | {"t": t, "x": x}) for t, x in POINTS]
+    assert evaluate(mode, values[operation], POINTS) == pytest.approx(known, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", PEERS)
+def test_peers_run_a_model_with_kinks_and_jumps(name):
+    if find_spec(PACKAGES[name]) is None:
+        pytest.skip(f"{name} is not installed")
+    scene = Scene.of(hsdsl.loads(KINKS), samples=300, digits=6)
+    if name == "heyoka":
+        with pytest.raises(Refused, match=r"`[a-z]+` is not translated"):
+            prepare(name, scene)
+        return
+    judgement = judge(scene, prepare(name, scene)(1e-9))
+    assert judgement.verdict == "right", judgement
+    assert judgement.error < 1e-3
+
+
+def test_linear_equations_are_refused():
+    text = SHEDDING.replace("modes:", "solve: {unknowns: [a], equations: [2*a == x + y]}\nmodes:").replace("-2*x", "-a")
+    with pytest.raises(Refused, match="`solve` is not translated"):
+        prepare("scipy", Scene.of(hsdsl.loads(text.replace("{x: -a}", "{x: -a, y: 0}")), samples=50))
+
+
+def test_events_of_several_conditions_are_translated():
+    text = SHEDDING.replace("when: y >= 1", "event: y >= 0.7 and min(t, 3) >= 0.4")
+    scene = Scene.of(hsdsl.loads(text), samples=50)
+    assert judge(scene, prepare("scipy", scene)(1e-9)).verdict == "right"
 
 
 def test_sampled_inputs_are_refused():

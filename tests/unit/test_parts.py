@@ -707,3 +707,63 @@ def test_tied_parts_commute_also_where_modes_name_transitions_alike(engine):
     assert len(run.transitions) > 8
     assert run.verdict.theorem == "holds"
     assert any("every order leads to the same point" in reason for reason in run.verdict.reasons)
+
+
+RING = """
+hsdsl: 1
+automata:
+  cell:
+    inputs: [before]
+    modes:
+      run:
+        flow: {p: 0.5 + 0.1*index + 0.01*before, hits: 0}
+        transitions:
+          - {name: wrap, when: p >= 1, reset: {p: 0}}
+          - {name: hear, on: "c[index - 1].wrap", reset: {p: 0.9*p, hits: hits + 1}}
+          - {name: back, on: "c[index + 1].wrap", reset: {hits: hits + 100}}
+system:
+  c:
+    automaton: cell
+    count: 4
+    initial: {p: 0.1*index, hits: 0}
+    inputs: {before: "c[index - 1].p"}
+    at_ends: {p: "c[select(index, 1, 4)].p", wrap: "c[select(index, 1, 4)].wrap"}
+experiment: {until: 5}
+"""
+
+
+def test_a_ring_is_closed_by_its_ends():
+    """The same cells, each with its neighbours by name."""
+    names = [f"c{k}" for k in range(1, 5)]
+    cell = RING.split("automata:")[1].split("system:")[0]
+    kinds, instances = "", ""
+    for k, name in enumerate(names):
+        kind = cell.replace("cell:", f"k{k}:").replace("index", str(k + 1), 1)
+        kind = kind.replace('"c[index - 1].wrap"', f"{names[k - 1]}.wrap")
+        kinds += kind.replace('"c[index + 1].wrap"', f"{names[(k + 1) % 4]}.wrap")
+        start = f"initial: {{p: {0.1 * (k + 1)}, hits: 0}}"
+        instances += f"  {name}: {{automaton: k{k}, {start}, inputs: {{before: {names[k - 1]}.p}}}}\n"
+    apart = hsdsl.loads(f"hsdsl: 1\nautomata:{kinds}system:\n{instances}experiment: {{until: 5}}").simulate()
+    ring = hsdsl.loads(RING).simulate()
+    assert [float(t.time) for t in ring.transitions] == pytest.approx([float(t.time) for t in apart.transitions])
+    for k, name in enumerate(names):
+        for state in ("p", "hits"):
+            assert ring.final.state[f"c[{k + 1}].{state}"] == pytest.approx(apart.final.state[f"{name}.{state}"])
+    assert min(ring.final.state[f"c[{k}].hits"] for k in (1, 4)) > 100
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("at_ends: {p:", "at_ends: {q: 3, p:", "nothing reads 'q' beyond the ends of 'c'"),
+        ("at_ends: {p:", "at_ends: {hits: 3, p:", "nothing reads 'hits' beyond the ends of 'c'"),
+        ("wrap: ", "wraps: ", "nothing reads 'wraps' beyond the ends of 'c' (did you mean 'wrap'?)"),
+        ("1, 4)].wrap", "1, 4)].warp", "has no transition 'warp' (did you mean 'wrap'?)"),
+        ("1, 4)].wrap", "4, 1)].wrap", "'c[select(index, 4, 1)].wrap' is a transition of 'c[1]' itself"),
+        ('wrap: "c[select(index, 1, 4)].wrap"', "wrap: 3", "expected an instance and its transition, got '3'"),
+    ],
+)
+def test_ends_that_mean_nothing_are_reported(old, new, says):
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.loads(RING.replace(old, new))
+    assert says in str(error.value)

@@ -16,18 +16,12 @@ from hsdsl.chart.result import Array, Refused, Result
 from hsdsl.chart.scene import Scene
 from hsdsl.chart.translation import PlainModel, as_function, translate
 
-FUNCTIONS = [
-    {
-        **{name: getattr(ca, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},
-        **{name: getattr(ca, name) for name in ("asin", "acos", "atan", "asinh", "acosh", "atanh", "atan2", "floor")},
-        "Abs": ca.fabs,
-        "sign": ca.sign,
-        "Max": ca.fmax,
-        "Min": ca.fmin,
-        "pi": float(np.pi),
-    },
-    "math",
-]
+FUNCTIONS = {
+    **{name: getattr(ca, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},
+    **{name: getattr(ca, name) for name in ("asin", "acos", "atan", "asinh", "acosh", "atanh", "atan2", "floor")},
+    **{"abs": ca.fabs, "sign": ca.sign, "max": ca.fmax, "min": ca.fmin, "pow": ca.power},
+    "below": lambda number, bound, one, other: ca.if_else(number < bound, one, other),
+}
 
 
 def prepare(scene: Scene) -> Callable[[float], Result]:

@@ -18,6 +18,12 @@ from hsdsl.chart.scene import Scene
 from hsdsl.chart.translation import PlainMode, as_function, translate
 
 MOST_STEPS = 1 << 14
+FUNCTIONS = {
+    **{name: getattr(jnp, name) for name in ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")},
+    **{name: getattr(jnp, name) for name in ("asin", "acos", "atan", "asinh", "acosh", "atanh", "atan2", "floor")},
+    **{"abs": jnp.abs, "sign": jnp.sign, "max": jnp.maximum, "min": jnp.minimum, "pow": jnp.power},
+    "below": lambda number, bound, one, other: jnp.where(number < bound, one, other),
+}
 
 
 def prepare(scene: Scene) -> Callable[[float], Result]:
@@ -42,8 +48,8 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
 
 
 def _solver(mode: PlainMode) -> Any:
-    flow = as_function(mode, mode.flow, "jax")
-    guards = [as_function(mode, (edge.guard,), "jax") for edge in mode.edges]
+    flow = as_function(mode, mode.flow, FUNCTIONS)
+    guards = [as_function(mode, (edge.guard,), FUNCTIONS) for edge in mode.edges]
     term = dx.ODETerm(lambda t, y, args: jnp.stack([jnp.asarray(v, float) for v in flow(t, *y)]))
     conditions = [lambda t, y, args, guard=guard, **_: guard(t, *y)[0] for guard in guards]
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import heyoka as hy
 import numpy as np
@@ -16,9 +16,22 @@ import numpy as np
 from hsdsl.chart.by_arcs import ToolArc, by_arcs
 from hsdsl.chart.result import Array, Refused, Result
 from hsdsl.chart.scene import Scene
-from hsdsl.chart.translation import PlainEdge, PlainMode, PlainModel, T, as_function, translate
+from hsdsl.chart.translation import PlainEdge, PlainMode, as_function, translate
 
 NOTHING = np.empty((0, 0))
+
+
+def _of_constants_too(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    return lambda argument: function(hy.expression(argument))
+
+
+_NAMES = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh")
+FUNCTIONS = {
+    **{name: _of_constants_too(getattr(hy, name)) for name in (*_NAMES, "exp", "log", "sqrt")},
+    "atan2": lambda y, x: hy.atan2(hy.expression(y), hy.expression(x)),
+    "pow": lambda base, exponent: hy.expression(base) ** hy.expression(exponent),
+}
+"""Its own functions, but for those with kinks and jumps: a Taylor series has neither."""
 
 
 def prepare(scene: Scene) -> Callable[[float], Result]:
@@ -27,10 +40,11 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
     kept: dict[tuple[int, float], Any] = {}
     counted = [0]
     stops = [any(_stops(edge, k) for edge in mode.edges) for k, mode in enumerate(model.modes)]
+    systems = [_system(mode) for mode in model.modes]
 
     def integrate(tolerance: float, k: int, t: float, x: Sequence[float], times: Array, until: float) -> ToolArc:
         if (k, tolerance) not in kept:
-            kept[k, tolerance] = _integrator(model, k, tolerance, counted)
+            kept[k, tolerance] = _integrator(model.modes[k], systems[k], k, tolerance, counted)
         ta, end = kept[k, tolerance], None
         if stops[k]:
             end = _reached(_begun(ta, t, x).propagate_until(until)[0], ta)
@@ -72,18 +86,31 @@ def _stops(edge: PlainEdge, k: int) -> bool:
     return edge.target != k or edge.conditional
 
 
-def _integrator(model: PlainModel, k: int, tolerance: float, counted: list[int]) -> Any:
-    mode = model.modes[k]
-    variables = hy.make_vars(*(s.name for s in mode.symbols)) if len(mode.symbols) > 1 else [hy.make_vars("x0")]
-    names = dict(zip(mode.symbols, variables, strict=True)) | {T: hy.time}
-    system = list(zip(variables, (hy.from_sympy(f, names) for f in mode.flow), strict=True))
-    events = [_event(mode, i, k, names, counted) for i in range(len(mode.edges))]
-    return hy.taylor_adaptive(system, [0.0] * len(variables), tol=tolerance, t_events=events)
+class System(NamedTuple):
+    """A mode in its expressions: variables, their derivatives, and guards."""
+
+    variables: Sequence[Any]
+    flow: Sequence[Any]
+    guards: Sequence[Any]
 
 
-def _event(mode: PlainMode, i: int, k: int, names: Any, counted: list[int]) -> Any:
+def _system(mode: PlainMode) -> System:
+    variables = [hy.expression(s.name) for s in mode.symbols]
+
+    def expressions(of: tuple[Any, ...]) -> list[Any]:
+        return [hy.expression(value) for value in as_function(mode, of, FUNCTIONS)(hy.time, *variables)]
+
+    return System(variables, expressions(mode.flow), expressions(tuple(edge.guard for edge in mode.edges)))
+
+
+def _integrator(mode: PlainMode, system: System, k: int, tolerance: float, counted: list[int]) -> Any:
+    flow = list(zip(system.variables, system.flow, strict=True))
+    events = [_event(mode, i, k, guard, counted) for i, guard in enumerate(system.guards)]
+    return hy.taylor_adaptive(flow, [0.0] * len(flow), tol=tolerance, t_events=events)
+
+
+def _event(mode: PlainMode, i: int, k: int, guard: Any, counted: list[int]) -> Any:
     edge = mode.edges[i]
-    guard = hy.from_sympy(edge.guard, names)
     rising = hy.event_direction.positive
     if _stops(edge, k):
         return hy.t_event(guard, direction=rising)

@@ -62,6 +62,8 @@ class Parts:
         self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
         self.parts = tuple(map(self._with_timer, self.parts))
         self.initial = self._initial()
+        if not symbols.resolver.findings.diagnostics:  # else what reads them may not have been looked at
+            self.board.check_ends()
 
     def _solve(self, document: SystemDocument) -> None:
         """Solve the file's equations, in which definitions of parts have the unknowns as symbols of their own."""

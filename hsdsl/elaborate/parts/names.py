@@ -21,7 +21,7 @@ from hsdsl.expression import ExpressionError, parse, selection, syntax
 from hsdsl.expression.plain import RANGES
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
-from hsdsl.names import SINCE, counted, did_you_mean
+from hsdsl.names import SINCE, counted, did_you_mean, shown
 from hsdsl.schema import PartModeDocument
 from hsdsl.source import Key, Scalar
 
@@ -47,6 +47,7 @@ class Board:
     _solving: list[tuple[str, str]] = field(default_factory=list)
     _active: list[tuple[str, str]] = field(default_factory=list)
     _broken: set[tuple[str, Any, str]] = field(default_factory=set)
+    _read_beyond: set[tuple[str, str]] = field(default_factory=set)  # (name of several, attribute)
 
     @property
     def constants(self) -> frozenset[Any]:
@@ -174,14 +175,32 @@ class Board:
             return Refusal("HS111", f"the index `{text}` is not a whole number", None)
         return int(value.expr)
 
-    def _beyond(self, base: str, number: int, attribute: str) -> Meaning:
+    def at_end(self, base: str, number: int, attribute: str) -> Scalar | Refusal:
+        """What a name is given as beyond the first and the last of several instances."""
         several = self.roster.counted[base]
+        self._read_beyond.add((base, attribute))
         given = {str(key): scalar for key, scalar in several[0].given.at_ends.items()}
-        if attribute not in given:
-            message = f"there is no {base}[{number}]: '{base}' has {counted(len(several), 'instance')}"
-            return Refusal("HS111", message, f"give its value under `at_ends` of '{base}': {{{attribute}: ...}}")
+        if attribute in given:
+            return given[attribute]
+        message = f"there is no {base}[{number}]: '{base}' has {counted(len(several), 'instance')}"
+        return Refusal("HS111", message, f"give its value under `at_ends` of '{base}': {{{attribute}: ...}}")
+
+    def check_ends(self) -> None:
+        """Report names of `at_ends` that nothing reads; to know that, everything must have been worked out."""
+        for base, several in self.roster.counted.items():
+            read = sorted(attribute for of, attribute in self._read_beyond if of == base)
+            for key in several[0].given.at_ends:
+                if str(key) not in read:
+                    message = f"nothing reads '{shown(key)}' beyond the ends of '{base}'"
+                    hint = did_you_mean(key, read) or f"remove it, or read {base}[index - 1].{shown(key)}"
+                    self.symbols.report(key.place, "HS351", message, hint)
+
+    def _beyond(self, base: str, number: int, attribute: str) -> Meaning:
+        given = self.at_end(base, number, attribute)
+        if isinstance(given, Refusal):
+            return given
         key = ("at_ends", base, number, attribute)
-        return self.evaluated(key, given[attribute], Names(self, index=number), f"{base}[{number}].{attribute}")
+        return self.evaluated(key, given, Names(self, index=number), f"{base}[{number}].{attribute}")
 
     def of(self, one: Instance, attribute: str, lenient: bool = False) -> Meaning:
         """What a name of an instance is to the others: a choice among what it is in each mode."""

@@ -11,7 +11,7 @@ from hsdsl.elaborate.parts.instances import Instance
 from hsdsl.elaborate.parts.names import IN_MODE, MEMBER, Board, Names, whole_value
 from hsdsl.elaborate.symbols import Meanings
 from hsdsl.expression.scope import Meaning, Refusal, Scope, Value, state
-from hsdsl.names import counted, did_you_mean
+from hsdsl.names import did_you_mean
 from hsdsl.source import Scalar
 
 _SENTENCE = "an initial value is an expression of parameters and of other initial values"
@@ -65,14 +65,8 @@ class Starts:
 
     def beyond(self, base: str, number: int, attribute: str, symbolic: bool) -> Meaning:
         """What a name is beyond the first and the last of several instances."""
-        several = self.board.roster.counted[base]
-        given = {str(key): scalar for key, scalar in several[0].given.at_ends.items()}
-        if attribute not in given:
-            hint = f"give its value under `at_ends` of '{base}': {{{attribute}: ...}}"
-            return Refusal(
-                "HS111", f"there is no {base}[{number}]: '{base}' has {counted(len(several), 'instance')}", hint
-            )
-        return self._number(None, given[attribute], symbolic, number)
+        given = self.board.at_end(base, number, attribute)
+        return given if isinstance(given, Refusal) else self._number(None, given, symbolic, number)
 
 
 def given_to(one: Instance) -> dict[str, Scalar]:

@@ -145,8 +145,8 @@ def _target(board: Board, one: Instance, source: int, document: PartTransitionDo
     return None
 
 
-def _events(board: Board, names: Names, label: Scalar) -> tuple[Event, ...] | None:
-    """The events that `on` names; none where their instance is beyond the ends."""
+def _events(board: Board, names: Names, label: Scalar, beyond: bool = False) -> tuple[Event, ...] | None:
+    """The events that `on` names, or `at_ends` where that names one ``beyond`` the ends; none further out."""
     found = MEMBER.fullmatch(label.value)
     if found is None:
         board.report_once(label, "HS353", f"expected an instance and its transition, got '{shown(label.value)}'",
@@ -167,7 +167,10 @@ def _events(board: Board, names: Names, label: Scalar) -> tuple[Event, ...] | No
         board.report_once(label, sender.code, sender.message, sender.hint)
         return None
     if isinstance(sender, int):
-        return ()
+        given = board.at_end(base, sender, name)
+        if beyond or isinstance(given, Refusal):
+            return ()
+        return _events(board, replace(names, index=sender), given, beyond=True)
     senders = [other for other in several or [] if other is not names.instance] or ([sender] if sender else [])
     known = [label for other in senders for mode, inner in other.modes for label in _labels(board, mode, inner)]
     if senders and name not in known:

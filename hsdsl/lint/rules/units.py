@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from fractions import Fraction
 
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.subject import Subject
@@ -12,12 +11,15 @@ from hsdsl.names import closest, shown
 
 PLAIN = "divide by something in the same unit, or give the factor a name and its unit"
 _VALUES = {
-    "reset": "the new value of",
-    "initial": "the initial value of",
-    "scale": "the scale of",
-    "parameter": "the parameter",
-    "input": "the input",
-    "output": "the output",
+    "reset": "the new value of '{}'",
+    "initial": "the initial value of '{}'",
+    "scale": "the scale of '{}'",
+    "parameter": "the parameter '{}'",
+    "input": "the input '{}'",
+    "output": "the output '{}'",
+    "reference": "the value of '{}'",
+    "experiment": "`{}`",
+    "delay": "the delay",
 }
 
 
@@ -46,24 +48,21 @@ def misfits(kind: str, hint: str | None = None) -> Callable[[Subject], Iterator[
 
 def flow_units(subject: Subject) -> Iterator[Finding]:
     """Find flows in another unit than that of their state by time."""
-    time = subject.units.of("t")
-    if time is not None:
-        yield from _differing(subject, {"flow": "the flow of"}, time.to(Fraction(-1)))
+    return _differing(subject, {"flow": "the flow of '{}'"})
 
 
 def value_units(subject: Subject) -> Iterator[Finding]:
     """Find values in another unit than that of their name."""
-    return _differing(subject, _VALUES, Unit())
+    return _differing(subject, _VALUES)
 
 
-def _differing(subject: Subject, roles: dict[str, str], factor: Unit) -> Iterator[Finding]:
-    """Find expressions in another unit than that of their name times a factor."""
+def _differing(subject: Subject, roles: dict[str, str]) -> Iterator[Finding]:
+    """Find expressions in another unit than they should be in."""
     for checked in subject.units.checked:
-        written, own = checked.written, subject.units.of(str(checked.written.name))
-        if written.role not in roles or own is None or not isinstance(checked.measure, Unit):
+        written, expected = checked.written, checked.expected
+        if written.role not in roles or expected is None or not isinstance(checked.measure, Unit):
             continue
-        expected = own.times(factor)
         if not expected.same(checked.measure):
-            unit = checked.measure.compared_with(expected)
-            message = f"{roles[written.role]} '{written.name}' is in {unit}, and should be in {expected}"
-            yield Finding(written.span(), message)
+            what = "this time" if written.role in ("input", "reference") and written.unit_of else roles[written.role]
+            what, unit = what.format(written.name), checked.measure.compared_with(expected)
+            yield Finding(written.span(), f"{what} is in {unit}, and should be in {expected}")

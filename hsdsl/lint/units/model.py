@@ -4,24 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 
-from hsdsl.lint.source_expressions import SourceExpression
+from hsdsl.lint.source_expressions import TIME, SourceExpression
 from hsdsl.lint.units.unit import Unit, UnknownUnit, read
 from hsdsl.lint.units.walk import Any_, Measure, Misfit, Walk
 from hsdsl.names import SINCE
 from hsdsl.schema import ModelDocument, ParameterEntry
 from hsdsl.source import Scalar
 
-_VALUES = ("parameter", "input", "initial", "scale", "output")
+_VALUES = ("parameter", "input", "reset", "output", "initial", "scale", "reference", "experiment", "delay")
 
 
 @dataclass(frozen=True)
 class Checked:
-    """An expression, its unit, and what does not fit in it."""
+    """An expression, its unit, the one that it should have, if that is known, and what does not fit in it."""
 
     written: SourceExpression
     measure: Measure
+    expected: Unit | None
     misfits: tuple[Misfit, ...]
 
 
@@ -77,16 +79,21 @@ class Units:
 
     @cached_property
     def checked(self) -> tuple[Checked, ...]:
-        """Every expression that units say something about."""
-        roles = (*_VALUES, "let", "flow", "domain", "when", "if", "reset")
-        return tuple(self._check(e) for e in self._expressions if e.role in roles) if self.given else ()
+        """Every expression but functions, which have units where they are called."""
+        return tuple(self._check(e) for e in self._expressions if e.role != "function") if self.given else ()
 
     def _check(self, written: SourceExpression) -> Checked:
         walk = Walk(lambda name: self._name(written.mode, name), written.scalar.value, self._functions)
         measure = walk.measure(written.tree)
         if written.role == "let":
             self._lets.setdefault(str(written.name), {})[written.mode] = measure
-        return Checked(written, measure, tuple(walk.misfits))
+        return Checked(written, measure, self._expected(written), tuple(walk.misfits))
+
+    def _expected(self, written: SourceExpression) -> Unit | None:
+        own, time = self.of(str(written.unit_of or written.name)), self.of(TIME)
+        if written.role == "flow":
+            return None if own is None or time is None else own.times(time.to(Fraction(-1)))
+        return own if written.role in _VALUES else None
 
     def _name(self, mode: str | None, name: str) -> Measure:
         unknown: Any_ = "unknown"
