@@ -73,6 +73,10 @@ _HINTS = {  # what to write instead of names
     CASES: "if ifelse where piecewise Piecewise heaviside Heaviside step unit_step unitstep",
 }
 NAMES = {name: hint for hint, names in _HINTS.items() for name in names.split()}
+MISCOUNTED = {  # functions by a number of arguments that other languages give them
+    ("log", 2): "write log(x)/log(b) for the logarithm to the base b",
+    ("atan", 2): "write atan2(y, x)",
+}
 
 _OPERATORS = {  # of other languages, by the code of their error: what to write instead
     "HS108": {

@@ -7,12 +7,13 @@ from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any
 
 import sympy as sp
 
-from hsdsl.expression.expression_hints import NAMES, derivative_of, timed, unit
-from hsdsl.expression.syntax import Call, ExpressionError, Name, Number, Tree, walk
+from hsdsl.expression.expression_hints import MISCOUNTED, NAMES, derivative_of, timed, unit
+from hsdsl.expression.syntax import Call, ExpressionError, Name, Number, Product, Tree, walk
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import SINCE, WORDS, closest, did_you_mean, shown
 
@@ -93,13 +94,13 @@ class Scope:
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
         faults: list[ExpressionError] = []
-        end = 0
+        end, measured = 0, frozenset(_behind_numbers(tree))
         for node in walk(tree):
             if node.start < end:
                 continue
             fault = None
             if isinstance(node, Name):
-                fault = self._name(node)
+                fault = self._name(node, node.start in measured)
             elif isinstance(node, Call):
                 fault = self._call(node)
                 end = node.end if fault and timed(node.function, None) else end  # its units mean nothing here
@@ -115,7 +116,7 @@ class Scope:
             isinstance(function, Function) and function.tree is None for function in called
         )
 
-    def _name(self, node: Name) -> ExpressionError | None:
+    def _name(self, node: Name, measured: bool) -> ExpressionError | None:
         if node.name in CONSTANTS:
             return None
         if node.name in FUNCTIONS or isinstance(self.values.get(node.name), Function):
@@ -125,7 +126,7 @@ class Scope:
             return _dotted(node, node.name)
         if node.name not in self.values:
             message = f"nothing here is called '{shown(node.name)}'"
-            return ExpressionError.at(node, "HS111", message, self._hint(node.name))
+            return ExpressionError.at(node, "HS111", message, self._hint(node.name, measured))
         value = self.values[node.name]
         if isinstance(value, Refusal):
             return ExpressionError.at(node, value.code, value.message, value.hint)
@@ -168,17 +169,27 @@ class Scope:
         arguments = "x" if most == fewest == 1 else "x, y"
         return _miscounted(node, fewest, most, f"{node.function}({arguments})")
 
-    def _hint(self, name: str) -> str | None:
+    def _hint(self, name: str, measured: bool) -> str | None:
+        """What to write for an unknown name; one that is ``measured`` is the factor behind a number."""
         known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
-        if unit(name) and closest(name, known) is None:
+        if measured and unit(name) and closest(name, known) is None:
             return unit(name)
         if name in NAMES:
             return NAMES[name]
         near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS])
-        return near or "define it, under `parameters`, `inputs` or `let`"
+        more = "; a unit belongs under `units`" if unit(name) else ""
+        return (near or "define it, under `parameters`, `inputs` or `let`") + more
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states
+
+
+def _behind_numbers(tree: Tree) -> Iterator[int]:
+    """Where each factor of a product begins that stands behind a number, as the unit of a quantity does."""
+    for product in walk(tree):
+        if isinstance(product, Product):
+            pairs = pairwise(factor for _, factor in product.factors)
+            yield from (factor.start for before, factor in pairs if isinstance(before, Number))
 
 
 def _dotted(node: Name | Call, name: str) -> ExpressionError:
@@ -209,7 +220,7 @@ def _miscounted(node: Call, fewest: int, most: int | None, example: str) -> Expr
     number = f"{fewest}" if most == fewest else f"at least {fewest}"
     noun = "argument" if fewest == 1 else "arguments"
     message = f"`{node.function}` takes {number} {noun}, not {given}"
-    return ExpressionError.at(node, "HS113", message, f"write {example}")
+    return ExpressionError.at(node, "HS113", message, MISCOUNTED.get((node.function, given)) or f"write {example}")
 
 
 def functions_called(tree: Tree) -> Iterator[str]:

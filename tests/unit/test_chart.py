@@ -313,7 +313,7 @@ def test_linear_equations_are_refused():
 
 
 def test_events_of_several_conditions_are_translated():
-    text = SHEDDING.replace("when: y >= 1", "event: y >= 0.7 and min(t, 3) >= 0.4")
+    text = SHEDDING.replace("when: y >= 1", "event: 'y >= 0.7 and min(t, 3) >= 0.4'")
     scene = Scene.of(hsdsl.loads(text), samples=50)
     assert judge(scene, prepare("scipy", scene)(1e-9)).verdict == "right"
 
