@@ -13,6 +13,7 @@ from hsdsl.chart.scene import Scene
 from hsdsl.chart.translation import PlainMode, PlainModel, as_function
 
 MOST_SECONDS = 60.0
+TIE = 1e-12  # of a run: times that are no further apart are one
 
 
 class ToolArc(NamedTuple):
@@ -36,7 +37,9 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
         [(i, mode.states.index(name)) for i, name in enumerate(scene.states) if name in mode.states]
         for mode in model.modes
     ]
+    flows = [as_function(mode, mode.flow) for mode in model.modes]
     grid, until = scene.grid, float(scene.grid[-1])
+    tie = TIE * max(abs(float(grid[0])), abs(until))
     most = 10 * len(scene.exact.transitions) + 100
 
     def run(tolerance: float) -> Result:
@@ -44,7 +47,7 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
         passed: list[tuple[int, int]] = []  # where each arc's samples end, and its mode
         t, x, k, first, count = float(grid[0]), model.x, model.start, 0, 0
         began = time.perf_counter()
-        problem = None
+        problem, passed_by = None, 0
         while True:
             mode, begin = model.modes[k], t
             arc = integrate(tolerance, k, t, x, grid[first:], until)
@@ -57,10 +60,13 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
                 break
             taken = _taken(choices[k][arc.edge], t, arc.x)
             if taken is None:
-                if t == begin:
+                passed_by = passed_by + 1 if t <= begin else 0
+                if passed_by > len(mode.edges):
                     problem = f"stays at t = {t:.6g}, at a guard whose conditions do not hold"
                     break
-                x = arc.x
+                t, x = _past(flows[k], t, arc.x, min(tie, until - t))
+                if t >= until:
+                    break
                 continue
             count += 1
             x = resets[k][taken](t, *arc.x)
@@ -87,6 +93,13 @@ def _alternatives(mode: PlainMode, guard: object) -> list[Choice]:
 def _taken(choices: Sequence[Choice], t: float, x: Sequence[float]) -> int | None:
     """The edge that is taken where their guard is reached; None where no condition holds."""
     return next((i for i, holds in choices if holds(t, *x)[0]), None)
+
+
+def _past(
+    flow: Callable[..., tuple[float, ...]], t: float, x: Sequence[float], tie: float
+) -> tuple[float, list[float]]:
+    """A point right behind a surface that is passed, where the tool does not find it again."""
+    return t + tie, [float(value) + tie * rate for value, rate in zip(x, flow(t, *x), strict=True)]
 
 
 def _modes(passed: Sequence[tuple[int, int]], model: PlainModel, samples: int) -> Array:

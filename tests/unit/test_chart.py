@@ -307,9 +307,10 @@ def test_peers_run_a_model_with_kinks_and_jumps(name):
 
 
 def test_linear_equations_are_refused():
-    text = SHEDDING.replace("modes:", "solve: {unknowns: [a], equations: [2*a == x + y]}\nmodes:").replace("-2*x", "-a")
+    solve = 'solve: {unknowns: [a, b], equations: ["2*a + x*b == x", "a - b == 1"]}'
+    text = SHEDDING.replace("modes:", f"{solve}\nmodes:").replace("-2*x", "-a")
     with pytest.raises(Refused, match="`solve` is not translated"):
-        prepare("scipy", Scene.of(hsdsl.loads(text.replace("{x: -a}", "{x: -a, y: 0}")), samples=50))
+        prepare("scipy", Scene.of(hsdsl.loads(text), samples=50))
 
 
 def test_events_of_several_conditions_are_translated():
