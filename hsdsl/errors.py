@@ -234,9 +234,10 @@ CODES: dict[str, str] = {
     "HS353": "a part whose transitions cannot be what is written",
     "HS354": "a name that a mode of a part does not define",
     # what is imported
-    "HS331": "a file that is not a model of SpaceEx",
+    "HS331": "a file to import that is no model of SpaceEx or SBML",
     "HS332": "a part of a SpaceEx model that no model of this language can keep",
     "HS333": "a configuration of SpaceEx that does not say where a run starts",
+    "HS334": "a part of an SBML model that no model of this language can keep",
 }
 
 TOO_LONG = "HS122"

@@ -13,10 +13,10 @@ from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 from hsdsl.names import counted
 
-FILE = "A SpaceEx model (.xml)."
-CFG = "Its configuration; left out, the file of the same name that ends in .cfg."
+FILE = "A model of SpaceEx or SBML (.xml)."
+CFG = "The configuration of a SpaceEx model; left out, the file of the same name that ends in .cfg."
 OUT = "The model's file (.yaml); left out, the model is printed."
-URGENT = "Make a transition as soon as its guard holds, where SpaceEx may wait."
+URGENT = "SpaceEx: make a transition as soon as its guard holds, where SpaceEx may wait."
 
 
 def import_(
@@ -30,16 +30,15 @@ def import_(
     quiet: Quiet = False,
     limit: Limit = None,
 ) -> None:
-    """Import a SpaceEx model: write it as a model that runs, or say what cannot be kept."""
+    """Import a model of SpaceEx or SBML: write it as a model that runs, or say what cannot be kept."""
     with answering(json, None, limit):
         check_target(out, "--out", (".yaml", ".yml"))
         if out is not None and out.exists() and not force:
             raise UsageError(f"--out {out}: the file is there already", "--force replaces it")
         from hsdsl.model import loads
-        from hsdsl.spaceex import imported
         from hsdsl.store.atomic import replacing
 
-        text = imported(file, cfg, until, urgent)
+        text = _imported(file, cfg, until, urgent)
         system = loads(text).system
         if out is None:
             print(text, end="")
@@ -51,3 +50,17 @@ def import_(
             print_json({"file": str(out), "modes": len(system.modes), "transitions": edges})
         elif not quiet:
             say(f"wrote {out}: {counted(len(system.modes), 'mode')}, {counted(edges, 'transition')}")
+
+
+def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool) -> str:
+    """The text of the model in a file of one of the formats."""
+    from hsdsl import sbml, spaceex
+    from hsdsl.files.model import read_bytes
+    from hsdsl.source.xml import read_xml
+
+    root = read_xml(str(file), read_bytes(file), sbml.DEEPEST)
+    if not sbml.is_sbml(root):
+        return spaceex.imported(file, cfg, until, urgent)
+    if cfg is not None or urgent:
+        raise UsageError(f"{'--cfg' if cfg else '--urgent'} is for models of SpaceEx, and {file} is one of SBML")
+    return sbml.imported(root, until)

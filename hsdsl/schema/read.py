@@ -22,6 +22,7 @@ from hsdsl.schema.value_suggestions import assigned, undifferentiated
 from hsdsl.source import Mapping, Node, NodePath, Scalar, Sequence, SourceRange, child, descend, keys
 
 _MOST_READINGS = 8
+_MARKUP = "`hsdsl import` makes one of a file of SBML or SpaceEx"
 _TAGS = "|".join(("expression", "mapping", "list", "samples", "file", *KINDS))  # of a union; no key in the file
 _TAG = re.compile(rf"<(?:{_TAGS})>|function-\w+\[.*")
 
@@ -128,7 +129,9 @@ def _diagnostic(root: Node, fault: ErrorDetails) -> Diagnostic:
     if not code.startswith("HS"):
         return place.diagnostic("HS204", "this value is not possible here")
     if not path:
-        hint = "a model begins with hsdsl: 1; is this file one?"
+        text = _plain(root)
+        other = isinstance(text, Scalar) and text.value.lstrip().startswith("<")
+        hint = f"a model begins with hsdsl: 1; {_MARKUP if other else 'is this file one?'}"
         return place.diagnostic(code, f"expected a model, got {described(_plain(root))}", hint)
     context = fault.get("ctx", {})
     message, hint, last = context["message"], context.get("hint"), _untagged(path)[-1]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from hsdsl.errors import ModelError
 from hsdsl.names import shown
 from hsdsl.source.text import Text, decode
+from hsdsl.source.xml import Passage
 from hsdsl.spaceex.formula import Relation, checked, relations
-from hsdsl.spaceex.xml import Passage
 
 _ENTRY = re.compile(r"[ \t]*([A-Za-z][\w-]*)[ \t]*=[ \t]*(\"[^\"]*\"|'[^']*'|[^#\n\"']*)[ \t]*(?:#[^\n]*)?(?:\n|$)")
 _BLANK = re.compile(r"[ \t]*(?:#[^\n]*)?(?:\n|$)")

@@ -9,8 +9,8 @@ from typing import TypeVar
 from hsdsl.errors import ModelError
 from hsdsl.expression.scope import RESERVED
 from hsdsl.names import closest, shown
+from hsdsl.source.xml import Element, Passage, read_xml
 from hsdsl.spaceex.formula import Relation, checked, relations
-from hsdsl.spaceex.xml import Element, Passage, read_xml
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 T = TypeVar("T")
@@ -81,7 +81,7 @@ def components(path: str, data: bytes) -> dict[str, Component]:
     """
     root = read_xml(path, data)
     if root.tag != "sspaceex":
-        raise ModelError([root.fault("HS331", f"expected <sspaceex>, got <{shown(root.tag, 40)}>")])
+        raise ModelError([root.fault("HS331", f"expected <sspaceex> or <sbml>, got <{shown(root.tag, 40)}>")])
     found: dict[str, Component] = {}
     for element in root.all("component"):
         _once(found, element.attribute("id"), _component(element), element)

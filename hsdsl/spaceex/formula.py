@@ -13,7 +13,7 @@ from hsdsl.expression.parse import parse
 from hsdsl.expression.plain import names_in, value
 from hsdsl.expression.syntax import ExpressionError, Name, walk
 from hsdsl.names import shown
-from hsdsl.spaceex.xml import Passage
+from hsdsl.source.xml import Passage
 
 _AND = re.compile(r"&&?|\band\b")
 _RELATION = re.compile(r":=|==|<=|>=|!=|<|>|=")

@@ -11,8 +11,8 @@ from hsdsl.expression.plain import names_in
 from hsdsl.expression.scope import RESERVED
 from hsdsl.expression.syntax import ExpressionError
 from hsdsl.names import closest, shown
+from hsdsl.source.xml import Passage
 from hsdsl.spaceex.document import Bind, Component, Param
-from hsdsl.spaceex.xml import Passage
 
 MOST_INSTANCES, DEEPEST = 1000, 20
 Origin = tuple[str, str]  # path of the instance that declares a parameter, and its name there

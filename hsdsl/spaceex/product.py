@@ -8,10 +8,10 @@ from itertools import islice, product
 
 from hsdsl import limits
 from hsdsl.errors import ModelError
+from hsdsl.source.xml import Element
 from hsdsl.spaceex.document import Jump, Location
 from hsdsl.spaceex.formula import Relation
 from hsdsl.spaceex.network import Instance, Network
-from hsdsl.spaceex.xml import Element
 
 Key = tuple[str, ...]  # the location of each instance, by id
 MOST_EDGES = 100_000

@@ -12,12 +12,12 @@ from hsdsl.expression.plain import names_in, value
 from hsdsl.expression.scope import symbol
 from hsdsl.lower.straight import replaced
 from hsdsl.names import closest, did_you_mean, shown
+from hsdsl.source.xml import Element
 from hsdsl.spaceex.configuration import DOT, Configuration
 from hsdsl.spaceex.drafts import ModeDraft
 from hsdsl.spaceex.formula import Relation, renamed, within
 from hsdsl.spaceex.network import Network
 from hsdsl.spaceex.product import Key
-from hsdsl.spaceex.xml import Element
 
 
 @dataclass(frozen=True)

@@ -88,8 +88,8 @@ class Element:
         return self.attributes[name]
 
 
-def read_xml(path: str, data: bytes) -> Element:
-    """The root element of a file.
+def read_xml(path: str, data: bytes, deepest: int = DEEPEST) -> Element:
+    """The root element of a file whose elements are nested at most ``deepest`` deep.
 
     Raises ModelError: no well-formed XML, a document type, too large or too deep.
     """
@@ -99,12 +99,12 @@ def read_xml(path: str, data: bytes) -> Element:
         message = f"the encoding '{shown(name)}' is not read"
         raise ModelError([Diagnostic("HS331", message, Span(path, 1, 1), "save the file as UTF-8")])
     text = decode(path, data.decode("latin-1").encode() if _ENCODINGS[name] == "latin-1" else data)
-    return _Reader(text).root()
+    return _Reader(text, deepest).root()
 
 
 class _Reader:
-    def __init__(self, file: Text) -> None:
-        self.file = file
+    def __init__(self, file: Text, deepest: int) -> None:
+        self.file, self.deepest = file, deepest
         self.parser: Any = expat.ParserCreate("utf-8")
         self.open: list[Element] = []
         self.first: Element | None = None
@@ -131,8 +131,8 @@ class _Reader:
             self.refuse(
                 f"the file has more than {limits.current().values:,} elements", "allow more with --limit values="
             )
-        if len(self.open) >= DEEPEST:
-            self.refuse(f"elements are nested more than {DEEPEST} deep", None)
+        if len(self.open) >= self.deepest:
+            self.refuse(f"elements are nested more than {self.deepest} deep", None)
         element = Element(self.file, tag, attributes, *self.here)
         if self.open:
             self.open[-1].children.append(element)
@@ -146,7 +146,7 @@ class _Reader:
 
     def document_type(self, *_: object) -> NoReturn:
         """Refuse what could declare entities."""
-        self.refuse("a document type has no place in a SpaceEx file", "remove <!DOCTYPE ...>")
+        self.refuse("a document type has no place in a model", "remove <!DOCTYPE ...>")
 
     def characters(self, text: str) -> None:
         """Add text to the element that is open."""
