@@ -94,8 +94,10 @@ class Located(NamedTuple):
     engine: EngineName = "auto"
 
     def settings(self, overrides: list[str] | None, **more: Any) -> dict[str, Any]:
-        """Arguments of the model's method."""
-        return values_of(overrides) | with_method(self._asdict()) | more
+        """Arguments of the model's method; a method or tolerance of ``--set`` is one that was asked for, as here."""
+        given, own = values_of(overrides), self._asdict()
+        own |= {name: given["settings"].pop(name, None) for name in ("method", "tolerance") if own[name] is None}
+        return given | with_method(own) | more
 
 
 class Answer(NamedTuple):

@@ -102,5 +102,5 @@ def slides(edge: str, source: ModeProgram, target: ModeProgram, t: Number) -> St
         if source.slides or target.slides:
             how += "on an intersection of surfaces no rule gives one flow"
         else:
-            how += "completion: auto follows the motion on a surface that two modes press on"
+            how += "completion: auto follows the motion where both modes press on one surface, written alike"
     return Stop("zeno", t, f"sliding at t = {show(t)}: {how}")

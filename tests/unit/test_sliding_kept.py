@@ -1,4 +1,4 @@
-"""Models whose runs slide are kept like others: the same runs, without SymPy."""
+"""Models whose runs slide: kept like others, the same runs without SymPy; in both schemes; beside chattering."""
 
 from __future__ import annotations
 
@@ -37,3 +37,28 @@ def test_parts_of_a_model_that_slides_are_kept_apart(tmp_path, monkeypatch):
     sliding = [hsdsl.load(path).sliding.pipeline.only(("x",)).program for _ in range(2)]
     plain = hsdsl.load(path).pipeline.only(("x",)).program
     assert sliding[0] == sliding[1] and len(sliding[0].modes) == len(plain.modes) + 1
+
+
+SWITCHED = """hsdsl: 1
+parameters: {k: 2}
+modes:
+  down: {flow: {x: -k + 0.5, y: 1 + x}, transitions: [{when: x <= 0, to: up}]}
+  up: {flow: {x: k + 0.5, y: 1 + x}, transitions: [{when: x >= 0, to: down}]}
+initial: {mode: down, x: 0.9, y: 0}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize("scheme", ["located", "relaxed"])
+def test_switches_slide_stop_or_chatter(scheme):
+    """Without completion two modes that press on one surface end a run; with a distance they stay near the sliding."""
+    model, given = hsdsl.loads(SWITCHED), {"engine": "python", "scheme": scheme, "relaxation": 1e-4}
+    assert model.simulate(**given).stop.reason == "zeno"
+    slides = model.simulate(completion="auto", **given)
+    assert slides.stop.complete and slides.final.mode == "sliding_down_up"
+    for width in (0.04, 0.01):
+        apart_by = SWITCHED.replace("<= 0", f"<= -{width}").replace(">= 0", f">= {width}")
+        chatters = hsdsl.loads(apart_by).simulate(**given)
+        assert chatters.stop.complete and len(chatters.transitions) > 0.5 / width
+        waited = sum(made.resumed - made.time for made in chatters.transitions)
+        assert abs(chatters.final["y"] - slides.final["y"]) < 3 * (width + waited)
