@@ -9,7 +9,7 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.names import SINCE, did_you_mean, without_memory
 from hsdsl.plot.curves import GuardLine
-from hsdsl.program import Program
+from hsdsl.program import ModeProgram, Program
 
 Pair = tuple[str, str]
 
@@ -23,7 +23,8 @@ class View:
     columns : sequence of str or None
         The states and outputs over time, in this order; None for all but those that only tell the time.
     phases : sequence of pairs or None
-        States or outputs against each other, across and up; None for one pair where all modes have the same two states.
+        States or outputs against each other, across and up; None for one pair where all modes
+        have the same two that flow, clocks aside.
     guards : sequence of GuardLine
         Levels at which transitions fire.
     units : mapping
@@ -68,11 +69,15 @@ class View:
         known = names_of(runs)
         if self.phases is not None:
             return [(checked(across, known), checked(up, known)) for across, up in dict.fromkeys(self.phases)]
-        timers = self._timers(known)
-        layouts = {states: [name for name in without_memory(states) if name not in timers]
-                   for states in {arc.states for run in runs for arc in run.arcs}}  # fmt: skip
-        states = list(dict.fromkeys(name for run in runs for name in without_memory(run.states) if name not in timers))
-        shown = len(states) == 2 and all(len(own) == 2 for own in layouts.values())
+        without = self._timers(known) | self._with_flow(0)  # counters, and what a controller holds
+
+        def moving(states: Sequence[str]) -> list[str]:
+            return [name for name in without_memory(states) if name not in without]
+
+        states = list(dict.fromkeys(name for run in runs for name in moving(run.states)))
+        shown = len(states) == 2 and all(
+            len(moving(each)) == 2 for each in {a.states for run in runs for a in run.arcs}
+        )
         return [(states[0], states[1])] if shown and set(states) <= set(self.names(runs)) else []
 
     def _timers(self, known: Sequence[str]) -> set[str]:
@@ -80,14 +85,20 @@ class View:
 
         A clock has the flow 1 wherever it flows, and a transition that sets it to a number.
         """
-        modes = () if self.program is None else self.program.modes
-        flows = [(name, text) for mode in modes for name, text in zip(mode.states, mode.flow_texts, strict=False)]
-        made = [(edge.target_states[k], text) for mode in modes for edge in mode.edges
+        made = [(edge.target_states[k], text) for mode in self._modes for edge in mode.edges
                 for k, text in zip(edge.changes, edge.change_texts, strict=True)]  # fmt: skip
-        others = {name for name, text in flows if number_of(text) != 1}
-        set_back = {name for name, text in made if number_of(text) is not None} & {name for name, _ in flows}
-        found = {name for name in known if name.rpartition(".")[2] == SINCE or name in set_back - others}
+        clocks = {name for name, text in made if number_of(text) is not None} & self._with_flow(1)
+        found = {name for name in known if name.rpartition(".")[2] == SINCE or name in clocks}
         return found if found < set(known) else set()
+
+    @property
+    def _modes(self) -> Sequence[ModeProgram]:
+        return () if self.program is None else self.program.modes
+
+    def _with_flow(self, number: float) -> set[str]:
+        """States whose flow is a number wherever they flow."""
+        flows = [(name, text) for mode in self._modes for name, text in zip(mode.states, mode.flow_texts, strict=False)]
+        return {name for name, _ in flows} - {name for name, text in flows if number_of(text) != number}
 
     def called(self, runs: Sequence[Execution]) -> list[str]:
         """Return a label for each run.

@@ -307,6 +307,10 @@ def test_what_tells_the_time_is_shown_only_by_name():
     flat = hsdsl.loads(CLOCKED.replace(", way: 1", "").replace(", way: 0", "").replace("way: way/2", "x: 1"))
     run = flat.simulate(engine="python")
     assert View(**run.view()).pairs([run]) == [("x", "v")]
+    counted = CLOCKED.replace("way: 1", "way: 0").replace("way/2", "way + 1")
+    run = hsdsl.loads(counted).simulate(engine="python")
+    assert View(**run.view()).pairs([run]) == [("x", "v")] and "way" in View(**run.view()).names([run])
+    run = flat.simulate(engine="python")
     assert View().names([run]) == ["x", "clock", "v"]  # of a saved run nothing else is known
     timer = hsdsl.loads(
         "hsdsl: 1\nmodes: {m: {flow: {c: 1}, transitions: [{when: c >= 1, to: m, reset: {c: 0}}]}}\n"
