@@ -17,11 +17,11 @@ from typing import Any, Literal
 
 import sympy as sp
 
+from hsdsl.expression.scope import TIME as TIME
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.trigger import Trigger
 from hsdsl.parts import Part
 
-TIME = sp.Symbol("t", real=True)
 ZERO, HALF, ONE = sp.S.Zero, sp.S.Half, sp.S.One
 TRUTH = {True: sp.true, False: sp.false}
 

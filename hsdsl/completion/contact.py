@@ -20,7 +20,6 @@ from hsdsl.completion.nearby import (
     SMALL,
     Nearby,
     Point,
-    along,
     cancelled,
     fixed_point,
     jacobian,
@@ -31,7 +30,7 @@ from hsdsl.completion.nearby import (
     value_at,
 )
 from hsdsl.completion.printer import text_of
-from hsdsl.expression.derivatives import derivative
+from hsdsl.expression.derivatives import derivative, lie_derivative
 from hsdsl.system import TIME, Edge, Mode, Surface
 
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
@@ -163,7 +162,7 @@ def _push(near: Nearby, at: Point):
 def _is_kept(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], push: sp.Expr, at: Point) -> bool:
     """Whether a value is zero all along the guard, and rises where the flow presses: what it decides never ends."""
     constrained = {near.states[i]: row for i, row in rows.items()}
-    stays = along(value, near.among(value), lambda x: constrained[x] if x in constrained else near.flow(x))
+    stays = lie_derivative(value, {x: constrained[x] if x in constrained else near.flow(x) for x in near.among(value)})
     presses = value_at(near.along(value), at) * value_at(push, at) > 0
     return presses and abs(value_at(value, at)) <= SMALL and abs(value_at(stays, at)) <= SMALL
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from functools import lru_cache
 from itertools import chain
 from operator import mul, sub
@@ -13,7 +13,7 @@ from typing import Any
 
 import sympy as sp
 
-from hsdsl.expression.derivatives import derivative
+from hsdsl.expression.derivatives import derivative, lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import below
 from hsdsl.system import TIME, Edge, Mode
@@ -77,9 +77,13 @@ class Nearby:
         """The time, and the states in the order of their names, that a value depends on."""
         return sorted((x for x in value.free_symbols if x == TIME or x in self._flow), key=lambda x: x.name)
 
+    def rates(self, value: sp.Expr) -> dict[Any, Any]:
+        """The rate of time and of each state that a value depends on."""
+        return {x: self.flow(x) for x in self.among(value)}
+
     def along(self, value: sp.Expr) -> sp.Expr:
         """The derivative of an expression along the flow."""
-        return along(value, self.among(value), self.flow)
+        return lie_derivative(value, self.rates(value))
 
     def flows(self) -> list[sp.Expr]:
         """The flows that the motion depends on: of what guard and reset depend on, and of what their flows do."""
@@ -113,11 +117,6 @@ def mode_of_part(edge: Edge, numbers: Sequence[str]) -> dict[sp.Symbol, sp.Integ
             most = max(int(node.args[1] + 1) for node in residual.atoms(below) if node.args[0] == number)
             return next({number: k} for k in map(sp.Integer, range(1, most + 1)) if residual.subs(number, k) != -1)
     return {}
-
-
-def along(value: sp.Expr, among: Sequence[sp.Symbol], flow: Callable[[sp.Symbol], sp.Expr]) -> sp.Expr:
-    """The derivative of an expression of ``among`` along a flow."""
-    return sp.Add(*(derivative(value, x) * flow(x) for x in among))
 
 
 def cancelled(value: sp.Expr) -> sp.Expr:

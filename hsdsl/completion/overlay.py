@@ -7,14 +7,14 @@ subset costs as much as all of them. Of the others each connected set has rows o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
 
 from hsdsl.completion.contact import Contact, contact
 from hsdsl.completion.coupled_contacts import Pairs, connected_sets, coupled_flow, neighbours
-from hsdsl.completion.nearby import along
+from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import absolute, below
 from hsdsl.program import HELD, LOOKED_AT
@@ -88,7 +88,8 @@ def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp
             for i in contacts[first].rows:
                 other = sp.Add(*(1 - off[j] for j in sorted(near[first])))
                 flow[i] = below(flags[first], HELD, flow[i], below(other, 1, flow[i], _NAN))
-    return flow, [_push(mode, found, flow, flag) if near[k] else (found.push, _size(found, found.near.flow))
+    return flow, [_push(mode, found, flow, flag) if near[k] else
+                  (found.push, _size(found, found.near.rates(found.last)))
                   for k, (found, flag) in enumerate(zip(contacts, flags, strict=True))]  # fmt: skip
 
 
@@ -96,15 +97,13 @@ def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) 
     """The push on a guard along the flow that the others leave, and the size of its terms."""
     places = dict(zip(found.near.states, flow, strict=True))
 
-    def left(x: sp.Symbol) -> sp.Expr:
-        return sp.S.One if x == TIME else places[x].xreplace({flag: sp.S.Zero})
-
-    return along(found.last, found.near.among(found.last), left), _size(found, left)
+    left = {x: places[x].xreplace({flag: sp.S.Zero}) for x in found.near.among(found.last) if x != TIME}
+    return lie_derivative(found.last, left), _size(found, left)
 
 
-def _size(found: Contact, flow: Callable[[sp.Symbol], sp.Expr]) -> sp.Expr:
+def _size(found: Contact, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
     """The size of the terms of a push along a flow."""
-    return sp.Add(*(absolute(sp.diff(found.last, x) * flow(x)) for x in found.near.among(found.last)))
+    return sp.Add(*(absolute(sp.diff(found.last, x) * rate) for x, rate in {TIME: sp.S.One, **flow}.items()))
 
 
 def _released(found: Contact, chosen: sp.Expr, flag: sp.Symbol, push: sp.Expr, size: sp.Expr) -> Edge:

@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from hsdsl.completion.contact import zero_surface
-from hsdsl.completion.nearby import along, cancelled
+from hsdsl.completion.nearby import cancelled
 from hsdsl.completion.printer import text_of
+from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
@@ -87,8 +88,8 @@ def _opposite(out: Edge, back: Edge) -> bool:
 def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr) -> Sliding:
     states = [symbol(state) for state in a.states]
     r = out.surface.residual
-    flows = ({TIME: sp.S.One} | dict(zip(states, mode.flow, strict=True)) for mode in (a, b))
-    outwards, inwards = (cancelled(along(r, (TIME, *states), flow.__getitem__)) for flow in flows)
+    flows = (dict(zip(states, mode.flow, strict=True)) for mode in (a, b))
+    outwards, inwards = (cancelled(lie_derivative(r, flow)) for flow in flows)
     slopes = [sp.diff(r, x) for x in states]
     curved = any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME)))
     pressing = cancelled(outwards - inwards)

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
 import sympy as sp
 
+from hsdsl.expression.scope import TIME
 from hsdsl.functions import below, floor, sign
 
 
@@ -44,3 +46,10 @@ def derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
     if expr.is_Mul:
         return sp.Add(*(sp.Mul(*expr.args[:i], slope, *expr.args[i + 1 :]) for i, slope in slopes))
     return sp.Add(*(slope for _, slope in slopes))
+
+
+def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """The derivative of an expression of time and states along a flow, L_f."""
+    rates = {TIME: sp.S.One, **flow}
+    present = sorted(expr.free_symbols & rates.keys(), key=lambda s: s.name)
+    return sp.Add(*(derivative(expr, s) * rates[s] for s in present))

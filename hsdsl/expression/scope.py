@@ -17,7 +17,8 @@ from hsdsl.expression.syntax import Call, ExpressionError, Name, Number, Product
 from hsdsl.functions import CONSTANTS, FUNCTIONS
 from hsdsl.names import SINCE, WORDS, closest, did_you_mean, shown
 
-RESERVED = ("t", *CONSTANTS, *FUNCTIONS, *WORDS)
+TIME = sp.Symbol("t", real=True)
+RESERVED = (TIME.name, *CONSTANTS, *FUNCTIONS, *WORDS)
 
 
 @dataclass(frozen=True)

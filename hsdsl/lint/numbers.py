@@ -11,9 +11,9 @@ import sympy as sp
 from sympy.logic.boolalg import BooleanFunction
 
 from hsdsl.expression import numeric
+from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import FUNCTIONS
-from hsdsl.lower.straight import lie_derivative
 from hsdsl.system import Mode, SampledInput, Surface
 
 INSIDE, ON, BEYOND = -1, 0, 1

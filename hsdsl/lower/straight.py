@@ -8,7 +8,7 @@ derivative or a text without end. After the cut every one of these costs as much
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import accumulate
 
 import sympy as sp
@@ -18,7 +18,6 @@ from hsdsl.functions import rebuilt, solution
 from hsdsl.lower.elimination import solved
 from hsdsl.lower.printer import LARGEST_PRODUCT
 from hsdsl.lower.sharing import Statement, shared
-from hsdsl.system import TIME
 
 LARGEST = 80  # nodes of one statement
 WIDEST = 16  # terms or factors of one statement
@@ -149,13 +148,6 @@ class Gradient:
             for argument, inner in self._slopes[symbol].items():
                 direct[argument] = direct.get(argument, sp.S.Zero) + slope * inner
         return {a: direct[a] for a in sorted(direct, key=self._order.__getitem__) if direct[a] != 0}
-
-
-def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
-    """The derivative of an expression of time and states along a flow, L_f."""
-    rates = {TIME: sp.S.One, **flow}
-    present = sorted(expr.free_symbols & rates.keys(), key=lambda s: s.name)
-    return sp.Add(*(derivative(expr, s) * rates[s] for s in present))
 
 
 def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Statement]:

@@ -7,10 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from hsdsl.errors import ModelError
+from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.plain import names_in, value
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.question import negative, positive
-from hsdsl.lower.straight import lie_derivative, replaced
+from hsdsl.lower.straight import replaced
 from hsdsl.spaceex.drafts import Facet, ModeDraft
 from hsdsl.spaceex.feasibility import decide
 from hsdsl.spaceex.formula import Relation

@@ -14,9 +14,9 @@ import sympy as sp
 
 from hsdsl import functions
 from hsdsl.errors import UsageError
+from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
-from hsdsl.lower.straight import lie_derivative
 from hsdsl.metrics.formulas import Formula, affine, stacked
 from hsdsl.metrics.geometry import CurvedGate, Domain, Gate, Space
 from hsdsl.metrics.polyhedra import gate_of, unit_rows
