@@ -56,6 +56,11 @@ class Arithmetic:
         """Zero of this type."""
         return self.constant(Fraction(0))
 
+    @property
+    def most_halvings(self) -> int:
+        """Enough halvings, or steps of an iteration that gains as much, from any number to round-off of it."""
+        return 16 + 2 * self.bits
+
     def sqrt(self, x: Number) -> Number:
         """The square root."""
         return self.functions["sqrt"](x)

@@ -20,7 +20,7 @@ from hsdsl.arithmetic import Arithmetic
 
 Array = NDArray[np.float64]
 
-ANGLE = 8 * 2.0**-53  # more than rounding makes of a number of turns, beside that number and 1
+ANGLE = 2.0**-49  # more than rounding makes of a number of turns, beside that number and 1
 STEPS = 4  # units in the last place by which NumPy's functions may be wrong
 
 

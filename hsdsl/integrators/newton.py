@@ -18,14 +18,14 @@ from hsdsl.integrators.stepper import State
 Increments = tuple[Vector, Vector, Vector]
 Iteration = tuple[Vector, Increments]  # the largest change of each state, and the increments after it
 
-MOST = 7  # iterations of a step that has a tolerance
+MOST_ITERATIONS = 7  # iterations of a step that has a tolerance
 RENEWED = 1e-3  # an iteration that leaves more than this of the one before has old derivatives,
 FEW = 2  # which matters where a step takes more than these
 LEAST_LEFT, MOST_LEFT = 1e-3, 0.03  # of the tolerance: what the iterations of such a step may leave
 DIVERGING = 0.99  # an iteration that leaves more than this of the one before is one of too long a step
-SLOW = 0.5  # likewise for iterations that go on to round-off
-NOISE = 2**10  # units of round-off, relative to the scales: a correction this small may be all noise
-SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
+SLOW_RATE = 0.5  # likewise for iterations that go on to round-off
+NEWTON_NOISE = 2**10  # units of round-off, relative to the scales: a correction this small may be all noise
+NEWTON_SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
 
 
 class NoConvergence(ValueError):
@@ -60,7 +60,7 @@ class Convergence:
         """
         unit, tolerance, one = self._arithmetic.unit, self._tolerance, self._arithmetic.zero + 1
         assert tolerance is not None
-        noise = NOISE * unit / tolerance
+        noise = NEWTON_NOISE * unit / tolerance
         enough = max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, self._arithmetic.sqrt(tolerance))))
         left, before = self._arithmetic.functions["pow"](max(self.left, unit), one * 4 / 5), None
         for count, (largest, z) in enumerate(iterations, 1):
@@ -78,9 +78,9 @@ class Convergence:
             if size == 0 or ahead <= enough:
                 self.left = left
                 return z
-            for _ in range(count, MOST if rated else count):
+            for _ in range(count, MOST_ITERATIONS if rated else count):
                 ahead = ahead * self.rate
-            if count == MOST or (rated and ahead > enough and size > noise):
+            if count == MOST_ITERATIONS or (rated and ahead > enough and size > noise):
                 break
             before = size
         self.rate, self.left, self.aged = one, one, True
@@ -95,15 +95,17 @@ class Convergence:
             They become no smaller before that.
         """
         unit, before, z = self._arithmetic.unit, None, None
-        allowed = max(NOISE * unit, SHARE * (self._tolerance or 0))
-        for count, (largest, z) in enumerate(islice(iterations, 16 + 2 * self._arithmetic.bits), 1):
+        allowed = max(NEWTON_NOISE * unit, NEWTON_SHARE * (self._tolerance or 0))
+        for count, (largest, z) in enumerate(islice(iterations, self._arithmetic.most_halvings), 1):
             size = _scaled(largest, x, scales, z)
-            rate = SLOW if not before else size / before
+            rate = SLOW_RATE if not before else size / before
             reach = [max(abs(a), *(abs(a + k) for k in ks)) for a, *ks in zip(x, *z, strict=True)]
-            if size == 0 or (rate < SLOW and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))):
+            if size == 0 or (
+                rate < SLOW_RATE and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))
+            ):
                 self.rate, self.aged = rate, rate > RENEWED
                 return z
-            if before and rate >= SLOW and count > 1 + _followers(x, scales, z):
+            if before and rate >= SLOW_RATE and count > 1 + _followers(x, scales, z):
                 if size <= allowed:
                     return z
                 self.rate, self.aged = self._arithmetic.zero + 1, True

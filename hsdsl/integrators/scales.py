@@ -15,7 +15,7 @@ from hsdsl.integrators.stepper import Flow, State
 
 SHARE = 32  # the terms of a flow may move a state by so many times its scale in a step
 PROBES = (2, 2), (-2, 2), (6, -2), (-6, -6)  # units of round-off by which time and states of odd and even place differ
-BLUR = 4  # units of round-off of its terms that a flow changes by with them
+BLUR_UNITS = 4  # units of round-off of its terms that a flow changes by with them
 
 
 def resolved(
@@ -59,7 +59,7 @@ def flow_terms(
         near = tuple(a + (even if i % 2 else odd) * unit * s for i, (a, s) in enumerate(zip(x, moved, strict=True)))
         other = flow(t + even * unit * t, *near)
         found = [max(d, abs(a - b)) for d, a, b in zip(found, other, slope, strict=True)]
-    return [d / (BLUR * unit) for d in found]
+    return [d / (BLUR_UNITS * unit) for d in found]
 
 
 def _derived_terms(rows: Matrix, moved: Sequence[Number], arithmetic: Arithmetic) -> Vector:

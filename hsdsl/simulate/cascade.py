@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import State
 
-PARALLEL = 1e-6
+PARALLEL = 1e-6  # of a component: flows that differ by less move no state on by more than this share of the way back
 
 
 @dataclass
@@ -33,14 +32,8 @@ class Cascade:
         return False
 
 
-def takes_back(slope: State, back: State, sizes: Sequence[Number], noise: Sequence[Number]) -> bool:
-    """Whether one direction is opposite to another that is not zero, relative to each component's size."""
-    moving = [i for i, f in enumerate(slope) if f != 0]
-    if not moving:
-        return False
-    along = max(moving, key=lambda i: abs(slope[i]) / sizes[i])
-    share: Number = back[along] / slope[along]
-    return share < 0 and all(
-        abs(b - share * f) <= PARALLEL * abs(share) * size + small
-        for b, f, size, small in zip(back, slope, sizes, noise, strict=True)
-    )
+def takes_back(slope: State, back: State) -> bool:
+    """Whether one direction is opposite to another that is not zero, in each component."""
+    pairs = list(zip(back, slope, strict=True))
+    share: Number = next((b / f for b, f in pairs if f != 0), 0)
+    return share < 0 and all(abs(b - share * f) <= PARALLEL * abs(share) * abs(f) for b, f in pairs)

@@ -9,7 +9,7 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.integrators.stepper import State
 
 MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
-HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
+JUMP_HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
 Flow = Callable[..., State]
 
 
@@ -45,7 +45,7 @@ def jump_between(flow: Flow, k: int, t: Number, x: State, t1: Number, z: State) 
         low, high = t * 0, t * 0 + 1
         (_, before), (point, behind) = at(low), at(high)
         size = abs(behind - before)
-        for _ in range(HALVINGS):
+        for _ in range(JUMP_HALVINGS):
             middle = (low + high) / 2
             q, value = at(middle)
             if abs(value - before) >= abs(behind - value):

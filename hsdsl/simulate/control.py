@@ -31,7 +31,7 @@ from hsdsl.simulate.settings import Settings
 SAFETY, LEAST, MOST = 0.9, 0.2, 5
 MOST_REJECTIONS = 2_000  # in a stretch
 STRETCH = 1e-3  # of the largest step: the time in which rejections are counted together
-BAND = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
+BAND_FROM, BAND_TO = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
 LEAST_SEEN = 1e-10  # an error ratio below this counts as this
 LEAST_BEFORE = 0.3  # a root of the one before likewise
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
@@ -141,7 +141,7 @@ class Control:
             length, last = self.before
             factor = min(factor, max(LEAST, SAFETY * (taken / length) * (last / (root * root))))
         self.before = taken, max(LEAST_BEFORE, root)
-        return 1 if BAND[0] <= factor <= BAND[1] else factor
+        return 1 if BAND_FROM <= factor <= BAND_TO else factor
 
     def reject(self, taken: Number, ratio: Number | None) -> None:
         """Shrink after a rejected, unhalved step; without a ratio it has no end at all."""

@@ -116,7 +116,7 @@ class TableSteps:
                 if tried is TOO_FAST:
                     control.too_fast(mode, h)
                 h, halvings = h / 2, halvings + 1
-            if halvings > most_halvings(self.run) or not t + h > t or control.struggles:
+            if halvings > self.run.arithmetic.most_halvings or not t + h > t or control.struggles:
                 return tried
 
     _ratio: Number = 1
@@ -196,7 +196,7 @@ class SeriesSteps:
             return NOT_FINITE
         stages = tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
         h = run.control.within_reach(mode, self._longest(stages))
-        for _ in range(most_halvings(run)):
+        for _ in range(run.arithmetic.most_halvings):
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             if not t1 > t:
                 break
@@ -309,8 +309,3 @@ class SeriesSteps:
 def sizes_along(x: State, piece: Polynomial, s: Number) -> State:
     """The sums of the absolute terms of an interpolant."""
     return at(tuple(map(abs, x)), tuple(tuple(map(abs, c)) for c in piece), s)
-
-
-def most_halvings(run: Run) -> int:
-    """Enough to go from any step to round-off of it."""
-    return 16 + 2 * run.arithmetic.bits

@@ -68,7 +68,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     control, method, arc = run.control, run.stepper(here), here.arc
     attempt = attempts(run, here, method)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
-    most_halvings = 16 + 2 * run.arithmetic.bits
+    most_halvings = run.arithmetic.most_halvings
     t, x, limit, patience, chatter = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit), Chatter()
     active, emerging = here.surfaces.active, here.surfaces.emerging
     try:
@@ -189,7 +189,7 @@ def moves_on(here: ModeState, crossing: Crossing, entered: ModeState) -> bool:
         one, other = here.kernel.flow(crossing.time, *crossing.state), entered.kernel.flow(entered.t, *entered.x)
     except DOMAIN_ERRORS:
         return True
-    return len(one) != len(other) or not takes_back(one, other, [abs(f) for f in one], [f * 0 for f in one])
+    return len(one) != len(other) or not takes_back(one, other)
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:

@@ -17,7 +17,7 @@ from hsdsl.simulate.root_isolation import ROUNDING, Coefficients, last_root, ris
 from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.surfaces import at
 
-MOST_HALVINGS = 30  # of a step, before a piece that does not settle is taken as a straight line
+MOST_SPLITS = 30  # of a step, before a piece that does not settle is taken as a straight line
 MOST_FIRST = 3  # of a step's first piece, before the step is made shorter
 MOST_PIECES = 1000  # before what is left is taken as it is, or it is refused
 IN_A_STEP = 64  # pieces of a surface, at most
@@ -164,7 +164,7 @@ def interpolated(
         ]
         if may_refuse and not all(settled) and (len(found[0]) >= most or (start == 0 and halvings == MOST_FIRST)):
             raise TooFast("too fast for one step")
-        if not all(settled) and halvings < MOST_HALVINGS and len(found[0]) < most:
+        if not all(settled) and halvings < MOST_SPLITS and len(found[0]) < most:
             half = width / 2
             parts += [(start + half, half, halvings + 1), (start, half, halvings + 1)]
             continue

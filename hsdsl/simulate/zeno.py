@@ -34,7 +34,7 @@ from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.scales import flow_sizes
 
 LEAST_FLIGHTS = 3
-MOST_CORRECTIONS = 4  # of a point towards a guard
+MOST_CORRECTIONS_TO_GUARD = 4  # of a point towards a guard
 MOST_ROUNDS = 60  # of acceleration towards a fixed point
 
 
@@ -190,7 +190,7 @@ def in_turn(taken: Callable[[int, Number, State], State], edges: list[int], t: N
 
 def onto_guard(here: ModeState, k: int, t: Number, x: State) -> State:
     """A point near a guard taken to it, each state in proportion to its scale."""
-    for _ in range(MOST_CORRECTIONS):
+    for _ in range(MOST_CORRECTIONS_TO_GUARD):
         r, gradient = here.kernel.surfaces(t, *x)[k], here.kernel.gradients[k](t, *x)[1:]
         if abs(r) <= here.surfaces.roundoff_bound(k, t, x):
             break

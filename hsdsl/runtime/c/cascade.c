@@ -23,17 +23,14 @@ static int returns(hs_run *run, int flowed) {
   return 0;
 }
 
-/* Whether one direction is opposite to another that is not zero, relative to each component's size. */
-static int takes_back(const hs_real *slope, const hs_real *back, const hs_real *size, const hs_real *noise, int n) {
-  int along = -1;
+/* Whether one direction is opposite to another that is not zero, in each component. */
+static int takes_back(const hs_real *slope, const hs_real *back, int n) {
+  int first = 0;
+  while (first < n && slope[first] == 0) first++;
+  const hs_real share = first < n ? back[first] / slope[first] : 0;
   for (int s = 0; s < n; s++)
-    if (slope[s] != 0 && (along < 0 || fabs(slope[s]) / size[s] > fabs(slope[along]) / size[along])) along = s;
-  if (along < 0) return 0;
-  const hs_real share = back[along] / slope[along];
-  if (!(share < 0)) return 0;
-  for (int s = 0; s < n; s++)
-    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * size[s] + noise[s])) return 0;
-  return 1;
+    if (!(fabs(back[s] - share * slope[s]) <= PARALLEL * fabs(share) * fabs(slope[s]))) return 0;
+  return share < 0;
 }
 
 /* Stop where a cascade has returned, after edge k of a mode. */

@@ -174,7 +174,7 @@ static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here,
 /* cascade.c */
 static int has_flowed(const hs_run *run, hs_time t);
 static int returns(hs_run *run, int flowed);
-static int takes_back(const hs_real *slope, const hs_real *back, const hs_real *size, const hs_real *noise, int n);
+static int takes_back(const hs_real *slope, const hs_real *back, int n);
 static int slides(hs_run *run, int mode, int k);
 
 /* chatter.c */

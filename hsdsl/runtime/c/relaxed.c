@@ -176,8 +176,7 @@ static int moves_on(hs_run *run, const hs_mode_state *before, int unknown) {
   if (before->mode == here->mode) return 0;
   if (unknown || here->table->flow(here->p, here->t, run->x, run->end)) return 1;
   if (before->dimension != here->dimension) return 1;
-  for (int s = 0; s < here->dimension; s++) run->flow_sizes[s] = fabs(run->source[s]), run->at[s] = 0.0;
-  return !takes_back(run->source, run->end, run->flow_sizes, run->at, here->dimension);
+  return !takes_back(run->source, run->end, here->dimension);
 }
 
 /* Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14). */

@@ -145,7 +145,7 @@ static int outgrown(hs_view *v) {
   const int states = v->s->model->states;
   double *const most = v->roundoff_floor, *const before = v->roundoff_floor + states;
   for (int i = 0; i < states; i++) most[i] = 0.0;
-  for (int round = 0; round < 3; round++) {
+  for (int round = 0; round < ROUNDOFF_ROUNDS; round++) {
     if (explained(v)) return 0;
     copy(before, most, states);
     if (!round_off(v, before)) return 1;

@@ -1,7 +1,7 @@
 /* Turning points of surfaces along steps of a recorded run, and the one that comes closest. See
    hsdsl/simulate/verdict/misses.py. */
 
-#include "screen_view.h"
+#include "screen_parts.h"
 
 /* Rates of all surfaces at a point; not-a-number where there is none. */
 static void all_rates(hs_view *v, double t, const double *x, double *to) {
@@ -13,9 +13,7 @@ static void all_rates(hs_view *v, double t, const double *x, double *to) {
 static int surely_turns(hs_view *v, int64_t row, int k) {
   const hs_formula *const rate = &v->f->rate[k];
   for (int end = 0; end < 2; end++) {
-    const double t = v->s->run.times[row + end], *x = recorded_row(&v->s->run, row + end);
-    v->range[0].low = v->range[0].high = t;
-    for (int i = 0; i < v->n; i++) v->range[1 + i].low = v->range[1 + i].high = x[i];
+    set_row(v, row + end);
     range_operations(v->f, rate->first, rate->last, first_register(v), v->range);
     const hs_range found = v->range[rate->result[0]];
     if (end ? !(found.high <= 0) : !(found.low > 0)) return 0;
@@ -41,7 +39,7 @@ static void note_near_miss(hs_view *v, int64_t row) {
       looked = 1;
     }
     const double below = -v->values[k], moved = v->range[surfaces->result[k]].high;
-    const double margin = below > 0 ? below / hs_max(moved + below, 1e-300) : INFINITY;
+    const double margin = below > 0 ? below / hs_max(moved + below, HS_NOTHING) : INFINITY;
     hs_near_miss *const best = &v->nearest[v->mode];
     if (margin < best->margin) {
       best->margin = margin, best->row = row, best->surface = k, best->segment = v->segment;

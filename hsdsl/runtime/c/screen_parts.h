@@ -15,6 +15,13 @@ static void set_times(hs_view *v, double begin, double length, double start, dou
   v->range[0] = outwards(begin + start * length, begin + (start + width) * length, 0x1p-52);
 }
 
+/* Time and states of a row as ranges of one number each. */
+static void set_row(hs_view *v, int64_t row) {
+  const double *const x = recorded_row(&v->s->run, row);
+  v->range[0].low = v->range[0].high = v->s->run.times[row];
+  for (int i = 0; i < v->n; i++) v->range[1 + i].low = v->range[1 + i].high = x[i];
+}
+
 static double *coefficients_at(const hs_view *v, int level) {
   return v->bernstein + level * (int64_t)(v->s->run.degree + 1) * v->s->model->width;
 }

@@ -101,22 +101,20 @@ static int turns_along(hs_view *v, int64_t row) {
 
 /* Whether an edge's surface may be passed although its `if` is false, along a step. */
 static int passes(hs_view *v, int64_t row) {
-  const hs_record *run = &v->s->run;
+  const hs_formula *const surfaces = &v->f->surfaces;
   int any = 0;
-  for (int k = 0; k < v->table->edges; k++) any |= v->table->edge[k].conditional;
-  if (!any) return 0;
-  for (int end = 1; end >= 0; end--) {
-    if (evaluate_surfaces(v, run->times[row + end], recorded_row(run, row + end))) return 1;
+  for (int k = 0; k < v->table->edges; k++)
+    any |= v->open[k] = v->table->edge[k].conditional && !(row + 1 == v->last && v->crossed == k);
+  for (int end = 0; end < 2 && any; end++) {
+    set_row(v, row + end);
+    range_operations(v->f, surfaces->first, surfaces->last, first_register(v), v->range);
+    any = 0;
     for (int k = 0; k < v->table->edges; k++) {
-      const double slack = v->magnitudes[k] * 0x1p-36;
-      const int there = end ? v->values[k] > -slack : v->values[k] <= slack;
-      v->open[k] = there && v->table->edge[k].conditional && (end || v->open[k]);
-      if (row + 1 == v->last && v->crossed == k) v->open[k] = 0;
+      const hs_range value = v->range[surfaces->result[k]];
+      any |= v->open[k] &= end ? value.high > 0.0 : value.low <= 0.0;
     }
   }
-  for (int k = 0; k < v->table->edges; k++)
-    if (v->open[k]) return 1;
-  return 0;
+  return any;
 }
 
 /* Screen the step that begins at a row; errors are those at its end. */

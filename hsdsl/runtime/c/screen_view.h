@@ -16,6 +16,7 @@
 #define MOST_PARTS_TRIED 128 /* of one step */
 #define COARSE_PARTS_TRIED 16 /* likewise, by expansions of the states */
 #define PLACES 64           /* of a mode where the round-off of its flow is bounded */
+#define ROUNDOFF_ROUNDS 3   /* from that round-off to what it moves, and what that moves in turn */
 #define ROUNDS 48           /* of closing in on a turning point */
 #define CLOSE_SHARE 0x1p-50 /* of a step, to which one is found */
 

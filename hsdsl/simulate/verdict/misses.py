@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, NOTHING, Number
 from hsdsl.execution import Arc
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
@@ -181,7 +181,7 @@ def _nearest(run: RunView, steps: Parts) -> NearMiss | None:
                 continue
             at_middle, moved = kernel.surfaces(*middle)[k], kernel.surfaces(middle[0], *steps.moved(middle[1:]))[k]
             below = -high(at_middle, n)
-            margin = np.where(turns & (below > 0), below / np.maximum(high(moved, n) + below, 1e-300), np.inf)
+            margin = np.where(turns & (below > 0), below / np.maximum(high(moved, n) + below, NOTHING), np.inf)
             i = int(np.argmin(margin))
             if margin[i] < np.inf and (best is None or margin[i] < best[0]):
                 best = float(margin[i]), k, int(steps.row[i])

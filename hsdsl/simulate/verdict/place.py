@@ -13,7 +13,7 @@ from hsdsl.program import ModeProgram
 from hsdsl.simulate.surfaces import Surfaces
 
 ALONG = 1e-3  # of what a surface may change by: less is along it
-ROUNDS = 3  # of Newton's method, back onto a guard
+GUARD_ROUNDS = 3  # of Newton's method, back onto a guard
 TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
 
 
@@ -57,7 +57,7 @@ class Place:
         """The state moved by the error in each component, and then back onto the guard of edge k."""
         for moved in self.moved_by(error):
             x = moved
-            for _ in range(ROUNDS):
+            for _ in range(GUARD_ROUNDS):
                 value = self.kernel.surfaces(self.t, *x)[k]
                 slopes = self.kernel.gradients[k](self.t, *x)[1:]
                 norm = sum(g * g for g in slopes)

@@ -14,7 +14,7 @@ from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import steps_of
 
 PLACES = 64  # of a run where the round-off of its flow is looked at
-ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in turn
+ROUNDOFF_ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in turn
 
 
 def reliability(run: RunView) -> Iterator[Finding]:
@@ -47,7 +47,7 @@ def _roundoff(run: RunView) -> dict[str, float]:
     span, unit = float(run.times[-1] - run.times[0]), ERROR_UNITS * float(run.arithmetic.unit)
     ends = list(steps_of(run, PLACES))
     moved: dict[str, float] = {}
-    for _ in range(ROUNDS):
+    for _ in range(ROUNDOFF_ROUNDS):
         found = dict(moved)
         for steps in ends:
             names = run.problem.program.modes[steps.mode].states

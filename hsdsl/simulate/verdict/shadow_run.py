@@ -20,10 +20,10 @@ from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.verdict.correction import Array, corrected
 
-MOST_ROUNDS = 8  # of Newton's method
+MOST_CHANGES = 8  # of Newton's method
 CLOSED_IN = 2.0**-10  # of the tie tolerance: a crossing's time is found
 ROUNDED = 2.0**-52  # of a state that moves, in each step
-FEWEST, FURTHER = 3, 2  # the order of the first series, and by how much it grows where that is not enough
+FEWEST, MORE_TERMS = 3, 2  # the order of the first series, and by how much it grows where that is not enough
 
 
 class Lost(ValueError):
@@ -99,7 +99,7 @@ class ShadowRun:
             settled = np.all(len(self.times) * sizes[-2:].sum(axis=0) <= sizes.sum(axis=0))
             if settled or self.most is None or self.order == self.most:
                 return away
-            self.order = min(self.order + FURTHER, self.most)
+            self.order = min(self.order + MORE_TERMS, self.most)
 
     def _expanded(self, mode: int) -> Array:
         series = self.problem.kernel.taylor(mode, self.data)
@@ -143,7 +143,7 @@ class ShadowRun:
         k = min(found, key=lambda k: abs(kernel.surfaces(made.time, *made.before.values())[k]))
         tie, change, s = float(self.problem.tie(self.t)), np.inf, 0.0
         slope = kernel.flow(self.t, *y)
-        for _ in range(MOST_ROUNDS):
+        for _ in range(MOST_CHANGES):
             value, rate = kernel.surfaces(self.t + s, *y)[k], kernel.rates[k](self.t + s, *y)[0]
             if not rate > 0:
                 raise Lost

@@ -23,7 +23,7 @@ from hsdsl.simulate.verdict.run_view import RunView
 Array = NDArray[np.float64]
 MOST_PARTS = 1 << 15  # looked at together
 COLUMNS = ("row", "start", "width", "time", "length", "bernstein", "error")  # one entry for each part
-ROUNDING = 2.0**-48  # of the largest coefficient: what cutting and changing the basis may add
+CUTTING = 2.0**-48  # of the largest coefficient: what cutting and changing the basis may add
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class Parts:
     def states(self, wider: float = 0.0) -> list[Range]:
         """The states along each part, ``wider`` times the error either way."""
         low, high = self.bernstein.min(axis=2), self.bernstein.max(axis=2)
-        more = wider * self.error + ROUNDING * np.maximum(np.abs(low), np.abs(high))
+        more = wider * self.error + CUTTING * np.maximum(np.abs(low), np.abs(high))
         return [Range(low[:, i] - more[:, i], high[:, i] + more[:, i]) for i in range(low.shape[1])]
 
     def ends(self) -> tuple[list[Range], list[Range]]:

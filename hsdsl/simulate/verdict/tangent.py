@@ -12,7 +12,7 @@ from itertools import pairwise
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Arc, Transition
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.verdict.place import ALONG, ROUNDS, Place
+from hsdsl.simulate.verdict.place import ALONG, GUARD_ROUNDS, Place
 from hsdsl.simulate.verdict.run_view import RunView
 
 
@@ -88,7 +88,7 @@ def _keeps(run: RunView, made: Transition, k: int) -> bool:
 def _onto(run: RunView, made: Transition, k: int, x: State) -> State:
     """A state of the mode that a transition leaves, taken to surface k of its target and, along that, to its guard."""
     before, edge = run.before(made)
-    for _ in range(ROUNDS):
+    for _ in range(GUARD_ROUNDS):
         seen = _seen(run, made, made.time, x)
         assert seen is not None
         named = dict(zip(seen.mode.states, seen.kernel.gradients[k](made.time, *seen.x)[1:], strict=True))

@@ -13,16 +13,16 @@ from .model import Bound, noise_of
 from .steps import at
 from .surfaces import UNIT
 
-SAME_UNITS, ZERO_UNITS, ROUNDS, CORRECTIONS, QUADRUPLINGS = 4, 16, 60, 8, 28
+SAME_UNITS, ZERO_UNITS, MOST_ROUNDS, CORRECTIONS, QUADRUPLINGS = 4, 16, 60, 8, 28
+PARALLEL = 1e-6
 
 
-def takes_back(slope, back, sizes):
-    """Whether one direction is opposite to another that is not zero, relative to the size of each component."""
-    moving = slope != 0
-    along = jnp.argmax(jnp.where(moving, jnp.abs(slope) / jnp.where(sizes > 0, sizes, 1.0), -1.0))
-    share = back[along] / jnp.where(slope[along] == 0, 1.0, slope[along])
+def takes_back(slope, back):
+    """Whether one direction is opposite to another that is not zero, in each component."""
+    first = jnp.argmax(slope != 0)
+    share = jnp.where(slope[first] == 0, 0.0, back[first] / jnp.where(slope[first] == 0, 1.0, slope[first]))
     off = jnp.abs(back - share * slope)
-    return moving.any() & (share < 0) & (off <= 1e-6 * jnp.abs(share) * sizes).all()
+    return (share < 0) & (off <= PARALLEL * jnp.abs(share) * jnp.abs(slope)).all()
 
 
 def after_reset(model, bound, mode, k, t, x):
@@ -141,7 +141,7 @@ def fixed_point(reset, x, wanted):
         further = jnp.where(bend == 0, two, x - (one - x) * (one - x) / jnp.where(bend == 0, 1.0, bend))
         return jnp.where((one == x).all(), x, further)
 
-    found = when(wanted, lambda: lax.fori_loop(0, ROUNDS, accelerate, frozen(x)), frozen(x))
+    found = when(wanted, lambda: lax.fori_loop(0, MOST_ROUNDS, accelerate, frozen(x)), frozen(x))
     return keeping(found, accelerate(0, x))
 
 

@@ -12,7 +12,7 @@ from .surfaces import UNIT
 SAFETY, LEAST, MOST = 0.9, 0.2, 5.0
 ALMOST = 1 - 2.0**-30
 MOST_HALVINGS, CREEPING_HALVINGS, MOST_CREEPING, IDLE_UNITS, MOST_IDLE = 122, 10, 2000, 64, 64
-MOST_REJECTIONS, STRETCH, NOTHING, SHARE, BLUR = 2000, 1e-3, 2.0**-960, 32, 4
+MOST_REJECTIONS, STRETCH, NOTHING, SHARE, BLUR_UNITS = 2000, 1e-3, 2.0**-960, 32, 4
 PROBES = (2, 2), (-2, 2), (6, -2), (-6, -6)
 
 
@@ -56,7 +56,7 @@ def resolved(model, flow, t, h, x, scales):
         for odd, even in PROBES:
             near = x + jnp.where(odd_place, odd, even) * UNIT * moved
             change = jnp.maximum(change, jnp.abs(flow(t + even * UNIT * t, near) - slope))
-        least = h * change / (BLUR * UNIT)
+        least = h * change / (BLUR_UNITS * UNIT)
         more = jnp.isfinite(least) & (least > SHARE * scales)
         moved = jnp.where(more, jnp.maximum(moved, least), moved)
     return jnp.maximum(scales, moved / SHARE)

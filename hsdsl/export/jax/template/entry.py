@@ -105,7 +105,7 @@ def flowing(model, config, bound, lane, mask):
     slides = same & lane.made
     if config.scheme == "relaxed":
         other = bound.flow(still.mode, still.t, still.x)
-        undone = takes_back(still.slope, other, jnp.abs(still.slope))
+        undone = takes_back(still.slope, other)
         dimension = jnp.asarray(model.dimension)
         alike = dimension[still.mode_before] == dimension[still.mode]
         slides = slides & (still.mode_before != still.mode) & ~(alike & undone)

@@ -18,7 +18,7 @@ from .surfaces import SCAN, closed, each_at, standing, states_at, ties
 from .transitions import Crossing, facts_here_and_at, passed_over, sizes_of
 from .verdicts import attempted, looked_along, motion, rising, scaled, terms_of
 
-HALVINGS, NEWTON_STEPS = 40, 8
+JUMP_HALVINGS, NEWTON_STEPS = 40, 8
 
 
 def slopes_at(bound, lane, trial, shares):
@@ -39,7 +39,7 @@ def crests(bound, lane, trial, low, high, wanted):
         return jnp.where(rises, middle, low), jnp.where(rises, high, middle), turn + 1
 
     state = low, high, jnp.zeros((), int)
-    return lax.while_loop(lambda s: wanted.any() & (s[2] < HALVINGS), close, state)[0]
+    return lax.while_loop(lambda s: wanted.any() & (s[2] < JUMP_HALVINGS), close, state)[0]
 
 
 def settled(model, bound, lane, trial, shares):

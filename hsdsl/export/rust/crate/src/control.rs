@@ -10,7 +10,8 @@ const ALMOST: f64 = 1.0 - 1.0 / 1073741824.0;
 const LEAST: f64 = 0.2;
 const MOST: f64 = 5.0;
 const SHARE: f64 = 32.0;
-const BLUR: f64 = 4.0;
+const BLUR_UNITS: f64 = 4.0;
+const PARALLEL: f64 = 1e-6;
 const MOST_REJECTIONS: u32 = 2000;
 const MOST_IDLE: u32 = 64;
 const MOST_CREEPING: u32 = 2000;
@@ -84,7 +85,7 @@ impl<S> Run<'_, S> {
             }
         }
         for s in 0..self.dimension {
-            found[s] /= BLUR * UNIT;
+            found[s] /= BLUR_UNITS * UNIT;
         }
         Some(found)
     }
@@ -223,17 +224,7 @@ impl<S> Run<'_, S> {
 
 /// Whether one direction is opposite to another that is not zero.
 pub(crate) fn takes_back(slope: &State, back: &State, n: usize) -> bool {
-    let mut along: Option<usize> = None;
-    for s in 0..n {
-        if slope[s] != 0.0 && along.is_none() {
-            along = Some(s); // relative to its own size each is as large
-        }
-    }
-    let along = match along {
-        None => return false,
-        Some(s) => s,
-    };
-    let share = back[along] / slope[along];
-    share < 0.0 && (0..n).all(|s| size(back[s] - share * slope[s]) <= 1e-6 * size(share) * size(slope[s]))
+    let share = (0..n).find(|&s| slope[s] != 0.0).map_or(0.0, |s| back[s] / slope[s]);
+    share < 0.0 && (0..n).all(|s| size(back[s] - share * slope[s]) <= PARALLEL * size(share) * size(slope[s]))
 }
 
