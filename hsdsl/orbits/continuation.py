@@ -25,7 +25,7 @@ from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, rep
 from hsdsl.execution import Array
 from hsdsl.orbits.section import NoReturn, Return
 from hsdsl.orbits.shooting import CLOSED, Closed, gap
-from hsdsl.simulate.verdict.run_view import RunView
+from hsdsl.simulate.verdict.recorded_run import RecordedRun
 
 Passage = Callable[[Array, float, float], tuple[Return, float | None, float]]
 MOST_POINTS, MOST_CORRECTIONS = 400, 8
@@ -248,7 +248,7 @@ def _grazing(previous: Solution, here: Solution) -> Bifurcation:
 def _rates(here: Solution) -> list[float]:
     """The rates at which the transitions of a period cross their guards."""
     found = here.passage.sensitivity
-    run = RunView(found.setting.augmented, found.execution)
+    run = RecordedRun(found.setting.augmented, found.execution)
     made = run.transitions[: len(sequence(here))]
     return [float(place.rate(k)) for place, k in map(run.before, made)]
 

@@ -12,7 +12,7 @@ from engines import ENGINES, needs_compiler
 
 import hsdsl
 from hsdsl.elaborate.product import flat_part
-from hsdsl.simulate.verdict.run_view import RunView
+from hsdsl.simulate.verdict.recorded_run import RecordedRun
 
 MODELS = Path(__file__).parents[2] / "models" / "parts"
 WAYS = [
@@ -504,7 +504,7 @@ def test_a_fit_finds_a_parameter_of_a_part():
 
 def test_transitions_of_one_name_are_told_apart():
     prepared = hsdsl.loads(SWITCHED).pipeline.prepare({"until": 1})
-    crossed = list(RunView(prepared, prepared.simulate()).crossed.values())
+    crossed = list(RecordedRun(prepared, prepared.simulate()).crossed.values())
     assert len(crossed) > 4 and crossed == [k % 2 for k in range(len(crossed))]
 
 

@@ -20,7 +20,7 @@ from hsdsl.export.source import Source, drivable
 from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
 from hsdsl.parts import numbered
 from hsdsl.simulate import Problem
-from hsdsl.simulate.verdict import RunView
+from hsdsl.simulate.verdict.recorded_run import RecordedRun
 
 Kind = Literal["time", "state", "derivative", "parameter", "input", "output", "mode", "indicator"]
 _FIRST = re.compile(r"\ba(\d+)\b")
@@ -145,7 +145,7 @@ def _listed(modes: Sequence[str], first: int) -> str:
 def nominals(source: Source) -> list[float]:
     """A size for each state: as given, else the power of two that it stays below in the run that is exported."""
     run, given = source.model.simulate(**source.arguments), source.problem.settings.scale
-    sizes = RunView(source.problem, run).sizes
+    sizes = RecordedRun(source.problem, run).sizes
     own = {name: size for name, size in sizes.items() if not _is_roundoff(run, name)}
     return [float(given.get(name) or _power(own.get(name, 0.0))) for name in continuous(source)]
 

@@ -5,12 +5,14 @@ transversally. No other surface is so near that an error could change the sequen
 same point. A run shows its own neighbourhood of the execution, so every margin is held against the error that the run
 allows itself.
 
-==================  ================================================================================
-`screen`            what compiled enclosures leave undecided; `formulas`: routines as it takes them
+==================  =================================================================================================
+`screen`            what compiled enclosures leave undecided
+`formulas`          routines as operations, as it takes them; `formula_tables`: those of a program in C
 `shadow`            the errors of a run, by a `shadow_run` that takes the same steps, closer to the solution
 `correction`        steps that no series repeats, corrected
 `agreement`         the errors of a run, by the same run made finer
-`run_view`          an execution with its modes' routines; `place` is one state of it
+`recorded_run`      an execution with its modes' routines; `place` is one state of it
+`run_view`          the same with its errors
 `steps`             its steps as polynomials, many at once, with routines over intervals
 `compiled_verdict`  compiled runs of which it leaves nothing undecided
 `findings`          all of the following, of a run that the screen leaves undecided
@@ -26,7 +28,7 @@ allows itself.
 `commutation`       do transitions that are reached together commute?
 `accumulation`      Zeno points and rest, which the relaxed scheme goes through without a word
 `strips`            transitions that are lost while another one waits in a strip
-==================  ================================================================================
+==================  =================================================================================================
 """
 
 from __future__ import annotations

@@ -1,26 +1,21 @@
-"""Routines as operations on registers, for the compiled screen (``hs_screen.h``): one list for each mode.
+"""Routines as operations on the results of others, for the compiled screen: one list for each mode.
 
-Registers hold time, the states, data, constants and then the result of each operation. Operations on data alone come
-first. Of a function that the screen does not know nothing is concluded.
+Operations on data alone are apart from those that move with time and states. Of a function that the screen does not
+know nothing is concluded.
 """
 
 from __future__ import annotations
 
 import ast
-import ctypes
 import math
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from functools import reduce
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from hsdsl.arithmetic import FLOAT64
-from hsdsl.program import ModeProgram, Program
-from hsdsl.runtime import structures
 
 CONSTANT = re.compile(r"q_(m?)(\d+)_(\d+)")
 SIGNS: Mapping[type[ast.operator], str] = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div"}
@@ -36,7 +31,7 @@ class Node(NamedTuple):
     degree: float
 
 
-class Tape:
+class Operations:
     """The operations of one mode, while they are collected."""
 
     def __init__(self, states: int, data: Sequence[str]) -> None:
@@ -142,80 +137,3 @@ def _degree(kind: str, one: Node, other: Node | int) -> float:
     if kind == "div" and degrees[1] == 0:
         return degrees[0]
     return 0 if max(degrees) == 0 and kind != "unknown" else math.inf
-
-
-class Compiled:
-    """All modes of a program as the screen takes them; ``table`` is their ``hs_formulas``."""
-
-    def __init__(self, program: Program) -> None:
-        self._kept: list[Any] = []
-        found = [self._mode(program, k, mode) for k, mode in enumerate(program.modes)]
-        self.table: Any = (structures.Formulas * len(found))(*found)
-
-    def _mode(self, program: Program, index: int, mode: ModeProgram) -> Any:
-        data = [f"p{i}" for i in range(len(program.parameters))]
-        data += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
-        data += [f"k{i}" for i in range(len(program.switches))]
-        tape, routines = Tape(len(mode.states), data), _definitions(mode.routines.source)
-        surfaces = len(mode.edges) + len(mode.walls)
-        names = ["flow", "surfaces", *(f"rate_{k}" for k in range(surfaces))]
-        names += [f"reset_{k}" for k in range(len(mode.edges))]
-        formulas = [tape.formula(routines[name]) for name in names]
-        place = _placed(tape, 1 + len(mode.states) + len(data))
-        steps = [(structures.OPERATORS.index(kind), place(a), place(b)) for kind, a, b in (*tape.fixed, *tape.moving)]
-        flow, values, *others = (self._formula(tape, place, formula) for formula in formulas)
-        resets = [results for *_, results in formulas[2 + surfaces :]]
-        curved = [len(results) * any(math.isinf(node.degree) for node in results) for results in resets]
-        keeps = [_keeps(mode, index, k) for k in range(len(mode.edges))]
-        return structures.Formulas(
-            constants=len(tape.constants),
-            fixed=len(tape.fixed),
-            operations=len(steps),
-            affine=all(node.degree <= 1 for node in formulas[0][2]),
-            steep=mode.steep,
-            jumps=mode.jumps,
-            constant=self._memory(np.array(list(tape.constants), np.float64)),
-            operation=self._memory(np.array(steps, np.int32)),
-            flow=flow,
-            surfaces=values,
-            rate=self._structures(others[:surfaces]),
-            reset=self._structures(others[surfaces:]),
-            keeps=self._memory(np.array(keeps, np.int32)),
-            curved=self._memory(np.array(curved, np.int32)),
-        )
-
-    def _memory(self, array: Any) -> int:
-        self._kept.append(array)
-        return array.ctypes.data
-
-    def _structures(self, each: list[Any]) -> Any:
-        self._kept.append((structures.Formula * max(1, len(each)))(*each))
-        return ctypes.addressof(self._kept[-1])
-
-    def _formula(self, tape: Tape, place: Callable[[Any], int], formula: tuple[int, int, list[Node]]) -> Any:
-        first, last, results = formula
-        shift = len(tape.fixed)
-        return structures.Formula(first + shift, last + shift, self._memory(np.array([*map(place, results)], np.int32)))
-
-
-def _placed(tape: Tape, data_end: int) -> Callable[[Any], int]:
-    """The register of a node; a number is itself."""
-    starts = {"state": 0, "data": len(tape.names) - sum(n.source == "data" for n in tape.names.values())}
-    starts["constant"] = data_end
-    starts["fixed"] = data_end + len(tape.constants)
-    starts["moving"] = starts["fixed"] + len(tape.fixed)
-    return lambda node: starts[node.source] + node.number if isinstance(node, Node) else node
-
-
-def _definitions(source: str) -> dict[str, ast.FunctionDef]:
-    bind = ast.parse(source).body[0]
-    assert isinstance(bind, ast.FunctionDef)
-    return {each.name: each for each in bind.body if isinstance(each, ast.FunctionDef)}
-
-
-def _keeps(mode: ModeProgram, index: int, k: int) -> list[bool]:
-    """Say which states the reset of an edge to the mode itself leaves as they are."""
-    edge = mode.edges[k]
-    if edge.target != index:
-        return [False] * len(mode.states)
-    return [text == name for name, text in zip(mode.states, edge.reset_texts, strict=True)]

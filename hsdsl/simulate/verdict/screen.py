@@ -22,7 +22,7 @@ from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.correction import INSIDE, POLE, correction
 from hsdsl.simulate.verdict.finding import times
-from hsdsl.simulate.verdict.formulas import Compiled
+from hsdsl.simulate.verdict.formula_tables import FormulaTables
 from hsdsl.simulate.verdict.shadow import ShadowErrors, may_have_shadow, order_of
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class Screens:
 
     def __init__(self, problem: Problem, plan: CompiledPlan, by_shadow: bool) -> None:
         model, settings, method = plan.compiled, problem.settings, problem.settings.method
-        formulas: Compiled = model.shared("formulas", lambda: Compiled(problem.program))
+        formulas: FormulaTables = model.shared("formulas", lambda: FormulaTables(problem.program))
         assert method is not None
         order = order_of(method) if by_shadow else None
         self._common = structures.Screen(

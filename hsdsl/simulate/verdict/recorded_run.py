@@ -1,0 +1,155 @@
+"""A recorded run with its modes' routines bound again, so that any state of it can be evaluated."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.enclosures import Range
+from hsdsl.execution import Arc, Execution, Stop, Transition
+from hsdsl.integrators.stepper import Polynomial, State
+from hsdsl.kernel import ModeKernel
+from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.surfaces import Surfaces, at
+from hsdsl.simulate.verdict.place import Place
+
+
+@dataclass(eq=False)
+class RecordedRun:
+    """What a run recorded, and the problem that it is a run of."""
+
+    problem: Problem
+    execution: Execution
+
+    @property
+    def transitions(self) -> Sequence[Transition]:
+        """The run's transitions."""
+        return self.execution.transitions
+
+    @property
+    def stop(self) -> Stop:
+        """How it ended."""
+        return self.execution.stop
+
+    @property
+    def arithmetic(self) -> Arithmetic:
+        """The run's number type."""
+        return self.problem.arithmetic
+
+    @cached_property
+    def times(self) -> list[Number]:
+        """Times of all rows."""
+        return self.execution.times.tolist()
+
+    @cached_property
+    def flows(self) -> list[Arc]:
+        """Arcs of flow that take time."""
+        arcs = self.execution.arcs
+        return [arc for arc in arcs if arc.kind == "flow" and self.times[arc.last] > self.times[arc.first]]
+
+    @cached_property
+    def sizes(self) -> dict[str, float]:
+        """The largest size that each state has in the run."""
+        found: dict[str, float] = {}
+        for arc in self.execution.arcs:
+            rows = np.abs(np.asarray(self.execution.values[arc.first : arc.last + 1, : len(arc.states)], dtype=float))
+            for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
+                found[name] = max(found.get(name, 0.0), size)
+        return found
+
+    @cached_property
+    def crossed(self) -> dict[int, int]:
+        """The surface whose transition ends an arc, by the arc's last row."""
+        found: dict[int, int] = {}
+        for arc in self.flows:
+            if arc.jump < len(self.transitions):
+                made = self.transitions[arc.jump]
+                if not made.time > self.times[arc.last] + self.tie(made.time):  # else it ends at a jump of an input
+                    found[arc.last] = self.before(made)[1]
+        return found
+
+    def arc_of(self, row: int) -> Arc:
+        """The arc of the step that begins at a row."""
+        return self.flows[bisect_right(self.flows, row, key=lambda arc: arc.first) - 1]
+
+    def edges(self, mode: str) -> list[str]:
+        """The names of a mode's edges."""
+        return [edge.name for edge in self.problem.program.modes[self.index(mode)].edges]
+
+    def index(self, mode: str) -> int:
+        """The number of a mode."""
+        return self._indices[mode]
+
+    @cached_property
+    def _indices(self) -> dict[str, int]:
+        return {mode.name: k for k, mode in enumerate(self.problem.program.modes)}
+
+    @cached_property
+    def _bound(self) -> dict[tuple[int, Number], ModeKernel]:
+        return {}
+
+    def place(self, mode: str | int, t: Number, x: State) -> Place:
+        """Look at a state of a mode."""
+        index = self._indices[mode] if isinstance(mode, str) else mode
+        segment = self.problem.timeline.at(t)
+        key = index, segment.start
+        if key not in self._bound:
+            self._bound[key] = self.problem.kernel.bind(index, segment.data)
+        program, kernel = self.problem.program.modes[index], self._bound[key]
+        scale = tuple(abs(a) for a in x)
+        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic)
+        return Place(program, kernel, surfaces, t, x, partial(self._enclosing, index, t))
+
+    def _enclosing(self, index: int, t: Number) -> ModeKernel:
+        """A mode's routines over intervals."""
+        data = [Range(float(value), float(value)) for value in self.problem.timeline.at(t).data]
+        return self.problem.kernel.enclosing.bind(index, data)
+
+    def before(self, made: Transition) -> tuple[Place, int]:
+        """Look at where a transition was made, and which surface it crossed."""
+        place = self.place(made.source, made.time, tuple(made.before.values()))
+        return place, self.edge_at(place, made.edge)
+
+    def edge_at(self, place: Place, name: str) -> int:
+        """The edge of a name at a place; of several in a system of parts the one that is closest to its guard."""
+        found = [k for k, edge in enumerate(self.edges(place.mode.name)) if edge == name]
+        return found[0] if len(found) == 1 else min(found, key=lambda k: abs(place.value(k)))
+
+    def state(self, arc: Arc, row: int) -> State:
+        """The state at a row."""
+        return tuple(self.execution.values[row][: len(arc.states)].tolist())
+
+    def at_row(self, arc: Arc, row: int) -> Place:
+        """Look at a row."""
+        return self.place(arc.mode, self.times[row], self.state(arc, row))
+
+    def dense_output(self, arc: Arc, row: int) -> Callable[[Number], Place]:
+        """Look at shares of the step from a row to the next."""
+        t, h = self.times[row], self.times[row + 1] - self.times[row]
+        x, d = self.state(arc, row), len(arc.states)
+        piece: Polynomial = tuple(tuple(c[:d]) for c in self.execution.coefficients[row].tolist())
+        if not piece:
+            piece = (tuple(b - a for a, b in zip(x, self.state(arc, row + 1), strict=True)),)
+        index, start, end = self.index(arc.mode), t, self.times[row + 1]
+
+        def along(s: Number) -> Place:
+            time = min(t + s * h, end)
+            inner = self.place(index, start, x) if time == end else None  # the end belongs to the step's own segment
+            place = self.place(index, time, at(x, piece, s))
+            return place if inner is None else replace(inner, t=time, x=place.x)
+
+        return along
+
+    def row_before(self, made: Transition) -> int:
+        """The last row before a transition."""
+        arc = self.execution.arcs[int(np.searchsorted(self.execution.arc_table.jump, made.index, "right")) - 1]
+        return arc.last
+
+    def tie(self, t: Number) -> Number:
+        """Times closer than this are the same instant."""
+        return self.problem.tie(t)
