@@ -3,7 +3,7 @@
 
 #include "screen_parts.h"
 
-#define SEEN 0.5 /* of a step: every method looks at parts of such a width, and shows what is as smooth */
+#define SEEN 0.5 /* of a step: every method has stages on parts of such a width, and shows what is as smooth */
 
 /* Expand states and the flow along a part of a step. */
 static void expand_flow(hs_view *v, int64_t row, double start, double width) {
@@ -20,7 +20,7 @@ typedef struct {
   double most, drift, unresolved; /* either way, in all, and by what may have any sign */
 } hs_moved;
 
-/* What is not shown is unresolved or, on a part so short that no method looks at it, how the flow differs from the
+/* What is not shown is unresolved or, on a part so short that it may have no stage, how the flow differs from the
    slope of the state's polynomial. What errors of states change the flow by is no pulse. */
 static hs_moved moved_unseen(const hs_view *v, int64_t row, int i, double width) {
   const double length = width * (v->s->run.times[row + 1] - v->s->run.times[row]);

@@ -26,17 +26,17 @@ static void note_near_miss(hs_view *v, int64_t row) {
   const hs_record *run = &v->s->run;
   const double begin = run->times[row], length = run->times[row + 1] - begin, middle = begin + length / 2;
   const hs_formula *const surfaces = &v->f->surfaces;
-  int looked = 0;
+  int evaluated = 0;
   for (int k = 0; k < v->table->surfaces; k++) {
     if (!(v->at_start[k] > 0 && v->at_end[k] <= 0 && surely_turns(v, row, k))) continue;
-    if (!looked) {
+    if (!evaluated) {
       along_step(v, run, row, 0.5, v->z);
       if (v->table->values(v->p, middle, v->z, v->values)) return;
       v->range[0] = outwards(middle, middle, 0.0);
       for (int i = 0; i < v->n; i++)
         v->range[1 + i] = outwards(v->z[i] - v->mode_error[i], v->z[i] + v->mode_error[i], 0x1p-52);
       range_operations(v->f, surfaces->first, surfaces->last, first_register(v), v->range);
-      looked = 1;
+      evaluated = 1;
     }
     const double below = -v->values[k], moved = v->range[surfaces->result[k]].high;
     const double margin = below > 0 ? below / hs_max(moved + below, HS_NOTHING) : INFINITY;

@@ -24,7 +24,7 @@ static int turns_close(hs_view *v, const int *before, int *open) {
   return any;
 }
 
-/* Whether nothing is open but the surface that is crossed at the end of the arc: `crossings` looks at how it is. */
+/* Whether nothing is open but the surface that is crossed at the end of the arc: `crossings` decides that. */
 static int only_crossed(const hs_view *v, const int *open) {
   for (int k = 0; k < v->table->surfaces; k++)
     if (open[k] && k != v->crossed) return 0;

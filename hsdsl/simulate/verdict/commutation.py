@@ -23,7 +23,7 @@ Landed = tuple[str, State]
 
 
 def choices(run: RunView) -> tuple[list[Finding], list[str]]:
-    """Look at every transition that others were passed over for."""
+    """Findings about every transition that others were passed over for, and the ties that commute."""
     if run.screen is not None and not run.undecided("choice"):
         return [], together(run.screen.commuting)
     found: list[Finding] = []

@@ -18,7 +18,7 @@ from hsdsl.simulate.verdict.screen import CROSSING_UNDECIDED
 
 
 def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
-    """Look at every transition that the flow made."""
+    """Findings about every transition that the flow made, and the margins of the others."""
     found: list[Finding] = []
     slowest: Number | None = None
     least: Number | None = None

@@ -33,7 +33,7 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
     if crossed is None:
         place = run.dense_output(arc, arc.last - 1)(run.arithmetic.zero + 1)
     alternatives = run.transitions[arc.jump].alternatives if crossed is not None else ()
-    tied = {run.edge_at(place, name) for name in alternatives}  # `choices` looks at these
+    tied = {run.edge_at(place, name) for name in alternatives}  # `choices` decides these
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
         if k == crossed or k in tied or place.value(k) > place.roundoff_bound(k) or not place.rate(k) > 0:
             continue

@@ -1,4 +1,4 @@
-"""The flow along steps: does it vary where no step looked, jump, or have no bound on its slope?
+"""The flow along steps: does it vary where no step evaluated it, jump, or have no bound on its slope?
 
 A step's polynomial knows the flow at a few points. Operations of the flow that are not as smooth as half a step is long
 may be pulses that it did not see. What they may add is held against the error, on parts of the step that are halved;
@@ -23,12 +23,12 @@ from hsdsl.simulate.verdict.run_view import RunView, visited
 from hsdsl.simulate.verdict.steps import MOST_PARTS, Parts, high, joined, low, steps_of, undecided
 
 HALVINGS = 14
-SEEN = 0.5  # of a step: every method looks at parts of such a width, and shows what is as smooth as they are long
+SEEN = 0.5  # of a step: every method has stages on parts of such a width, and shows what is as smooth as they are long
 Array = NDArray[np.float64]
 
 
 def flows(run: RunView) -> tuple[list[Finding], list[str]]:
-    """Look at the flow of every mode along all steps in it."""
+    """Findings about the flow of every mode along all steps in it."""
     jumping = [mode for mode in visited(run) if mode.jumps] if run.undecided("flow change") else []
     found = [_jumping(jumping)] if jumping else []
     if run.errors is None:
@@ -99,8 +99,8 @@ def _furthest(step: NDArray[np.int64], start: Array, moved: Array, allowance: Ar
 def _moved_unseen(run: RunView, parts: Parts) -> Array:
     """How far states are moved along parts by what these do not show; shape (3, N, n).
 
-    Either way, in all, and by what may have any sign: that is what is unresolved or, on parts so short that no method
-    looks at each, how the flow differs from the slopes of the states' polynomials. What errors of states change
+    Either way, in all, and by what may have any sign: that is what is unresolved or, on parts so short that not
+    each has a stage, how the flow differs from the slopes of the states' polynomials. What errors of states change
     the flow by is no pulse.
     """
     (time, *states), slopes = parts.expanded()

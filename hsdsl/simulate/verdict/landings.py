@@ -28,7 +28,7 @@ WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
 
 
 def landings(run: RunView) -> tuple[list[Finding], list[str]]:
-    """Look at where every arc of flow begins, and at every reset."""
+    """Findings about the state that every arc of flow begins with, and about every reset."""
     if run.errors is None:
         return [], []
     found: list[Finding] = []
@@ -40,7 +40,7 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
                 if not (run.followed and leaves_along(run, arc, k)):
                     found += _on(run, arc, place, k, made)
             except DOMAIN_ERRORS:
-                continue  # `misses` looks along the arc
+                continue  # `misses` says so along the arc
     for made in run.undecided_transitions(RESET_UNDECIDED):
         try:
             found += _continuous(run, made)
@@ -84,7 +84,7 @@ def _soon(run: RunView, place: Place, row: int) -> State:
 
 
 def _tied(run: RunView, made: Transition) -> bool:
-    """Whether a transition follows one at the same instant that others were tied with: `choices` looks at these."""
+    """Whether a transition follows one at the same instant that others were tied with: `choices` decides these."""
     for before in reversed(run.transitions[: made.index]):
         if before.resumed is None or made.time - before.resumed > run.tie(made.time):
             return False

@@ -2,7 +2,7 @@
 
 Along steps every surface is enclosed on parts of a step that are cut in halves (`steps`). A part is done where the
 surface stays below zero although the states are moved by the error, or where it only rises or only falls there. What
-remains are its turning points close to zero: these are looked at one by one.
+remains are its turning points close to zero: these are evaluated one by one.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class NearMiss(NamedTuple):
 
 
 def misses(run: RunView) -> tuple[list[Finding], list[str]]:
-    """Look at every surface along every arc."""
+    """Findings about every surface along every arc, and the nearest miss."""
     if run.errors is None:
         return [], []
     found: list[Finding] = []
@@ -139,10 +139,10 @@ def _joined(parts: Parts, which: NDArray[np.int64], surface: int) -> list[Open]:
 
 
 def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | None:
-    """Look at a surface on parts of a step that the enclosures leave open."""
+    """Decide a surface on parts of a step that the enclosures leave open, by its values there."""
     k, last = each.surface, each.row + 1 == arc.last
     if last and run.crossed.get(arc.last) == k and each.end >= 1:
-        return None  # `crossings` looks at how it is crossed
+        return None  # `crossings` decides it
     along = run.dense_output(arc, each.row)
     if run.followed and each.row == arc.first and not each.start and leaves_along(run, arc, k):
         return None

@@ -19,7 +19,7 @@ TANGENT_UNITS = 64  # of round-off: a rate that counts as zero
 
 @dataclass(frozen=True)
 class Place:
-    """A mode at a time: its routines bound (``enclosing`` binds them over intervals), and one state to look at."""
+    """A mode at a time: its routines bound (``enclosing`` binds them over intervals), and one state."""
 
     mode: ModeProgram
     kernel: ModeKernel

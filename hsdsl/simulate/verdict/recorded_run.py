@@ -94,7 +94,7 @@ class RecordedRun:
         return {}
 
     def place(self, mode: str | int, t: Number, x: State) -> Place:
-        """Look at a state of a mode."""
+        """A state of a mode at a time."""
         index = self._indices[mode] if isinstance(mode, str) else mode
         segment = self.problem.timeline.at(t)
         key = index, segment.start
@@ -111,7 +111,7 @@ class RecordedRun:
         return self.problem.kernel.enclosing.bind(index, data)
 
     def before(self, made: Transition) -> tuple[Place, int]:
-        """Look at where a transition was made, and which surface it crossed."""
+        """The state that a transition was made from, and the surface that it crossed."""
         place = self.place(made.source, made.time, tuple(made.before.values()))
         return place, self.edge_at(place, made.edge)
 
@@ -125,11 +125,11 @@ class RecordedRun:
         return tuple(self.execution.values[row][: len(arc.states)].tolist())
 
     def at_row(self, arc: Arc, row: int) -> Place:
-        """Look at a row."""
+        """The state at a row, with its mode."""
         return self.place(arc.mode, self.times[row], self.state(arc, row))
 
     def dense_output(self, arc: Arc, row: int) -> Callable[[Number], Place]:
-        """Look at shares of the step from a row to the next."""
+        """The dense output of the step from a row to the next: states by the share of the step."""
         t, h = self.times[row], self.times[row + 1] - self.times[row]
         x, d = self.state(arc, row), len(arc.states)
         piece: Polynomial = tuple(tuple(c[:d]) for c in self.execution.coefficients[row].tolist())

@@ -13,7 +13,7 @@ from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import steps_of
 
-PLACES = 64  # of a run where the round-off of its flow is looked at
+PLACES = 64  # of a run where the round-off of its flow is bounded
 ROUNDOFF_ROUNDS = 3  # from a flow's round-off to what that moves, and what that moves in turn
 
 

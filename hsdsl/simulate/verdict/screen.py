@@ -67,7 +67,7 @@ class Screen:
         self.columns: Columns | None = None
 
     def decide(self, columns: Columns, finer: int | None = None) -> bool:
-        """Look at a run, and say whether there is surely nothing to find; ``finer`` is the record of a finer one.
+        """Screen a run, and say whether there is surely nothing to find; ``finer`` is the record of a finer one.
 
         Without that, the run is held against its shadow run.
         """

@@ -14,7 +14,7 @@ left out, carried along by the flow and by jumps, as long as that is small.
 - Round-off is much the same for both, so each step moves the shadow run further away from the run by the most that it
   may do: that of the flow, and of states that move. Where an arc begins these are rounded, too.
 
-The shadow run looks for no other surface: enclosures wider than the errors decide along the run's own steps that none
+The shadow run crosses no other surface: enclosures wider than the errors decide along the run's own steps that none
 is reached.
 """
 

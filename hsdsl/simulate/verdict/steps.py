@@ -21,7 +21,7 @@ from hsdsl.simulate.verdict.expansions import Expansion, line, polynomial
 from hsdsl.simulate.verdict.run_view import RunView
 
 Array = NDArray[np.float64]
-MOST_PARTS = 1 << 15  # looked at together
+MOST_PARTS = 1 << 15  # enclosed together
 COLUMNS = ("row", "start", "width", "time", "length", "bernstein", "error")  # one entry for each part
 CUTTING = 2.0**-48  # of the largest coefficient: what cutting and changing the basis may add
 

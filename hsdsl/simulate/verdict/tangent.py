@@ -71,7 +71,7 @@ def _kept(run: RunView, made: Transition, k: int) -> bool:
 
 
 def _keeps(run: RunView, made: Transition, k: int) -> bool:
-    """Whether the flow of the mode that a transition leaves keeps surface k of its target, wherever it is looked at."""
+    """Whether the flow of the mode that a transition leaves keeps surface k of its target, around it too."""
     before, _ = run.before(made)
     for x in before.moved_by(tuple(map(abs, before.x))):
         seen = _seen(run, made, made.time, x)

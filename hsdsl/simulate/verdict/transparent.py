@@ -47,12 +47,12 @@ def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]
 
 
 def shares_between(start: float, end: float) -> list[float]:
-    """Shares of a step at which it is looked at, from one to another."""
+    """Shares of a step at which it is sampled, from one to another."""
     return [start + (end - start) * i / (SHARES - 1) for i in range(SHARES)]
 
 
 def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], passed: Passed) -> Finding | None:
-    """Look at where a step reaches surface k, of an edge with an `if`, from inside: each such place decides.
+    """A finding about the places where a step reaches surface k, of an edge with an `if`, from inside.
 
     ``step`` is its arc and the row where it begins; ``at`` are the shares between which such places are found.
     """
@@ -63,7 +63,7 @@ def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], pa
         values[0] = run.arithmetic.zero
     seen = values[0] <= 0 < values[-1]  # by `transparent`
     if run.crossed.get(arc.last) == k and row + 1 == arc.last:
-        del shares[-1]  # `crossings` looks at the end
+        del shares[-1]  # `crossings` decides the end
     for (a, before), (b, after) in pairwise(zip(shares, values, strict=False)):
         if not before <= 0 < after:
             continue
@@ -77,7 +77,7 @@ def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], pa
 
 
 def almost_left(run: RunView, k: int, row: int, places: Sequence[Place]) -> Finding | None:
-    """Look at where a step to a row turns back close to surface k and beyond it: the error may take it inside."""
+    """A miss where a step to a row turns back close to surface k and beyond it: the error may take it inside."""
     place = min(places, key=lambda place: place.value(k))
     shift = run.surface_error(place, k, row)
     if not 0 < place.value(k) <= SAFE * shift or not may_hold(run, place, k, row):
