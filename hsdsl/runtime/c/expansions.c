@@ -34,16 +34,16 @@ HS_INLINE double variation(hs_expansion a) { return fabs(a.first) + fabs(a.secon
 HS_INLINE double deviation(hs_expansion a) { return variation(a) + a.remainder; }
 HS_INLINE double size_of(hs_expansion a) { return fabs(a.value) + deviation(a); }
 
-/* What is unresolved in the result of an operation with so large terms that makes `beyond` and leaves out `off`: where it
-   is resolved, what its operands hide. */
+/* What is unresolved in the result of an operation with so large terms that makes `beyond` and leaves out `off`: where
+   it is resolved, that of its operands. */
 HS_INLINE double unresolved_in(double beyond, double varies, double unresolved, double off) {
   return beyond * RESOLVED <= varies ? unresolved : off;
 }
 
 HS_INLINE hs_expansion expanded_sum(hs_expansion a, hs_expansion b) {
   return expansion(a.value + b.value, a.first + b.first, a.second + b.second, a.third + b.third,
-                   a.remainder + b.remainder + (size_of(a) + size_of(b)) * EXPANSION_ROUNDOFF, a.unresolved + b.unresolved,
-                   a.error + b.error);
+                   a.remainder + b.remainder + (size_of(a) + size_of(b)) * EXPANSION_ROUNDOFF,
+                   a.unresolved + b.unresolved, a.error + b.error);
 }
 
 HS_INLINE hs_expansion expanded_multiple(hs_expansion a, double by) {

@@ -111,8 +111,8 @@ static int correct_n(hs_view *v, hs_shadow *c, double *apart) {
   return correct_in(v, c, v->n, apart);
 }
 
-/* Find where the shadow run is at the end of the run's step, to y, further away by `roundoff`, which goes on as the flow
-   does; and how far it is from the run inside, to `apart`. */
+/* Find where the shadow run is at the end of the run's step, to y, further away by `roundoff`, which goes on as the
+   flow does; and how far it is from the run inside, to `apart`. */
 static int correct_step(hs_view *v, hs_shadow *c, double *apart) {
   return (v->n == 2 ? correct_2 : v->n == 3 ? correct_3 : correct_n)(v, c, apart);
 }

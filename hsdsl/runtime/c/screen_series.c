@@ -56,8 +56,8 @@ static int leave_out(hs_view *v, const hs_shadow *c) {
   return 1;
 }
 
-/* Find where the shadow run is at the end of the run's step, to y, moved by what the run leaves out, and further away by
-   what round-off of the flow may do, `roundoff`. */
+/* Find where the shadow run is at the end of the run's step, to y, moved by what the run leaves out, and further away
+   by what round-off of the flow may do, `roundoff`. */
 static int expand_step(hs_view *v, hs_shadow *c) {
   take_step(v, c->row);
   const double *const x = recorded_row(&v->s->run, c->row + 1);

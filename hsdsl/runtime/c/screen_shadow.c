@@ -55,8 +55,8 @@ static int shadow_jumps(hs_view *v, hs_shadow *c, int64_t j, double *errors) {
   return !hs_changed(edge, edge->reset, c->p, c->t, c->y, c->y, c->x);
 }
 
-/* Follow the run: how far each row is from the shadow run, to `shadow_errors`, and each transition, to `time_errors`; 0 where that
-   cannot be followed. */
+/* Follow the run: how far each row is from the shadow run, to `shadow_errors`, and each transition, to
+   `time_errors`; 0 where that cannot be followed. */
 static int follow_run(hs_view *v) {
   const hs_screen *const s = v->s;
   const hs_record *const run = &s->run;

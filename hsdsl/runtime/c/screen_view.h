@@ -62,8 +62,8 @@ typedef struct {
   double value, rate, roundoff, error;
 } hs_near_surface;
 
-/* Where the shadow run is at the start of a step of the run, and how far it is from there on: coefficients 1 to order + 1
-   in shares of the step, and by how much it has moved at the end besides. */
+/* Where the shadow run is at the start of a step of the run, and how far it is from there on: coefficients 1 to
+   order + 1 in shares of the step, and by how much it has moved at the end besides. */
 typedef struct {
   const hs_mode *table;
   const double *p;
