@@ -10,6 +10,7 @@ from dataclasses import replace
 import sympy as sp
 
 from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.insertions import Insertions, flow_style
 from hsdsl.completion.nearby import LONG, cancelled
 from hsdsl.completion.printer import inequality, text_of, wall
 from hsdsl.completion.sliding import Sliding, slidings
@@ -37,7 +38,7 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     slide = [(_leaving_on_surface(s), s.mode.name) for s in surfaces]
     for mode, name in slide + [writer.add_contact(*found) for found in contacts]:
         writer.add_mode(_without_constant_guards(mode, system), name)
-    return writer.result()
+    return writer.insertions.result()
 
 
 def _leaving_on_surface(found: Sliding) -> Mode:
@@ -60,20 +61,13 @@ def _without_constant_guards(mode: Mode, system: HybridSystem) -> Mode:
 
 
 class _Writer:
-    """Insertions into a text, made from its end to its start."""
+    """The modes and transitions that are inserted into the text of a model, with names that are free."""
 
     def __init__(self, text: Text, root: Node, system: HybridSystem) -> None:
         assert isinstance(root, Mapping)
-        self._text, self._root, self._system = text, root, system
+        self._root, self._system, self.insertions = root, system, Insertions(text)
         self._names = {mode.name for mode in system.modes} | {p.name for p in system.parameters}
-        self._insertions: dict[int, list[str]] = {}
         self._time: str | None = None
-
-    def result(self) -> str:
-        content = self._text.content
-        for index in sorted(self._insertions, reverse=True):
-            content = content[:index] + "".join(self._insertions[index]) + content[index:]
-        return content
 
     def add_contact(self, mode: Mode, found: Contact) -> tuple[Mode, str]:
         """Add the transition into a motion along a guard; return its mode and the name of that."""
@@ -116,17 +110,17 @@ class _Writer:
             entry = f"{self._time}: {TIME_OF_CONTACT}"
             if parameters is None or not isinstance(parameters, Mapping) or not parameters.entries:
                 (key, _) = self._root.entries["modes"]
-                self._insert(key.place.start[0], f"parameters: {{{entry}}}\n")
+                self.insertions.insert(key.place.start[0], f"parameters: {{{entry}}}\n")
             else:
-                self._append(parameters, entry, entry)
+                self.insertions.append(parameters, entry, entry)
         return self._time
 
     def add_transition(self, mode: str, fields: dict[str, str]) -> None:
         """Add a transition behind those of a mode."""
         node = child(child(child(self._root, "modes"), mode), "transitions")
         assert node is not None
-        text = _flow_style(fields)
-        self._append(node, text, f"- {text}")
+        text = flow_style(fields)
+        self.insertions.append(node, text, f"- {text}")
 
     def add_mode(self, mode: Mode, name: str) -> None:
         """Add a mode behind the others."""
@@ -134,27 +128,10 @@ class _Writer:
         assert node is not None
         end = "" if mode.edges else "  # hsdsl: ignore[HS425] no transition leads out of this motion"
         block = f"{name}:{end}\n" + "".join(f"  {line}\n" for line in _mode_lines(mode, self._system))
-        edges = ", ".join(_flow_style(_transition(edge)) for edge in mode.edges)
-        parts = [f"flow: {_flow_style(_flow(mode))}", *_rest(mode, self._system)]
+        edges = ", ".join(flow_style(_transition(edge)) for edge in mode.edges)
+        parts = [f"flow: {flow_style(_flow(mode))}", *_rest(mode, self._system)]
         parts += [f"transitions: [{edges}]"] if mode.edges else []
-        self._append(node, f"{name}: {{{', '.join(parts)}}}", block.rstrip("\n"))
-
-    def _append(self, node: Node, inline: str, block: str) -> None:
-        """Add an entry behind the last one of a mapping or a list, in its style."""
-        start, end = node.place.start[0], node.place.end[0]
-        content = self._text.content
-        if content[start] in "[{":
-            before = "" if content[start + 1 : end - 1].strip() == "" else ", "
-            self._insert(end - 1, before + inline)
-            return
-        column = node.place.start[2]
-        last = len(content[:end].rstrip())
-        line_end = content.find("\n", last)
-        at = len(content) if line_end < 0 else line_end
-        self._insert(at, "".join(f"\n{' ' * column}{line}" for line in block.splitlines()))
-
-    def _insert(self, index: int, text: str) -> None:
-        self._insertions.setdefault(index, []).append(text)
+        self.insertions.append(node, f"{name}: {{{', '.join(parts)}}}", block.rstrip("\n"))
 
 
 def _onto_guard(mode: Mode, found: Contact, depth: sp.Expr = sp.S.Zero) -> tuple[sp.Expr, ...]:
@@ -178,7 +155,7 @@ def _transition(edge: Edge) -> dict[str, str]:
     fields["to"] = edge.target
     changes = {name: text_of(r) for name, r in zip(edge.target_states, edge.reset, strict=True) if r != symbol(name)}
     if changes:
-        fields["reset"] = _flow_style(changes)
+        fields["reset"] = flow_style(changes)
     if edge.priority:
         fields["priority"] = str(edge.priority)
     return fields
@@ -199,7 +176,7 @@ def _rest(mode: Mode, system: HybridSystem) -> Iterator[str]:
         yield f"domain: [{', '.join(map(wall, mode.walls))}]"
     outputs = {n: text_of(o) for n, o in zip(system.outputs, mode.outputs, strict=True) if o is not None}
     if outputs:
-        yield f"outputs: {_flow_style(outputs)}"
+        yield f"outputs: {flow_style(outputs)}"
 
 
 def _mode_lines(mode: Mode, system: HybridSystem) -> Iterator[str]:
@@ -208,13 +185,4 @@ def _mode_lines(mode: Mode, system: HybridSystem) -> Iterator[str]:
     yield from _rest(mode, system)
     if mode.edges:
         yield "transitions:"
-    yield from (f"  - {_flow_style(fields)}" for fields in map(_transition, mode.edges))
-
-
-def _flow_style(fields: dict[str, str]) -> str:
-    return "{" + ", ".join(f"{key}: {_quoted(value)}" for key, value in fields.items()) + "}"
-
-
-def _quoted(text: str) -> str:
-    """A value inside brackets: in quotes where a comma or a bracket of its own would end it."""
-    return f"'{text}'" if "," in text and text[0] not in "{[" else text
+    yield from (f"  - {flow_style(fields)}" for fields in map(_transition, mode.edges))
