@@ -176,7 +176,7 @@ def unseen(run: Run, here: ModeState, span: Span, first: Crossing, seen: set[int
         if k in seen or here.surfaces.releases(k) or not first.theta > 0:
             continue
         bound = here.surfaces.roundoff_bound
-        if not end[k] > bound(k, first.time, first.state) or start[k] > bound(k, t, x):
+        if not end[k] > 0 or not end[k] > bound(k, first.time, first.state) or start[k] > bound(k, t, x):
             continue
 
         def residual(s: Number, k: int = k) -> Number:

@@ -145,6 +145,7 @@ static int with_unseen(hs_run *run, int count) {
   const hs_span *span = &run->span;
   const hs_crossing *first = &run->crossings[0];
   const int seen = count;
+  int known = 0; /* whether run->values are those at the first crossing */
   for (int i = 1; i < count; i++)
     if (run->crossings[i].time < first->time) first = &run->crossings[i];
   if (!(first->theta > 0)) return count;
@@ -153,6 +154,9 @@ static int with_unseen(hs_run *run, int count) {
     for (int i = 0; i < seen; i++) was |= run->crossings[i].edge == k;
     if (was) continue;
     hs_real start, end, before, noise, s = 0.0;
+    if (!known && mode->values(run->here.p, first->time, first->state, run->values)) return RAISED;
+    known = !(run->values[k] > 0);
+    if (known) continue;
     if (surface(run, k, span->t, run->x, &start) || surface(run, k, first->time, first->state, &end)) return RAISED;
     if (roundoff_bound(run, k, first->time, first->state, 0, &noise)) return RAISED;
     if (!(end > noise)) continue;
