@@ -36,18 +36,19 @@ _HOMES = {
     "load": "hsdsl.model",
     "loads": "hsdsl.model",
 }
+_MODULES = ("exact", "store", "sweep")  # those with functions for users
 
 
 def __dir__() -> list[str]:
-    return sorted({*__all__, "exact"})
+    return sorted({*__all__, *_MODULES})
 
 
 def __getattr__(name: str) -> Any:
     """Import public names on first use: importing one stage must not load the others."""
     from importlib import import_module
 
-    if name == "exact":
-        return import_module("hsdsl.exact")
+    if name in _MODULES:
+        return import_module(f"hsdsl.{name}")
     if name not in _HOMES:
         raise AttributeError(f"module 'hsdsl' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)

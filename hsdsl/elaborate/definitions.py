@@ -98,6 +98,9 @@ def substituted_definitions(document: ModelDocument) -> Iterator[Definition]:
         yield from (Definition(str(name), scalar.value, str(mode)) for name, scalar in content.let.items())
 
 
+_OF_TIME = dict.fromkeys(("time", "tau"), "the time is t: write its unit for t")
+
+
 def elaborate_units(symbols: SymbolTable) -> dict[str, str]:
     """The unit of each name that has one."""
     known = [name for name, kind in symbols.names.items() if kind not in ("let", "functions")]
@@ -106,7 +109,7 @@ def elaborate_units(symbols: SymbolTable) -> dict[str, str]:
     for key, scalar in symbols.document.units.items():
         if key not in known:
             message = f"'{shown(key)}' is neither a state nor a parameter, an input or an output"
-            symbols.report(key.place, "HS313", message, did_you_mean(key, known))
+            symbols.report(key.place, "HS313", message, _OF_TIME.get(key.lower()) or did_you_mean(key, known))
         unit = symbols.text(scalar)
         if unit is not None:
             units[str(key)] = unit

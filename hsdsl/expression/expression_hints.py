@@ -189,6 +189,11 @@ def unit(name: str) -> str | None:
     return "leave the unit out: units belong under `units`" if len(name) > 1 and name.lower() in _UNITS else None
 
 
+def measured(number: str) -> str:
+    """The hint for a number and what may be a unit such as ``1/h``."""
+    return f"write {number} alone, for units belong under `units`; or {number}*1 for a product"
+
+
 def side_by_side(number: str, name: str) -> str | None:
     """The hint for a number and a name without an operator between, where the name is a unit or an exponent."""
     if name in ("deg", "degrees", "rad"):

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from typing import Literal
 
 from hsdsl.expression import syntax
-from hsdsl.expression.expression_hints import CASES, compared, power_of, side_by_side, timed
+from hsdsl.expression.expression_hints import CASES, compared, measured, power_of, side_by_side, timed
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.syntax import Expected, ExpressionError, Tree
 from hsdsl.expression.tokens import Token, tokenize
@@ -214,7 +214,8 @@ class _Parser:
 
 def _joined(before: Token, token: Token, left: str, right: str) -> str:
     if before.kind == token.kind == "number":
-        return "a number has one decimal point, and no blanks"
+        plain = right == "1" and before.end < token.start  # as in 1.2 1/h
+        return measured(left) if plain else "a number has one decimal point, and no blanks"
     known = side_by_side(left, right) if (before.kind, token.kind) == ("number", "name") else compared(left, right)
     known = known or timed(left, right)
     return known or f"write {left}*{right} for a product"

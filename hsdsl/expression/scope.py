@@ -136,7 +136,8 @@ class Scope:
         assert self.states is not None
         lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
         message = f"'{node.name}' needs the state {lacking}, which {self.place} does not have"
-        hint = f"give {self.place} this state; with the flow 0 it keeps its value there"
+        flow = ", ".join(f"{s}: 0" for s in sorted(value.uses - self.states))
+        hint = f"add {flow} to its flow, where it then keeps its value"
         if value.uses == {node.name}:
             message = f"{self.place} has no state '{node.name}'"
             hint = did_you_mean(node.name, sorted(self.states - {SINCE})) or hint

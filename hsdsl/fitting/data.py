@@ -46,7 +46,7 @@ def measurements(given: Any, known: Sequence[str]) -> Measurements:
     if isinstance(given, Measurements):
         return given
     name, columns = _columns(given)
-    time = next((c for c in TIMES if c in columns and c not in known), None)
+    time = next((c for name in TIMES for c in columns if c.lower() == name and c not in known), None)
     if time is None:
         raise UsageError(f"{name}: expected a column t with the times, got {', '.join(columns) or 'none'}")
     measured = [c for c in columns if c != time and c not in HYBRID_TIME]

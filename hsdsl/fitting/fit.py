@@ -11,12 +11,12 @@ import numpy as np
 
 from hsdsl.execution import Array, Execution
 from hsdsl.fitting.data import Measurements
-from hsdsl.names import called
+from hsdsl.names import called, visible
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """Values of parameters and initial states that measurements agree with best.
 
@@ -52,6 +52,17 @@ class Fit:
     nonsmooth: tuple[str, ...]
     measured: Measurements = field(repr=False)
     execution: Execution = field(repr=False)
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{name} {number(value, 6)}" for name, value in self.values.items())
+        of = visible(called(self.execution.title, self.execution.model))
+        return f"<Fit of {of}: {visible(values)}, {self.measured.count} measurements, {self.evaluations} runs>"
+
+    def _repr_html_(self) -> str:
+        """Show the values and a picture in notebooks."""
+        from hsdsl.plot.notebook import measured_html
+
+        return measured_html(self.summary, self.execution, self.measured.times, self.measured.columns)
 
     @property
     def deviations(self) -> dict[str, float]:

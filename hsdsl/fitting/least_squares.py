@@ -25,6 +25,7 @@ PRECISE = 1e-15  # changes of values and of the sum that end a fit
 TOO_FAR = 1e3  # the weighted residual of a run that ends before a measurement
 UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
 MOST_NAMED = 3
+TIE = 1e-12  # of a run: times that are no further apart are one
 
 
 @dataclass
@@ -191,10 +192,12 @@ def _covariance(slopes: Array) -> Array:
 def _close_transitions(found: Sensitivity, measured: Measurements, covariance: Array) -> Sequence[str]:
     """The transitions that the uncertainty of the values carries over a measurement."""
     close: list[str] = []
-    spread = np.where(np.isfinite(covariance), covariance, 0.0)
+    spread, end = np.where(np.isfinite(covariance), covariance, 0.0), float(measured.times.max())
     for made, moves in zip(found.execution.transitions, found.as_made().transitions, strict=True):
         slope = np.array([moves.time[by] for by in found.wrt], float)
         reach = 2 * float(max(0.0, slope @ spread @ slope)) ** 0.5
+        if reach <= TIE * max(abs(float(made.time)), end):
+            continue  # its time depends on no value
         near = measured.times[np.abs(measured.times - made.time) <= reach]
         if len(near):
             where = f"t = {show(near[0])}" + (f" and {len(near) - 1} more" if len(near) > 1 else "")

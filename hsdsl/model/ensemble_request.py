@@ -53,7 +53,9 @@ class EnsembleRequest:
             common = np.broadcast_arrays(*varied.values())
         except ValueError:
             shapes = ", ".join(f"{name} has {array.shape}" for name, array in varied.items())
-            raise UsageError(f"the arrays of an ensemble have no common shape: {shapes}") from None
+            several = [name for name, array in varied.items() if array.ndim == 1]
+            hint = f"for every combination give columns and rows: {several[0]} as array[:, None]" if several else None
+            raise UsageError(f"the arrays of an ensemble have no common shape: {shapes}", hint) from None
         shape = common[0].shape if common else ()
         flat = {name: array.reshape(-1) for name, array in zip(varied, common, strict=True)}
         return EnsembleRequest(call, flat, shape, _samples(samples), transition_times, every_transition)

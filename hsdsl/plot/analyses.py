@@ -49,8 +49,7 @@ def plot_over_time(times: Array, bounds: dict[str, tuple[Array, Array]], title: 
     return figure
 
 
-@to_file
-def plot_measured(run: Execution, times: Array, columns: Mapping[str, Array]) -> Figure:
+def measured(run: Execution, times: Array, columns: Mapping[str, Array]) -> Figure:
     """Draw measurements and the run fitted to them, a panel for each column; jumps are not joined."""
     from matplotlib.figure import Figure
 
@@ -68,6 +67,9 @@ def plot_measured(run: Execution, times: Array, columns: Mapping[str, Array]) ->
     drawn = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))  # one for all pieces of the run
     legend_below(figure, list(drawn.values()), 9.0)
     return figure
+
+
+plot_measured = to_file(measured)
 
 
 @to_file

@@ -4,14 +4,15 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from html import escape
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.execution import Ensemble, Execution
-from hsdsl.names import called, visible, without_memory
+from hsdsl.execution import Array, Ensemble, Execution
+from hsdsl.names import called, visible, visible_lines, without_memory
 from hsdsl.plot.style import ALARM, INK, styled, write_figure
 from hsdsl.plot.view import View
 from hsdsl.report import words
@@ -51,6 +52,19 @@ def ensemble_html(ensemble: Ensemble) -> str:
     with styled():
         drawn = _curves(ensemble) if len(ensemble.varied) == 1 else _map(ensemble)
         return f"{table}\n{_element(drawn, heading)}"
+
+
+def lines_html(text: str) -> str:
+    """Return lines of text; every text of the model is escaped."""
+    return f'<div class="hsdsl"><pre>{escape(visible_lines(text))}</pre></div>'
+
+
+def measured_html(text: str, run: Execution, times: Array, columns: Mapping[str, Array]) -> str:
+    """Return lines of text, and a picture of measurements and the run fitted to them."""
+    with styled():
+        from hsdsl.plot.analyses import measured
+
+        return f"{lines_html(text)}\n{_element(measured(run, times, columns), words.heading(run))}"
 
 
 def _range(values: Any) -> str:

@@ -34,7 +34,8 @@ _OF_OTHERS = {
     "column": "col field header column_name variable series",
     "of": "args arguments params parameters inputs variables vars",
     "is": "expr expression body formula value returns return",
-    "title": "name",
+    "title": "name model",
+    "samples": "points n_points num_points n_samples num_samples",
     "about": "description comment doc",
     "value": "default val number",
 }
@@ -53,6 +54,7 @@ _OF_MODELS = {  # keys of the whole file in other tools
     "species": "a species is a state, a key of `flow`; `initial` gives its value",
     "compartments": "give the size of a compartment under `parameters`",
     "reactions": "write the rate of each reaction under `let` of a mode, and what it changes in `flow`",
+    "doses": "a dose is an event that adds to a state: {event: since >= 8, reset: {gut: gut + dose}}",
     "events": "an event is a transition of a mode: {event: A < 1, reset: {A: 2}}",
     "rules": "write assignment rules under `let`, and rate rules in `flow`",
     "assignmentRules": "write them under `let`",
@@ -100,7 +102,8 @@ def key_meant(key: str, fields: Iterable[str], parent: Node | None) -> str | Non
     named = [field for field in _BY_NAME.get(key, ()) if field in fields and field not in present]
     if named:
         return named[0]
-    elsewhere = (key in _NOT_NEEDED and key not in fields) or _home(key) or _is_a_mode(child(parent, key))
+    elsewhere = _not_needed(key, fields) if key not in fields else None
+    elsewhere = elsewhere or _home(key) or _is_a_mode(child(parent, key))
     return None if elsewhere else closest(key, fields)
 
 

@@ -39,6 +39,13 @@ class Sweep:
         of = visible(called(self.manifest.title, self.manifest.model))
         return f"<Sweep of {of} in {self.folder}: {self.done:,} of {self.rows:,} rows>"
 
+    def _repr_html_(self) -> str:
+        """Show what was varied and how the runs ended in notebooks."""
+        from hsdsl.plot.notebook import lines_html
+        from hsdsl.sweep.summary import summary
+
+        return lines_html(summary(self))
+
     @property
     def rows(self) -> int:
         """How many rows it has when it is complete."""

@@ -111,6 +111,28 @@ def test_a_measurement_at_a_transition_is_named() -> None:
     assert any("bounce" in reason for reason in found.nonsmooth)
 
 
+DOSED = """
+hsdsl: 1
+parameters: {k: 0.4, dose: 3}
+modes: {m: {flow: {A: -k*A}, transitions: [{name: take, event: t >= 1.5, reset: {A: A + dose}}]}}
+initial: {mode: m, A: 2}
+experiment: {until: 4}
+"""
+
+
+def test_a_measurement_at_a_time_that_no_value_moves_is_not_named() -> None:
+    model = hsdsl.loads(DOSED)
+    times = np.array([0.5, 1.0, 1.5, 2.0, 3.5])
+    true = model.simulate(parameters={"k": 0.7}, tolerance=1e-12).sample(times)["A"]
+    noisy = true * np.array([1.01, 0.98, 1.0, 1.02, 0.99])
+    fit = model.fit({"Time": times, "A": noisy}, wrt="k")
+    assert fit.nonsmooth == ()
+    assert fit.values["k"] == pytest.approx(0.7, abs=0.05)
+    assert repr(fit).startswith("<Fit of ") and f"k {fit.values['k']:.6g}" in repr(fit)
+    shown = fit._repr_html_()
+    assert "5 measurements" in shown and "<img" in shown
+
+
 def test_progress(model: Any, samples: dict[str, Any]) -> None:
     told: list[float] = []
     model.fit({"t": samples["t"], "x": samples["x"]}, "c", progress=lambda runs, values, total: told.append(total))

@@ -119,6 +119,8 @@ def test_what_cannot_be_recorded_is_refused(text):
 
 def test_rows_are_single_runs(model, tmp_path):
     found = model.sweep(VARY, tmp_path / "s", record=RECORD, parameters={"g": 10}, chunk=5, processes=1)
+    assert f"{found.rows:,} of {found.rows:,} rows" in found._repr_html_()
+    assert hsdsl.sweep.load(tmp_path / "s").rows == found.rows
     assert found.complete and sorted(found.chunks) == [0, 1, 2]
     rows = found.table().to_pylist()
     for k in (0, 6, 11):
