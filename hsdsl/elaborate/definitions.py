@@ -98,7 +98,7 @@ def substituted_definitions(document: ModelDocument) -> Iterator[Definition]:
         yield from (Definition(str(name), scalar.value, str(mode)) for name, scalar in content.let.items())
 
 
-_OF_TIME = dict.fromkeys(("time", "tau"), "the time is t: write its unit for t")
+_OF_TIME: dict[str, str] = dict.fromkeys(("time", "tau"), "the time is t: write its unit for t")
 
 
 def elaborate_units(symbols: SymbolTable) -> dict[str, str]:
