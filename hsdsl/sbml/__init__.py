@@ -28,6 +28,7 @@ from hsdsl.source.xml import Element, read_xml
 
 __all__ = ["DEEPEST", "FEATURE", "converted", "imported", "is_sbml"]
 
+_HINTS = {"the package 'comp'": "have its submodels written out, by COPASI or libSBML"}
 FEATURE = "HS334"  # the code of what a model cannot keep
 
 
@@ -88,4 +89,4 @@ def _document(converter: Converter, outputs: Mapping[str, str], until: str) -> d
 
 def _refused(feature: NotExpressible, element: Element) -> ModelError:
     place = feature.element or element
-    return ModelError([place.fault(FEATURE, f"a model cannot have {feature}")])
+    return ModelError([place.fault(FEATURE, f"a model cannot have {feature}", _HINTS.get(str(feature)))])

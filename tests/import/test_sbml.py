@@ -249,6 +249,13 @@ def test_what_has_no_words_is_refused_with_its_place(formula: str, feature: str)
     assert found.span.line == 3 or formula == "twice(x)"
 
 
+def test_required_packages_are_refused() -> None:
+    """Submodels change what a model means."""
+    text = model(Parameters=parameter("x", 1)).replace('version="2"', 'version="2" xmlns:comp="c" comp:required="true"')
+    with pytest.raises(hsdsl.ModelError, match=r"the package 'comp' \(have its submodels written out"):
+        of(text)
+
+
 def test_functions_that_double_are_bounded() -> None:
     """A chain of functions that would write out to a formula without end is refused."""
     chain = ""
