@@ -154,6 +154,9 @@ def test_what_cannot_be_served_is_refused():
     ):
         with pytest.raises(UsageError, match=sentence):
             oscillator.ensemble(**arguments)
+    with pytest.raises(UsageError) as lengths:
+        oscillator.ensemble(parameters={"c": [0.7] * 4, "a": [0.1] * 3})
+    assert lengths.value.hint == "for every combination give columns and rows: c as array[:, None]"
     with pytest.raises(IndexError, match="expected an index of an ensemble of shape"):
         oscillator.ensemble(parameters={"c": [0.5, 0.6]}, **FAST).run(2)
 
