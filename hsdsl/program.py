@@ -208,6 +208,7 @@ class ModeProgram:
     ``held`` is the number, among `Program.flows`, of this mode where guards hold the state.
     ``slides`` names the two modes between which a mode of a completion slides.
     ``measured`` numbers states whose slopes at the end of an implicit step are put into the states before the last.
+    The last ``derived`` states are derivatives of the others: surfaces and conditions do not depend on them.
     """
 
     name: str
@@ -226,6 +227,7 @@ class ModeProgram:
     held: int | None = None
     slides: tuple[str, ...] = ()
     measured: tuple[int, ...] = ()
+    derived: int = 0
 
     @cached_property
     def conditions(self) -> tuple[tuple[str, ...], ...]:

@@ -85,6 +85,9 @@ def taylor_stepper(method: TaylorMethod, series: Taylor, arithmetic: Arithmetic)
     def piece(
         flow: Flow, t: Number, h: Number, x: State, z: State, stages: Stages, slope: State, end: State
     ) -> Polynomial:
+        return along(stages, h)
+
+    def along(stages: Stages, h: Number) -> Polynomial:
         power, parts = zero + 1, list[State]()
         for c in stages[:-1]:
             power = power * h
@@ -92,11 +95,12 @@ def taylor_stepper(method: TaylorMethod, series: Taylor, arithmetic: Arithmetic)
         return tuple(parts)
 
     def error(h: Number, stages: Stages, end: State) -> State:
-        """How badly the polynomial solves the equation at its end: h (X' - f) / (order + 1)."""
-        slope = tuple(order * c for c in stages[-2])
+        """How badly the polynomial solves the equation at its end: (h X' - h f) / (order + 1)."""
+        parts = along(stages, h)
+        moved = tuple(order * part for part in parts[-1])
         for m in range(order - 1, 0, -1):
-            slope = tuple(m * c + h * b for c, b in zip(stages[m - 1], slope, strict=True))
-        return tuple(h * (a - b) / (order + 1) for a, b in zip(slope, end, strict=True))
+            moved = tuple(m * part + b for part, b in zip(parts[m - 1], moved, strict=True))
+        return tuple((a - h * b) / (order + 1) for a, b in zip(moved, end, strict=True))
 
     return Stepper(method.name, step, piece, error)
 

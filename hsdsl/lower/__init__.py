@@ -272,6 +272,7 @@ class LoweredMode:
             slopes=tuple(tuple(self._places[a] for a in slopes.sparse[0]) for slopes in self._slopes),
             slides=mode.slides or (),
             measured=mode.measured,
+            derived=mode.derived,
             **others,
         )
 

@@ -7,11 +7,12 @@ each coefficient is written by pieces (`pieces`), which the functions of motions
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from itertools import chain
 
 from hsdsl.backends.c.pieces import LARGE, Assignment, pieces
 from hsdsl.backends.c.printer import expression
-from hsdsl.backends.c.shared import Shared, shared
+from hsdsl.backends.c.shared import arrays, shared, statements
 from hsdsl.backends.tape import Language, coefficient_of, value_of
 from hsdsl.program import Tape
 
@@ -22,7 +23,7 @@ static int NAME(const hs_real *restrict c, int order, hs_real t, const hs_real *
   int bad = 0;
   const int length = order + 2;
   (void)c, (void)t, (void)x;
-{pointers}
+{pointers}{arrays}
   l0[0] = t;
   l0[1] = 1.0;
   for (int k = 2; k < length; k++) l0[k] = 0.0;
@@ -73,10 +74,12 @@ def is_large(tape: Tape, dimension: int) -> bool:
     return line_count(tape, dimension) > LARGE
 
 
-def flow_lines(tape: Tape, dimension: int) -> str:
+def flow_lines(tape: Tape, dimension: int, further: Container[int], in_pairs: bool = False) -> str:
     """Write the function of the lines that the flow needs; its name is to be put in for ``NAME``.
 
-    The states' newest coefficients stay in variables ``w``: each waits for the one before, and memory is slower.
+    The states' newest coefficients stay in variables ``w``: each waits for the one before, and memory is slower. Those
+    of other lines are put into memory where something reads them there: ``further`` are lines that others read. With
+    ``in_pairs`` products go in vectors of two.
     """
     first, states = dimension + 1, range(1, dimension + 1)
 
@@ -87,12 +90,20 @@ def flow_lines(tape: Tape, dimension: int) -> str:
         return "l0[k]" if line == 0 else f"w{line}" if line < first else f"v{line}"
 
     own = range(first, first + tape.needed)
-    values = [f"l{i}[0] = {value(i)};" for i in states] + _straight(_values(tape, own, first, value))
+    groups = shared(tape, own, first, in_pairs)
+    sums = {i: text for group in groups for i, text in group.sums.items()}
+    texts = [(i, sums.get(i, text)) for i, text in _coefficients(tape, own, first, newest)]
+    loops = {i: keeping + loop for i, (keeping, loop) in statements(groups, newest).items()}
+    read = _lines_in([*(text for _, text in texts), *chain(*loops.values())])
+    read.update(i for i in own if i in further)
+    values = [f"l{i}[0] = {value(i)};" for i in states]
+    kept = {i: keeping for i, (keeping, _) in statements(groups, value).items()}
+    values += _straight(_values(tape, own, first, value), read, kept)
     values += [f"hs_real w{i} = l{i}[1] = {value(tape.flow[i - 1])}; (void)w{i};" for i in states]
-    coefficients = _straight(_coefficients(tape, own, first, newest), shared(tape, own, first))
+    coefficients = _straight(texts, read, loops)
     coefficients += [f"const hs_real u{i} = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
     coefficients += [f"w{i} = l{i}[k + 1] = u{i};" for i in states]
-    return _filled(_FLOW, values, coefficients)
+    return _filled(_FLOW, values, coefficients, [*arrays(groups).values()])
 
 
 def surface_lines(tape: Tape, dimension: int) -> str:
@@ -107,7 +118,7 @@ def surface_lines(tape: Tape, dimension: int) -> str:
         return f"v{line}" if line in own else f"l{line}[k]"
 
     values, coefficients = (each(tape, own, first, name) for each, name in ((_values, value), (_coefficients, newest)))
-    return _filled(_SURFACES, _straight(values), _straight(coefficients))
+    return _filled(_SURFACES, _straight(values, own), _straight(coefficients, own))
 
 
 def piecewise(tape: Tape, dimension: int, own: range, states: Iterable[int]) -> tuple[str, list[str]]:
@@ -137,15 +148,23 @@ def piecewise(tape: Tape, dimension: int, own: range, states: Iterable[int]) -> 
     return _CALLS.format(calls=f"(k ? {coefficients_text} : {values_text}) || {states_text}"), parts
 
 
-def _straight(texts: list[tuple[int, str]], groups: Sequence[Shared] = ()) -> list[str]:
-    """The statements for lines that are variables too, ``v``; those of products that share a factor together."""
-    loops = {group.products[0]: group.loop() for group in groups}
-    summed = {i for group in groups for i in group.products}
+def _straight(
+    texts: list[tuple[int, str]], kept: Container[int], before: Mapping[int, Sequence[str]] | None = None
+) -> list[str]:
+    """The statements for lines that are variables too, ``v``; those in ``kept`` go into memory."""
     found: list[str] = []
     for i, text in texts:
-        found += loops.get(i, [])
-        found += [f"const hs_real v{i} = {f'low{i} + high{i}' if i in summed else text};", f"l{i}[@] = v{i};"]
+        found += (before or {}).get(i, ())
+        found.append(f"const hs_real v{i} = {text};")
+        if i in kept:
+            found.append(f"l{i}[@] = v{i};")
     return found
+
+
+def read_by_surfaces(tape: Tape) -> set[int]:
+    """The lines that surfaces are, or are computed from."""
+    further = {line for operation in tape.operations[tape.needed :] for line in operation.lines}
+    return further | {line for line in tape.surfaces if line is not None}
 
 
 def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
@@ -177,10 +196,16 @@ def _language(constant: Callable[[int], str], name: Callable[[int], str], zero: 
     )
 
 
-def _filled(template: str, values: list[str], coefficients: list[str]) -> str:
-    used = sorted({0, *(int(i) for text in (*values, *coefficients) for i in _LINE.findall(text))})
+def _lines_in(texts: Iterable[str]) -> set[int]:
+    """The lines that texts read in memory."""
+    return {int(i) for text in texts for i in _LINE.findall(text)}
+
+
+def _filled(template: str, values: list[str], coefficients: list[str], pairs: Sequence[str] = ()) -> str:
+    used = sorted({0} | _lines_in((*values, *coefficients)))
     return template.format(
         pointers="\n".join(f"  hs_real *const l{i} = lines + {i} * length;" for i in used),
+        arrays="".join(f"\n  hs_pair {name}[HS_MOST_ORDER + 2];" for name in pairs),
         values="\n".join(f"  {text.replace('[@]', '[0]')}" for text in values),
         coefficients="\n".join(f"    {text.replace('[@]', '[k]')}" for text in coefficients),
     )

@@ -13,7 +13,7 @@ from textwrap import dedent
 
 from hsdsl.backends.c.printer import function_body
 from hsdsl.backends.c.routine import routine_function
-from hsdsl.backends.c.series import flow_lines, is_large, line_count, piecewise, surface_lines
+from hsdsl.backends.c.series import flow_lines, is_large, line_count, piecewise, read_by_surfaces, surface_lines
 from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines, Tape
 from hsdsl.sparsity import Elimination, Variation
 
@@ -192,6 +192,9 @@ class _Writer:
         self._names: dict[str, str] = {}
         self._tables: dict[tuple[str, str], str] = {}
         self._count = count()
+        self.read: dict[object, set[int]] = {}  # by the operations of flows, the lines that surfaces read
+        for tape in (mode.tape for mode in program.flows if mode.tape):
+            self.read.setdefault(_flow_of(tape), set()).update(read_by_surfaces(tape))
 
     def mode(self, index: int, mode: ModeProgram) -> str:
         routine = self.routines(mode.routines)
@@ -205,7 +208,7 @@ class _Writer:
             ),
             self.pointers(routine[f"rate_{k}"] for k in surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
-            *(self.series(mode.tape, len(mode.states)) if mode.tape else ("0", "0", "0")),
+            *(self.series(mode.tape, len(mode.states), mode.derived > 0) if mode.tape else ("0", "0", "0")),
             self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),
             self.elimination(mode.jacobian.elimination),
             str(int(mode.affine)),
@@ -215,6 +218,7 @@ class _Writer:
             str(len(mode.measured)),
             self.table("int", "measured", list(map(str, mode.measured))),
             self.variation(mode.jacobian.variation),
+            str(len(mode.states) - mode.derived),
         ]
         return f"{{{', '.join(fields)}}}"
 
@@ -240,8 +244,11 @@ class _Writer:
         numbers = ", ".join((sizes, *others))
         return self.table("hs_variation", "varied", [f"{{{numbers}, {self.elimination(of.elimination)}}}"])
 
-    def series(self, tape: Tape, dimension: int) -> tuple[str, str, str]:
-        """Write the functions of a tape: those of the lines, which many modes share, and those that give constants."""
+    def series(self, tape: Tape, dimension: int, has_derivatives: bool) -> tuple[str, str, str]:
+        """Write the functions of a tape: those of the lines, which many modes share, and those that give constants.
+
+        Models with derivatives are not exported: they may use what some compilers lack.
+        """
         own, further = tape.constant_count, tape.surface_constant_count
         texts, size = dict[str, str](_DEFINITION.findall(tape.constants.source)), max(1, own + further)
         first = f"{self.function(texts['flow'])}(p, 0.0, 0, c) || " if own else ""
@@ -249,7 +256,7 @@ class _Writer:
         found = [str(-1 if line is None else line) for line in tape.surfaces]
         if is_large(tape, dimension):
             return (*self.piecewise(tape, dimension, size, first, first + second), self.table("int", "line", found))
-        core = self.shared("flow_lines", flow_lines(tape, dimension))
+        core = self.shared("flow_lines", flow_lines(tape, dimension, self.read[_flow_of(tape)], has_derivatives))
         series = _SERIES.format(size=size, constants=first, core=core)
         core = self.shared("surface_lines", surface_lines(tape, dimension))
         surface_series = _SURFACE_SERIES.format(size=size, constants=first + second, core=core)
@@ -322,3 +329,8 @@ class _Writer:
             self._names[key] = name = f"routine_{len(self.functions)}"
             self.functions[key] = routine_function(name, text, self.data, apart)
         return self._names[key]
+
+
+def _flow_of(tape: Tape) -> object:
+    """What the function of the flow's lines is written from."""
+    return tape.operations[: tape.needed], tape.flow

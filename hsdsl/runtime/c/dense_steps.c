@@ -33,6 +33,19 @@ static int span_point(hs_run *run, hs_real s, hs_time *time, hs_real **state) {
   return status ? RAISED : 0;
 }
 
+/* The same, of Taylor's method the states that surfaces depend on. */
+static int span_place(hs_run *run, hs_real s, hs_time *time, hs_real **state) {
+  if (run->method->kind != HS_TAYLOR || s == 1 || !(s > 0)) return span_point(run, s, time, state);
+  *time = run->span.t + s * run->span.h;
+  return part_at(run, &run->span.piece, s, 0, run->here.table->own, *state), 0;
+}
+
+/* The other states where span_place() was. */
+static void span_rest(hs_run *run, hs_real s, hs_real *state) {
+  if (run->method->kind != HS_TAYLOR || s == 1 || !(s > 0)) return;
+  part_at(run, &run->span.piece, s, run->here.table->own, run->here.dimension, state);
+}
+
 static int shorter_piece(hs_run *run, hs_real s, hs_polynomial *piece) {
   const hs_span *span = &run->span;
   const hs_real h = s * span->h;
@@ -247,14 +260,12 @@ static int series_curves(hs_run *run) {
 HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_time t1) {
   const hs_mode *mode = run->here.table;
   const hs_real *p = run->here.p, tolerance = run->control.tolerance;
-  const hs_polynomial *piece = &run->span.piece;
   begin_span(run, h, t1);
-  taylor_piece(run, n, h, &run->span.piece);
-  at_end(run, n, piece, run->z);
+  taylor_span(run, n, h, &run->span.piece);
   if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
   if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
   if (tolerance > 0) {
-    taylor_error(run, n, h);
+    left_of(run, n, h);
     if (error_ratio(run, h) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
   }
   return mode->values(p, t1, run->z, run->ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;

@@ -54,6 +54,8 @@ static const hs_real *series_of(const hs_run *run, int s);
 static int taylor_step(hs_run *run, hs_time t, hs_real h);
 HS_INLINE void taylor_piece(const hs_run *run, const int n, hs_real h, hs_polynomial *piece);
 HS_INLINE void taylor_error(hs_run *run, const int n, hs_real h);
+HS_INLINE void taylor_span(hs_run *run, const int n, hs_real h, hs_polynomial *piece);
+HS_INLINE void left_of(hs_run *run, const int n, hs_real h);
 
 /* scales.c */
 static hs_real root(hs_real x, int m);
@@ -121,7 +123,6 @@ static void *take(hs_store *store, int64_t count, size_t size);
 static hs_real *numbers(hs_store *store, int64_t count);
 
 /* surfaces.c */
-HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece, hs_real *value);
 static void at(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_real *value);
 static void shortened(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_polynomial *part);
 static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r);

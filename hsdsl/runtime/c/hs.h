@@ -32,7 +32,7 @@ typedef int hs_routine(const hs_real *p, hs_real t, const hs_real *x, hs_real *o
 
 /* Taylor coefficients along the flow through (t, x), of all lines that it needs: coefficient m of line l goes to
    lines[l*(order + 2) + m]. Line 0 is time, lines 1 to n are the states, with coefficients 0 to order + 1; the others
-   have those from 0 to order. No value where one of them has none. */
+   have those from 0 to order, where something reads them. No value where one of them has none. */
 #define HS_MOST_ORDER 30 /* round-off is below the terms of any order that is higher */
 typedef int hs_series(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines);
 
@@ -118,6 +118,7 @@ typedef struct {
   int measures;            /* states whose slopes at the end of an implicit step go into the states before the last */
   const int *measured;
   const hs_variation *variation; /* 0 where no states are derivatives of others */
+  int own;                 /* states but the last ones, which are derivatives of these: surfaces depend on none of them */
 } hs_mode;
 
 typedef struct {

@@ -15,6 +15,10 @@
 #define HS_CALLED inline
 #endif
 
+#if defined(HS_COLUMNS)
+typedef hs_real hs_pair __attribute__((vector_size(2 * sizeof(hs_real))));
+#endif
+
 static const hs_real hs_inverse[HS_MOST_ORDER + 2] = {
   0.0, 1.0 / 1, 1.0 / 2, 1.0 / 3, 1.0 / 4, 1.0 / 5, 1.0 / 6, 1.0 / 7, 1.0 / 8, 1.0 / 9, 1.0 / 10, 1.0 / 11, 1.0
   / 12, 1.0 / 13, 1.0 / 14, 1.0 / 15, 1.0 / 16, 1.0 / 17, 1.0 / 18, 1.0 / 19, 1.0 / 20, 1.0 / 21, 1.0 / 22, 1.0

@@ -19,7 +19,7 @@ static int is_passed_by(hs_run *run, int k) {
 static int residual_of(hs_run *run, const hs_polynomial *piece, int k, hs_real s, hs_real *r) {
   hs_time time;
   (void)piece;
-  return span_point(run, s, &time, &run->q) || surface(run, k, time, run->q, r) ? RAISED : 0;
+  return span_place(run, s, &time, &run->q) || surface(run, k, time, run->q, r) ? RAISED : 0;
 }
 
 /* Close in on a rise near s where Newton's method fails (a root of higher order), if one is bracketed there. */
@@ -40,14 +40,14 @@ static int bracketed(hs_run *run, int k, hs_real *s) {
 static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossing) {
   hs_real s = rise->share, best = s, least = NAN, r, noise;
   for (int i = 0; i < MOST_CORRECTIONS; i++) {
-    if (span_point(run, s, &crossing->time, &crossing->state) || surface(run, k, crossing->time, crossing->state, &r))
+    if (span_place(run, s, &crossing->time, &crossing->state) || surface(run, k, crossing->time, crossing->state, &r))
       return RAISED;
     if (i && !(fabs(r) < least)) break;
     least = fabs(r), best = s;
     crossing->theta = s;
-    if (rise->slope == 0) return 0;
+    if (rise->slope == 0) return span_rest(run, s, crossing->state), 0;
     if (roundoff_bound(run, k, crossing->time, crossing->state, run->active_surfaces[k], &noise)) return RAISED;
-    if (fabs(r) <= noise) return 0;
+    if (fabs(r) <= noise) return span_rest(run, s, crossing->state), 0;
     s = hs_min(1.0, hs_max(s * 0, s - r / rise->slope));
   }
   if (bracketed(run, k, &best)) return RAISED;
@@ -98,7 +98,7 @@ static int largest(hs_run *run) {
   const int stood = stands(run, crossing);
   if (stood == RAISED) return RAISED;
   sizes(run, run->x, crossing->state);
-  for (int s = 0; s < run->here.dimension; s++) {
+  for (int s = 0; s < run->here.table->own; s++) {
     hs_real *const found = &run->landed[s];
     *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
     if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));

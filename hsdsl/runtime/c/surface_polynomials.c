@@ -195,7 +195,7 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
 
 /* The surfaces at the share s of the step, by its interpolant. */
 static int surfaces_along(hs_run *run, hs_real s, hs_real *values) {
-  at(run, &run->span.piece, s, run->at);
+  part_at(run, &run->span.piece, s, 0, run->here.table->own, run->at);
   return run->here.table->values(run->here.p, run->span.t + s * run->span.h, run->at, values);
 }
 

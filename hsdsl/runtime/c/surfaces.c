@@ -12,24 +12,19 @@ static hs_found failure(hs_step_failure kind, int surface) {
   return found;
 }
 
-/* Evaluate the interpolant of a step at s = theta, to `value`. */
-static void at(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_real *value) {
-  const int n = run->here.dimension, w = run->width, last = piece->degree - 1;
-  for (int s = 0; s < n; s++) {
+/* Evaluate the interpolant of a step at s = theta, to `value`: its states `from` to `to`. */
+HS_INLINE void part_at(const hs_run *run, const hs_polynomial *piece, hs_real theta, int from, int to, hs_real *value) {
+  const int w = run->width, last = piece->degree - 1;
+  for (int s = from; s < to; s++) {
     hs_real v = piece->c[last * w + s] * theta;
     for (int m = last - 1; m >= 0; m--) v = (piece->c[m * w + s] + v) * theta;
     value[s] = run->x[s] + v;
   }
 }
 
-/* The same at its end. */
-HS_INLINE void at_end(const hs_run *run, const int n, const hs_polynomial *piece, hs_real *value) {
-  const int w = run->width, last = piece->degree - 1;
-  for (int s = 0; s < n; s++) {
-    hs_real v = piece->c[last * w + s];
-    for (int m = last - 1; m >= 0; m--) v = piece->c[m * w + s] + v;
-    value[s] = run->x[s] + v;
-  }
+/* The same of all states. */
+static void at(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_real *value) {
+  part_at(run, piece, theta, 0, run->here.dimension, value);
 }
 
 /* The part of an interpolant before theta, over [0, 1] again. */
