@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import Number
@@ -50,21 +50,22 @@ class Differentiator:
 
         In ties an edge in ``firsts`` goes first.
         """
-        check_arguments(arguments, "a sensitivity", REFUSED)
         wrt = tuple(map(str, [wrt] if isinstance(wrt, str) else wrt))  # names of a file know their places
-        key = call_key(wrt, tuple(map(str, firsts)), dict(arguments))
+        firsts = tuple(map(str, firsts))
+        key = call_key(*wrt, None, *firsts, None, *arguments, None, *arguments.values())
         ready = self._prepared.find(key)
         if ready is None:
-            ready = self._ready(wrt, arguments, tuple(firsts))
+            check_arguments(arguments, "a sensitivity", REFUSED)
+            ready = self._ready(wrt, arguments, firsts)
         ready, run = self._run(ready)
         if not ready.entries and (run.stop.reason == "not_finite" or run.enters_beyond):
             ready, run = self._run(self._with_entries(ready))
         self._prepared.keep(key, ready)
         return Sensitivity(
-            tuple(t.label for t in ready.by),
+            ready.labels,
             run,
             ready.setting,
-            tuple(firsts),
+            firsts,
             lambda first: self.sensitivity(wrt, arguments, first),
         )
 
@@ -171,6 +172,11 @@ class _Ready:
     firsts: tuple[str, ...]
     exact: bool
     entries: bool = False
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """What it is by."""
+        return tuple(t.label for t in self.by)
 
 
 def started_with(values: Values, initial: Mapping[str, Any]) -> list[str]:

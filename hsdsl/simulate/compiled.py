@@ -156,6 +156,11 @@ class CompiledRun:
         """How many transitions were made."""
         return self.workspace.task.made
 
+    @property
+    def entries(self) -> int:
+        """How many of them on entry."""
+        return self.workspace.task.entries
+
     def follow(self) -> tuple[Stop, Columns]:
         """Run to the end: why it stopped, and the columns that were written."""
         self._run()

@@ -18,6 +18,7 @@ from hsdsl.simulate.state_layouts import StateLayouts
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
 MOST_KEPT = 2**23  # bytes of a chunk that the next run may use again
+FEWEST_ROWS = 512  # of a first chunk that is as small as that
 BY_ROW = ("times", "values", "outputs", "depth")
 BY_TRANSITION = ("transition", "before", "after")
 
@@ -41,6 +42,8 @@ class OutputBuffers:
         self.sink: Sink | None = None  # takes what is written, which then is not kept
         self.review: Review | None = None
         self._passed, self._mode = 0, 0  # rows of earlier chunks, and the mode of the last one
+        small = MOST_KEPT // self._row_bytes
+        self._least = small if FEWEST_ROWS <= small < LEAST_ROWS else LEAST_ROWS
 
     def clear(self, rows: float, memory: int, review: Review | None = None) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
@@ -48,15 +51,15 @@ class OutputBuffers:
         if review is not None or self.review is not None:
             self.review, self._passed = review, 0
             self._stop_at_review()
-        if max(rows, self._before, LEAST_ROWS) <= self._rows:
+        if max(rows, self._before, self._least) <= self._rows:
             return
         wanted = min(max(rows, self._before), MOST_ROWS, memory // self._row_bytes)
-        wanted = max(wanted, LEAST_ROWS)
+        wanted = max(wanted, self._least)
         if wanted > self._rows:
             try:
                 self._open(int(wanted))
             except MemoryError:
-                self._open(LEAST_ROWS)
+                self._open(self._least)
 
     def flush(self) -> None:
         """Keep what was written and open another chunk, twice as large; a small one where no more may be kept."""

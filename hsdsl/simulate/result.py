@@ -71,7 +71,7 @@ def written(
         assessment=partial(_assessment_of, under_way),
         repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
-        compiled=_Written(under_way, columns, under_way.made),
+        compiled=_Written(under_way, columns, under_way.made, under_way.entries),
     )
 
 
@@ -81,11 +81,12 @@ class _Written(NamedTuple):
     under_way: CompiledRun
     columns: Columns
     made: int
+    entries: int
 
     @property
     def enters_beyond(self) -> bool:
         """Whether one fired on entry."""
-        return self.made > 0 and bool(self.columns["transition"]["entry"].any())
+        return self.entries > 0
 
 
 def _assessment_of(

@@ -161,12 +161,45 @@ def test_implicit_steps_of_derivatives_share_factors(monkeypatch: pytest.MonkeyP
     assert sum(each.iterations for each in made) < 2 * steps
 
 
+PRODUCTS = """
+hsdsl: 1
+parameters: {a: 0.7, b: 1.3}
+modes:
+  A:
+    flow: {x: y*z*a - x, y: (x + b)*(z - y), z: x*y*x - z*b}
+    transitions: [{name: up, when: x*(1 + 0.1*y) >= 0.4*a + 0.05*sin(9*t), to: B, reset: {x: -x*b, z: z + y*x}}]
+  B:
+    flow: {x: 1 - z*x, y: x*z - y*y*a, z: b*(x - y)*z}
+    transitions: [{name: down, when: x >= 0.5, to: A, reset: {x: x - 0.6}}]
+initial: {mode: A, x: 0.2, y: 1.1, z: 0.9}
+experiment: {until: 1.5}
+"""
+
+
 @needs_compiler
-def test_engines_agree_on_derivatives() -> None:
-    """To the last bit: compiled series sum products that share a factor in one loop."""
-    model, wrt = hsdsl.load("models/gallery/lorenz-section.yaml"), "sigma,rho,initial.y"
-    python, compiled = (model.sensitivity(wrt, until=0.2, engine=engine).execution for engine in ("python", "c"))
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("text", [PRODUCTS, Path("models/gallery/lorenz-section.yaml").read_text()])
+def test_engines_agree_on_derivatives(text: str, count: int) -> None:
+    """To the last bit: compiled series sum products that share a factor in one loop, two of them as a vector."""
+    model = hsdsl.loads(text)
+    wrt = [*model.program.parameters, "initial.z", "initial.x", "initial.y"][:count]
+    python, compiled = (model.sensitivity(wrt, until=0.7, engine=engine).execution for engine in ("python", "c"))
+    assert len(python.transitions) == len(compiled.transitions) > 0
     assert np.array_equal(python.values, compiled.values, equal_nan=True)
+    assert np.array_equal(python.coefficients, compiled.coefficients, equal_nan=True)
+
+
+@needs_compiler
+def test_memory_of_wide_rows_is_used_again() -> None:
+    """A run writes where the one before it wrote: fresh memory costs more than a short run."""
+    model = hsdsl.load("models/gallery/lorenz-section.yaml")
+    names = [*model.program.parameters, "initial.x", "initial.y", "initial.z"]
+    runs = [model.sensitivity(names, until=1).setting.augmented.plan for _ in range(2)]
+    assert runs[0] is runs[1] and runs[0] is not None
+    workspace = runs[0].workspaces.take()
+    chunk = workspace.chunks.table.values
+    workspace.clear(0, 2**30)
+    assert workspace.chunks.table.values == chunk
 
 
 def test_oscillator() -> None:

@@ -189,7 +189,7 @@ static hs_run open_run(hs_task *task) {
   hs_chunk *const chunk = &task->chunk;
   chunk->rows = chunk->arcs = chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
   task->now = 0.0;
-  task->made = 0;
+  task->made = task->entries = 0;
   run.task = task;
   run.pause = INFINITY;
   run.epsilon = task->settings.relaxation;

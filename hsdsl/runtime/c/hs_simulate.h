@@ -204,6 +204,7 @@ typedef struct hs_task {
   int (*grow)(struct hs_task *, hs_visited *larger);   /* twice the room, slots zero: 0 */
   hs_time now;                                   /* to be looked at while it runs */
   int64_t made;
+  int64_t entries; /* of the transitions made, those on entry */
   hs_stop stop;
 } hs_task;
 

@@ -86,6 +86,7 @@ static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, co
   run->made[run->jump % FREE] = made;
   run->jump++;
   run->task->made = run->jump;
+  run->task->entries += entry;
   if (!room(run)) return;
   const int64_t i = chunk->transitions++;
   hs_transition *transition = &chunk->transition[i];
