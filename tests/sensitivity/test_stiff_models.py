@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -187,6 +188,25 @@ def test_an_end_in_a_fast_decay() -> None:
             mine = {x: row[by] for x, row in found.final.state.items()}
             assert abs(mine["y2"] - slopes[-1][2]) <= 1e-10 * max(abs(row[2]) for row in slopes)
             assert abs(mine["y1"] - since[-1][1]) <= 1e-7 * max(abs(row[1]) for row in slopes), by
+
+
+@pytest.mark.parametrize("by", ["slow", "high", "low"])
+def test_the_last_digits_of_numbers_decide_an_end_in_a_fast_decay(by: str) -> None:
+    """The exact derivatives of y1, by numbers that are one unit in the last place away: off by more than 1e-9.
+
+    They move by more than twenty times what ten digits allow, as no run in doubles can know: the numbers of the file
+    are rounded to doubles before anything else is done.
+    """
+    _, exact, texts, _, _ = CASES["switch"]
+    guesses = [made.time for made in SWITCH.simulate().transitions]
+    with mpmath.workdps(60):
+        given = {name: mpmath.mpf(text) for name, text in texts.items()}
+        rounded = {name: mpmath.mpf(float(text)) for name, text in texts.items()}
+        apart = given | {"high": given["high"] + mpmath.mpf(math.ulp(5.8))}
+        own, near, stored = (exact_slopes(exact, each, by, mpmath.mpf(5), guesses) for each in (given, apart, rounded))
+        largest = max(abs(row[1]) for row in own)
+        assert abs(near[-1][1] - own[-1][1]) > 1e-8 * largest
+        assert abs(stored[-1][1] - own[-1][1]) > 2e-9 * largest
 
 
 @needs_compiler
