@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 
 import sympy as sp
 
-from hsdsl.completion.nearby import Nearby, Point, drawn, solved, value_at
+from hsdsl.completion.nearby import Nearby, Point, as_float, drawn, size_at, solved, value_at
 from hsdsl.functions import absolute, maximum, minimum, power, rebuilt, sign
 from hsdsl.system import TIME
 
 KINKED = (absolute, maximum, minimum, sign)
-SPEEDS = (1e-6, 1e-9, 1e-12)  # rates of the guard at impacts that are looked at
+SPEEDS = (1e-6, 1e-9, 1e-12)  # of the rate of the guard: impacts that are looked at
 SEEDS = range(1, 9)  # of points where they are
 
 
@@ -47,7 +47,7 @@ def _impact(near: Nearby, speed: float, seed: int) -> Point | None:
     rate = near.along(near.guard)
     free = [x for x in near.among(sp.Tuple(near.guard, rate)) if x != TIME]
     at = drawn((near.guard, rate, *near.moved, *near.flows()), seed, {*near.states, TIME})
-    found = solved([near.guard, rate - speed], free, at)
+    found = solved([near.guard, rate - as_float(speed * size_at(rate, at))], free, at)
     return found if found and value_at(rate, found) > 0 else None
 
 

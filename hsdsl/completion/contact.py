@@ -17,11 +17,11 @@ from sympy.core.relational import Relational
 from hsdsl.completion.branches import branched
 from hsdsl.completion.counts import counts_of
 from hsdsl.completion.nearby import (
-    SMALL,
     Nearby,
     Point,
     cancelled,
     fixed_point,
+    is_zero,
     jacobian,
     mode_of_part,
     product,
@@ -130,7 +130,7 @@ def _constrained(near: Nearby):
     for k in range(2, count + 1):  # Faddeev and LeVerrier: own part / size projects along the reset's directions
         part = product(own, part) - size * sp.eye(len(near.changed))
         size = sp.trace(product(own, part)) / k
-    if abs(value_at(size, at)) <= SMALL:  # the reset does not contract: a shear
+    if is_zero(size, at):  # the reset does not contract: a shear
         return None
     rows: dict[int, sp.Expr] = {}
     part, away = product(part, slopes), product(part, moved)
@@ -154,7 +154,7 @@ def _push(near: Nearby, at: Point):
         slopes = [(derivative(value, x), moved[x]) for x in near.among(value) if x in moved]
         by = near.among(sp.Tuple(*(change for _, change in slopes)))
         back = [sum(g * derivative(change, y) for g, change in slopes) for y in by if y != TIME]
-        if any(abs(value_at(b, at)) > SMALL for b in back):
+        if not all(is_zero(b, at) for b in back):
             return cancelled(near.along(value)), order
     return rate, None
 
@@ -164,7 +164,7 @@ def _is_kept(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], push: sp.Ex
     constrained = {near.states[i]: row for i, row in rows.items()}
     stays = lie_derivative(value, {x: constrained[x] if x in constrained else near.flow(x) for x in near.among(value)})
     presses = value_at(near.along(value), at) * value_at(push, at) > 0
-    return presses and abs(value_at(value, at)) <= SMALL and abs(value_at(stays, at)) <= SMALL
+    return presses and is_zero(value, at) and is_zero(stays, at)
 
 
 def _falling(atom: Relational) -> sp.Expr:

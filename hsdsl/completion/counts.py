@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from hsdsl.completion.nearby import SMALL, Nearby, fixed_point, symbols, value_at
+from hsdsl.completion.nearby import NUMBERS, Nearby, fixed_point, is_zero, symbols, value_at
 from hsdsl.system import Mode
 
 
@@ -19,12 +19,11 @@ def counts_of(near: Nearby) -> tuple[int, ...]:
     few = tuple(i for i in near.changed if i in unused)
     if not few or not near.is_small() or (found := fixed_point(near.without(few))) is None:
         return ()
-    anywhere = {x: 1 + 1 / (3 + k) for k, x in enumerate(sorted(near.moved.free_symbols, key=str))}
+    anywhere = {x: NUMBERS.zero + 1 + 1 / (3 + k) for k, x in enumerate(sorted(near.moved.free_symbols, key=str))}
     at = anywhere | found
 
     def is_count(i: int, change: sp.Expr) -> bool:
-        vanishes = abs(value_at(change, at)) <= SMALL * abs(value_at(change, anywhere))
-        return not vanishes and abs(1 + value_at(sp.diff(change, near.states[i]), at)) >= 1
+        return not is_zero(change, at) and abs(1 + value_at(sp.diff(change, near.states[i]), at)) >= 1
 
     return tuple(i for i, change in zip(near.changed, near.moved, strict=True) if i in few and is_count(i, change))
 

@@ -3,26 +3,31 @@
 
 from __future__ import annotations
 
-import math
 import random
 from collections.abc import Collection, Iterable, Sequence
-from functools import lru_cache
-from itertools import chain
+from fractions import Fraction
+from functools import lru_cache, reduce
 from operator import mul, sub
 from typing import Any
 
 import sympy as sp
 
+from hsdsl.arithmetic import Number, multiprecision
 from hsdsl.expression.derivatives import derivative, lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import below
 from hsdsl.system import TIME, Edge, Mode
 
-SMALL = 1e-9  # a slope at a random point that counts as zero everywhere, relative to the largest
-MOST_ROUNDS = 50  # of Newton's method
+NUMBERS = multiprecision(60)  # of random points: units of states, guards and time may be far apart
+NAN = NUMBERS.functions["nan"]
+ROUNDED = NUMBERS.functions["ldexp"](1, -NUMBERS.bits // 2)  # of its terms: what is smaller counts as zero
+NEXT = NUMBERS.functions["ldexp"](1, -NUMBERS.bits // 4)  # of an argument: what a function changes by tells its slope
+MOST_ROUNDS = 200  # of Newton's method: where units are far apart it halves the way first
 MOST_NODES = 2_000  # of what a guard, its reset and their flows are written with: beyond, no motion is derived
 LONG = 400  # nodes, from which on a term is not simplified
-Point = dict[sp.Symbol, float]
+Point = dict[sp.Symbol, Number]
+Sized = tuple[Number, Number]  # a number, and the size of the terms that it is computed from
+Row = Sequence[Sized]
 
 
 @lru_cache(maxsize=16)  # of a large mode once, not for each of its edges
@@ -142,7 +147,7 @@ def drawn(expressions: Sequence[sp.Expr], seed: int, either: Collection[Any] = (
     """Random values of the names in expressions, from 1 to 2; those of names in ``either`` with either sign."""
     names: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in expressions))
     draw = random.Random(seed)
-    at: Point = {name: draw.uniform(1, 2) for name in sorted(names, key=str)}
+    at: Point = {name: NUMBERS.zero + draw.uniform(1, 2) for name in sorted(names, key=str)}
     return {name: -value if name in either and draw.random() < 0.5 else value for name, value in at.items()}
 
 
@@ -152,12 +157,12 @@ def solved(equations: Sequence[sp.Expr], free: Sequence[Any], start: Point) -> P
     slopes = jacobian(equations, free)
     for _ in range(MOST_ROUNDS):
         values = [value_at(e, at) for e in equations]
-        if not all(map(math.isfinite, values)):
+        if not all(map(NUMBERS.isfinite, values)):
             return None
-        step, _ = _least(_values_at(slopes, at), values)
+        step, _ = _least(_rows_at(slopes, at), values)
         for name, change in zip(free, step, strict=True):
             at[name] -= change
-        if all(abs(change) <= SMALL for change in step):
+        if all(abs(change) <= ROUNDED * abs(start[name]) for name, change in zip(free, step, strict=True)):
             return at
     return None
 
@@ -177,57 +182,110 @@ def product(left: sp.Matrix, right: sp.Matrix) -> sp.Matrix:
     return sp.Matrix(left.rows, right.cols, entry)
 
 
-def value_at(value: sp.Expr, at: Point) -> float:
+def value_at(value: sp.Expr, at: Point) -> Number:
     """The value of an expression at a point; not-a-number where it has none."""
-    return _number(sp.sympify(value), dict(at))
+    return _sized(sp.sympify(value), _known(at))[0]
 
 
-def _number(expr: sp.Basic, known: dict[sp.Basic, float]) -> float:
-    """The value of an expression, whose parts are each computed once."""
+def size_at(value: sp.Expr, at: Point) -> Number:
+    """The size of the terms that the value of an expression at a point is computed from."""
+    return _sized(sp.sympify(value), _known(at))[1]
+
+
+def as_float(number: Number) -> sp.Float:
+    """A number in an expression."""
+    return sp.Float(number._mpf_, precision=NUMBERS.bits)
+
+
+def is_zero(value: sp.Expr, at: Point) -> bool:
+    """Whether an expression is zero at a point, or no more than round-off."""
+    number, size = _sized(sp.sympify(value), _known(at))
+    return abs(number) <= ROUNDED * size
+
+
+def _known(at: Point) -> dict[sp.Basic, Sized]:
+    return {name: (number, 1 + abs(number)) for name, number in at.items()}
+
+
+def _sized(expr: sp.Basic, known: dict[sp.Basic, Sized]) -> Sized:
+    """The value of an expression with the size of its terms, whose parts are each computed once."""
     if expr not in known:
-        known[expr] = _computed(expr, [_number(part, known) for part in expr.args])
+        known[expr] = _computed(expr, [_sized(part, known) for part in expr.args])
     return known[expr]
 
 
-def _computed(expr: sp.Basic, parts: list[float]) -> float:
+def _computed(expr: sp.Basic, parts: list[Sized]) -> Sized:
+    if expr.is_Add:
+        return reduce(lambda a, b: (a[0] + b[0], a[1] + b[1]), parts)
+    if expr.is_Mul:
+        return reduce(lambda a, b: (a[0] * b[0], abs(a[0]) * b[1] + a[1] * abs(b[0])), parts)
+    numbers = [number for number, _ in parts]
+    value = _evaluated(expr, numbers)
+    size = abs(value)
+    for i, (argument, (number, own)) in enumerate(zip(expr.args, parts, strict=True)):
+        moved = (
+            value if argument.is_Number else _evaluated(expr, [*numbers[:i], number + NEXT * own, *numbers[i + 1 :]])
+        )
+        size = size + (abs(moved - value) / NEXT if NUMBERS.isfinite(moved) else 0)
+    return value, size
+
+
+def _evaluated(expr: sp.Basic, numbers: Sequence[Number]) -> Number:
+    """The value of one operation."""
     try:
-        if expr.is_Add or expr.is_Mul:
-            return math.fsum(parts) if expr.is_Add else math.prod(parts)
-        made = expr.func(*map(sp.Float, parts)) if parts else expr
-        number = made.evalf() if isinstance(made, sp.Expr) else made
-        return float(number) if number.is_Number and number.is_real else math.nan
+        if expr.is_Rational:
+            return NUMBERS.constant(Fraction(int(expr.p), int(expr.q)))
+        if expr.is_Pow:
+            return NUMBERS.functions["pow"](*numbers)
+        made = expr.func(*map(as_float, numbers)) if numbers else expr
+        found = made.evalf(NUMBERS.digits) if isinstance(made, sp.Expr) else made
+        if not found.is_Number or not found.is_real:
+            return NAN
+        return NUMBERS.zero.context.make_mpf(sp.Float(found, precision=NUMBERS.bits)._mpf_)
     except (TypeError, ValueError, ArithmeticError):
-        return math.nan
+        return NAN
 
 
-def _values_at(matrix: sp.Matrix, at: Point) -> list[list[float]]:
-    known: dict[sp.Basic, float] = dict(at)
-    return [[_number(value, known) for value in row] for row in matrix.tolist()]
+def _rows_at(matrix: sp.Matrix, at: Point) -> list[Row]:
+    known = _known(at)
+    return [[_sized(value, known) for value in row] for row in matrix.tolist()]
 
 
 def rank(matrix: sp.Matrix, at: Point) -> int:
     """The rank of a matrix at a point; 0 where it has no finite value."""
-    rows = _values_at(matrix, at)
-    return _least(rows, [0.0] * len(rows))[1] if all(map(math.isfinite, chain(*rows))) else 0
+    rows = _rows_at(matrix, at)
+    if not all(NUMBERS.isfinite(number) for row in rows for number, _ in row):
+        return 0
+    return _least(rows, [NUMBERS.zero] * len(rows))[1]
 
 
-def _least(rows: Sequence[Sequence[float]], values: Sequence[float]) -> tuple[list[float], int]:
+def _least(rows: Sequence[Row], values: Sequence[Number]) -> tuple[list[Number], int]:
     """The smallest solution of independent ones of linear equations, and how many these are, by Gram and Schmidt.
 
-    NumPy would take longer to import than all of this does.
+    An equation that others leave no more of than the round-off of its terms depends on them.
     """
-    left = [(math.hypot(*row), [*row, value]) for row, value in zip(rows, values, strict=True)]
-    step, count, largest = [0.0] * len(rows[0]), 0, max(size for size, _ in left)
-    while left and (best := max(left, key=lambda sized: sized[0]))[0] > SMALL * largest:
-        left.remove(best)
-        *direction, share = (entry / best[0] for entry in best[1])
+    count, step = 0, [NUMBERS.zero] * len(rows[0])
+    left = [
+        ([*(number for number, _ in row), value], _norm([size for _, size in row]))
+        for row, value in zip(rows, values, strict=True)
+    ]
+    while left:
+        sizes = [(_norm(row[:-1]), whole) for row, whole in left]
+        best = max(range(len(left)), key=lambda i: sizes[i][0] / sizes[i][1] if sizes[i][1] else NUMBERS.zero)
+        length, whole = sizes[best]
+        if length <= ROUNDED * whole:
+            break
+        *direction, share = (entry / length for entry in left.pop(best)[0])
         step = [x + share * d for x, d in zip(step, direction, strict=True)]
-        left, count = [_without(row, direction, share) for _, row in left], count + 1
+        left, count = [(_without(row, direction, share), whole) for row, whole in left], count + 1
     return step, count
 
 
-def _without(equation: list[float], direction: list[float], share: float) -> tuple[float, list[float]]:
-    """What is left of an equation beyond another one whose coefficients are ``direction``, and its size."""
-    part = sum(map(mul, equation, direction))
-    *rest, value = map(sub, equation, (part * d for d in (*direction, share)))
-    return math.hypot(*rest), [*rest, value]
+def _norm(numbers: Sequence[Number]) -> Number:
+    return NUMBERS.sqrt(sum(map(mul, numbers, numbers), NUMBERS.zero))
+
+
+def _without(equation: list[Number], direction: list[Number], share: Number) -> list[Number]:
+    """What is left of an equation beyond another one whose coefficients are ``direction``."""
+    part = sum(map(mul, equation, direction), NUMBERS.zero)
+    return list(map(sub, equation, (part * d for d in (*direction, share))))
