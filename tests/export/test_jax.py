@@ -107,6 +107,16 @@ def test_impacts_of_many_balls_and_their_derivatives(tmp_path: Path) -> None:
     assert np.allclose(slopes[2][:2], exact, rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize("reset", ["select(v, v, -0.3*v)", "max(-0.4*v, 0)"])
+def test_a_body_rests_where_its_reset_has_kinks(reset: str, tmp_path: Path) -> None:
+    model = hsdsl.loads(
+        f"hsdsl: 1\nmodes:\n  m: {{flow: {{x: v, v: -3}}, transitions: [{{when: x <= 0, to: m, reset: {{v: '{reset}'}}}}]}}\n"
+        "initial: {mode: m, x: 1, v: 0}\nexperiment: {until: 4}\n"
+    )
+    module = imported(model, tmp_path)
+    assert_same(module, jitted(module.simulate)(), model.simulate(method="dopri5"), 1e-7)
+
+
 def test_texts_of_a_model_stay_strings(tmp_path: Path) -> None:
     files = files_of(source_of(hsdsl.load(hostile(tmp_path / "jax.yaml")), {}), "jax")
     ((name, content),) = files.items()

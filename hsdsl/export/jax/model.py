@@ -114,7 +114,8 @@ def _tables(source: Source) -> str:
             target = tuple(map(states.index, edge.target_states))
             edges.append(
                 f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
-                f"{edge.counts}, SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}),"
+                f"{edge.counts}, SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}, "
+                f"mode_{mode.held if edge.branched else j}_reset_{k}),"
             )
     texts = [_mode(motion, found, program, numbers) for motion in found]
     lines += ["MODES = (", *texts, ")", "EDGES = (", *edges, ")"]

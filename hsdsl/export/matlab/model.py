@@ -125,6 +125,7 @@ class ModelText:
             )
         for name in ("reset", "spread"):
             self.add(name, cell(self.function(f"{name}_{number}_{k + 1}", found[f"{name}_{k}"], mode) for k in edges))
+        self.add("slow", cell(self.slow(number, k, mode) for k in edges))
         self.add("condition", cell(self.condition(number, k, found, mode) for k in edges))
         method = self.source.problem.settings.method
         if method is not None and method.implicit:
@@ -133,6 +134,14 @@ class ModelText:
     def add(self, key: str, handle: str) -> None:
         """One more mode's entry of a table."""
         self.handles.setdefault(key, []).append(handle)
+
+    def slow(self, number: int, k: int, mode: ModeProgram) -> str:
+        """The reset of an edge that leads back to its mode, or the branch of it that slow impacts take."""
+        if not mode.edges[k].branched:
+            return f"@reset_{number}_{k + 1}"
+        assert mode.held is not None
+        definition = mode_definitions(self.source.problem.program.flows[mode.held])[f"reset_{k}"]
+        return self.function(f"slow_{number}_{k + 1}", definition, mode)
 
     def condition(self, number: int, k: int, found: Mapping[str, ast.FunctionDef], mode: ModeProgram) -> str:
         """The parts of a condition; an edge without one has none."""
@@ -176,6 +185,6 @@ def _about(name: str, mode: ModeProgram) -> str:
     texts = [*(edge.text for edge in mode.edges), *mode.walls]
     if kind in ("gradient", "rate") and len(numbers) > 1:
         return visible(f"mode {mode.name}, {kind} of {texts[int(numbers[1]) - 1]}")
-    if kind in ("reset", "spread", "condition") and len(numbers) > 1:
+    if kind in ("reset", "slow", "spread", "condition") and len(numbers) > 1:
         return visible(f"mode {mode.name}, {kind} of {mode.edges[int(numbers[1]) - 1].name}")
     return visible(f"mode {mode.name}: {kind}")

@@ -26,9 +26,9 @@ def takes_back(slope, back):
 
 
 def after_reset(model, bound, mode, k, t, x):
-    """Where edge k leads, but for states that it counts with."""
+    """Where edge k leads at a slow impact, but for states that it counts with."""
     edge = model.of(model.edge, mode)[k]
-    return jnp.where(model.of(model.counts, edge), x, bound.routines.reset(edge, bound.p, t, x))
+    return jnp.where(model.of(model.counts, edge), x, bound.routines.slow(edge, bound.p, t, x))
 
 
 def keeps(model, bound, lane, k, t, x):

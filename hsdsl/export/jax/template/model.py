@@ -48,6 +48,7 @@ class Routines:
     outputs: Any
     reset: Any
     spread: Any
+    slow: Any
 
 
 class Model:
@@ -65,6 +66,7 @@ class Model:
             with_derivatives([mode.outputs for mode in modes]),
             with_derivatives([edge.reset for edge in edges] or [lambda p, t, x: x]),
             plainly([edge.spread for edge in edges] or [lambda p, t, x, s: s]),
+            with_derivatives([edge.slow for edge in edges] or [lambda p, t, x: x]),
         )
         self._tabulate()
 

@@ -113,8 +113,8 @@ def mode_of(
     )
 
 
-def edge_of(name, source, target, states, conditional, priority, counts, width, reset, spread):
-    """An edge of plain routines."""
+def edge_of(name, source, target, states, conditional, priority, counts, width, reset, spread, slow):
+    """An edge of plain routines; ``slow`` is its reset, or the branch of that which slow impacts take."""
     return Edge(
         name,
         source,
@@ -125,6 +125,7 @@ def edge_of(name, source, target, states, conditional, priority, counts, width, 
         counts,
         lambda p, t, x: padded(reset(p, t, x), width),
         lambda p, t, x, s: padded(spread(p, t, x, s), width),
+        lambda p, t, x: padded(slow(p, t, x), width),
     )
 
 
@@ -141,6 +142,7 @@ class Edge:
     counts: tuple[int, ...]
     reset: Callable
     spread: Callable
+    slow: Callable
 
 
 @dataclass(frozen=True)

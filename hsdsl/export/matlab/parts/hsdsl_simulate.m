@@ -889,8 +889,8 @@ function yes = stays(w, q, k, t, x, d)
 end
 
 function after = reset_but_counts(w, q, k, t, x, d)
-% What the reset of edge k makes of a state, but for states that it counts with.
-  after = w.m.reset{q}{k}(t, x, w.p, d);
+% What the reset of edge k makes of a state at a slow impact, but for states that it counts with.
+  after = w.m.slow{q}{k}(t, x, w.p, d);
   counts = w.m.edge_counts{q}{k};
   after(counts) = x(counts);
 end
