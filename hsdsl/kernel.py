@@ -89,6 +89,10 @@ class Kernel(Protocol):
         """Return the derivatives of a mode's flow by its states, n * n of them row by row."""
         ...
 
+    def terms(self, mode: int, data: Sequence[Number]) -> Routine | None:
+        """Return the sizes of the terms of a mode's flow, by time, states and their sizes; None if it does not jump."""
+        ...
+
     def expressions(self, mode: int, data: Sequence[Number]) -> Sequence[tuple[str, Routine]]:
         """Return a mode's expressions one by one, named for a person: which of them is not finite?"""
         ...

@@ -196,6 +196,9 @@ class ModeProgram:
 
     ``jacobian`` gives the derivatives of the flow by the states; only implicit methods need it.
 
+    ``terms`` has one routine, ``terms``, called like a spread, for the size of the terms that each derivative of a flow
+    that jumps is computed from; None where the flow does not jump.
+
     ``affine`` says whether every surface is an affine function of time and the states: its gradient is the same
     everywhere.
 
@@ -224,6 +227,7 @@ class ModeProgram:
     tape: Tape | None
     expressions: tuple[str, ...]
     diagnosis: Routines
+    terms: Routines | None = None
     held: int | None = None
     slides: tuple[str, ...] = ()
     measured: tuple[int, ...] = ()

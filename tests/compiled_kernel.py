@@ -44,6 +44,12 @@ class CompiledKernel(PythonKernel):
         rows = table.jacobian
         return spread_out(_routine(rows.values, numbers, n, rows.count), program.jacobian.places, n * n, 0.0)
 
+    def terms(self, mode: int, data: Sequence[Number]) -> Routine | None:
+        """Return the sizes of the terms of a mode's flow; None if it does not jump."""
+        table = self._compiled.mode(mode)
+        n, numbers = table.dimension, (Double * max(1, len(data)))(*data)
+        return _routine(table.terms, numbers, 2 * n, n) if table.terms else None
+
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to parameter values and input segments."""
         table, outputs = self._compiled.mode(mode), len(self._program.outputs)

@@ -12,7 +12,7 @@ from typing import Any
 from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.backends.text import compile_routines, each_apart
 from hsdsl.kernel import ModeKernel, Routine, Taylor, Vector
-from hsdsl.program import EdgeProgram, Program
+from hsdsl.program import EdgeProgram, Program, Routines
 
 
 class PythonKernel:
@@ -25,7 +25,7 @@ class PythonKernel:
         self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._apart: dict[int, Callable[..., tuple[Routine, ...]]] = {}
         self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
-        self._jacobians: dict[int, Callable[..., tuple[Routine, ...]]] = {}
+        self._further: dict[tuple[int, str], Callable[..., tuple[Routine, ...]]] = {}
         self._switches: dict[str, Callable[..., tuple[Routine, ...]]] = {}
         self._bound: dict[int, tuple[Sequence[Number], ModeKernel]] = {}
         constants = compile_routines(program.constants, arithmetic, "constants")
@@ -121,11 +121,20 @@ class PythonKernel:
     def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
         """Return the derivatives of a mode's flow by its states; compiled on first use."""
         program = self._program.flows[mode]
-        if mode not in self._jacobians:
-            text = program.jacobian.routines
-            self._jacobians[mode] = compile_routines(text, self.arithmetic, f"jacobian of mode {mode}")
-        size = len(program.states) ** 2
-        return spread_out(self._jacobians[mode](*data)[0], program.jacobian.places, size, self.arithmetic.zero)
+        routine = self._compiled(mode, program.jacobian.routines, data)
+        return spread_out(routine, program.jacobian.places, len(program.states) ** 2, self.arithmetic.zero)
+
+    def terms(self, mode: int, data: Sequence[Number]) -> Routine | None:
+        """Return the sizes of the terms of a mode's flow; None if it does not jump."""
+        routines = self._program.flows[mode].terms
+        return None if routines is None else self._compiled(mode, routines, data)
+
+    def _compiled(self, mode: int, routines: Routines, data: Sequence[Number]) -> Routine:
+        """The one routine of some that few runs need; compiled on first use."""
+        (name,) = routines.names
+        if (mode, name) not in self._further:
+            self._further[mode, name] = compile_routines(routines, self.arithmetic, f"{name} of mode {mode}")
+        return self._further[mode, name](*data)[0]
 
     def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
         """Return a mode's expressions one by one, named for a person."""

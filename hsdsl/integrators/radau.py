@@ -35,7 +35,7 @@ def radau_stepper(
     tolerance: Number | None,
     arithmetic: Arithmetic,
     scales: Sequence[Number],
-    smooth: bool = True,
+    terms: Routine | None = None,
     pattern: Elimination | None = None,
     measured: Sequence[int] = (),
     varied: Variation | None = None,
@@ -43,14 +43,14 @@ def radau_stepper(
 ) -> Stepper:
     """Make step functions from a mode's Jacobian; ``tolerance`` is that of an adaptive run.
 
-    ``scales`` are those of the states, which grow along the run; ``smooth`` says that the flow does not jump;
+    ``scales`` are those of the states, which grow along the run; ``terms`` is that of a flow that jumps;
     ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode; ``varied`` says which states are
     derivatives of others, whose errors may be larger where they do not last for the time ``soon``.
 
     The stages of a step are its three increments and, fourth, the error estimate. Its functions remember what they were
     called with: they are for one stretch of flow.
     """
-    steps = Steps(jacobian, tolerance, arithmetic, scales, smooth, pattern, measured, varied, soon)
+    steps = Steps(jacobian, tolerance, arithmetic, scales, terms, pattern, measured, varied, soon)
 
     def error(h: Number, stages: Stages, end: State) -> State:
         return stages[3]
@@ -77,7 +77,7 @@ class Steps:
         tolerance: Number | None,
         arithmetic: Arithmetic,
         scales: Sequence[Number],
-        smooth: bool = True,
+        terms: Routine | None = None,
         pattern: Elimination | None = None,
         measured: Sequence[int] = (),
         varied: Variation | None = None,
@@ -86,7 +86,7 @@ class Steps:
         self._pattern, self._varied = varied.elimination if varied else pattern, varied
         self._measured, self._soon, self._lasting = measured, soon, list[Number]()
         self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
-        self._largest, self._smooth = scales, smooth
+        self._largest, self._terms = scales, terms
         self._scales, self._floors = scales, list[Number]()
         self._tried: tuple[Flow, Number, Number, State] | None = None
         self._convergence = Convergence(tolerance, arithmetic)
@@ -156,8 +156,6 @@ class Steps:
             with suppress(NoConvergence):
                 return attempt()
             self._derive(t, x)
-        if not self._smooth:
-            return attempt()
         try:
             return attempt()
         except NoConvergence:
@@ -166,9 +164,8 @@ class Steps:
     def scales(self, closer: bool) -> Sequence[Number]:
         """The scales of the states over the step last tried; ``closer``, with a look at the terms of the flow."""
         if closer and self._tried is not None:
-            derivatives = None if self._smooth else self._jacobian
             with suppress(*DOMAIN_ERRORS):
-                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic, derivatives)
+                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic, self._terms)
                 lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))
                 self._floors = list(self._scales) if lifted else []
         return self._scales

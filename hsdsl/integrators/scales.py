@@ -26,19 +26,18 @@ def resolved(
     scales: Sequence[Number],
     rows: Matrix | None,
     arithmetic: Arithmetic,
-    derivatives: Flow | None = None,
+    terms: Flow | None = None,
 ) -> Vector:
     """The scales over a step of length h, none below a share of what the terms of its flow could move the state by.
 
-    What that is follows from what the last digits of time and states change in the flow or, where it jumps, from its
-    ``derivatives``. A state that they lift moves others in turn. ``rows`` are those of an implicit method: there a fast
-    decay forgets round-off.
+    What that is follows from what the last digits of time and states change in the flow or, where it jumps, from
+    ``terms``, which bounds them. A state that they lift moves others in turn. ``rows`` are those of an implicit method:
+    there a fast decay forgets round-off.
     """
     slope, moved, lifted = flow(t, *x), list(scales), [False for _ in x]
-    by = rows_of(derivatives(t, *x), len(x)) if derivatives else None
     for _ in x:
-        terms = _derived_terms(by, moved, arithmetic) if by else flow_terms(flow, t, x, slope, moved, arithmetic)
-        least = [h * size for size in terms]
+        sizes = terms(t, *x, *moved) if terms else flow_terms(flow, t, x, slope, moved, arithmetic)
+        least = [h * size for size in sizes]
         if rows:
             least = [a / (1 + h * abs(row[i])) for i, (a, row) in enumerate(zip(least, rows, strict=True))]
         more = [arithmetic.isfinite(a) and a > SHARE * s for a, s in zip(least, scales, strict=True)]
@@ -60,17 +59,6 @@ def flow_terms(
         other = flow(t + even * unit * t, *near)
         found = [max(d, abs(a - b)) for d, a, b in zip(found, other, slope, strict=True)]
     return [d / (BLUR_UNITS * unit) for d in found]
-
-
-def _derived_terms(rows: Matrix, moved: Sequence[Number], arithmetic: Arithmetic) -> Vector:
-    """The sizes of the terms of a flow, by its derivatives."""
-    found: Vector = []
-    for row in rows:
-        total = arithmetic.zero
-        for d, m in zip(row, moved, strict=True):
-            total = total + abs(d) * m
-        found.append(total)
-    return found
 
 
 def root(x: Number, m: int, arithmetic: Arithmetic) -> Number:

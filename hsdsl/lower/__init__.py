@@ -25,6 +25,7 @@ from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient, replaced
 from hsdsl.lower.switches import switch_programs, switch_routines, with_switches
 from hsdsl.lower.tape import make_tape
+from hsdsl.lower.terms import Terms
 from hsdsl.parts import numbered
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput
 
@@ -234,6 +235,7 @@ class LoweredMode:
         self.residuals = self.place(s.residual for s in mode.surfaces)
         self._places = {argument: i for i, argument in enumerate(self.arguments)}
         self._sizes = tuple(symbol(f"s{i}") for i in range(len(self.states)))
+        self._given = self._places | {s: len(self.arguments) + i for i, s in enumerate(self._sizes)}
         self._slopes = [Gradient((residual,), self.arguments) for residual in self.residuals]
 
     def place(self, expressions) -> tuple[sp.Basic, ...]:
@@ -261,7 +263,7 @@ class LoweredMode:
     ) -> lowered.ModeProgram:
         """The mode's routines, and its data for a loop."""
         mode = self.mode
-        return lowered.ModeProgram(
+        program = lowered.ModeProgram(
             name=mode.name,
             states=mode.states,
             final=mode.final,
@@ -275,6 +277,7 @@ class LoweredMode:
             derived=mode.derived,
             **others,
         )
+        return replace(program, terms=self._terms()) if program.jumps else program
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
         """Whether a surface is affine in time and the states, also where the modes of parts choose what it is."""
@@ -305,6 +308,12 @@ class LoweredMode:
         inside = [k // width * own + k % width for k in places if k // width < own]
         return lowered.Jacobian(routines, places, width, order, own, varied, ordering(inside, own))
 
+    def _terms(self) -> lowered.Routines:
+        """Bounds on the terms that the flow is computed from."""
+        terms = Terms(self.flow, dict(zip(self.states, self._sizes, strict=True)))
+        definition = Definition("terms", (), terms.bounds, terms.statements, self._given)
+        return print_routines((definition,), self.names.data)
+
     def _diagnosis(self, expressions):
         for k, result in enumerate(self.place(expressions)):
             yield Definition(f"expression_{k}", self.arguments, (result,), places=self._places)
@@ -328,7 +337,6 @@ class LoweredMode:
             for i, part in enumerate(condition.args if isinstance(condition, sp.And) else (condition,)):
                 yield self._few(f"condition_{k}_{i}", self.place([part]))
         scales = dict(zip(self.states, self._sizes, strict=True))
-        given = self._places | {s: len(arguments) + i for i, s in enumerate(self._sizes)}
         for k, edge in enumerate(mode.edges):
             changed = changed_by(edge, mode)
             own = [i for i in changed if i < len(edge.reset) - edge.derived]
@@ -337,7 +345,7 @@ class LoweredMode:
             changes = Gradient(reset[: len(own)], self.states)
             spreads = tuple(_spread(r, row, scales) for r, row in zip(reset, changes.sparse, strict=False))
             spreads += tuple(map(absolute, reset[len(own) :]))
-            yield Definition(f"spread_{k}", (), spreads, changes.statements, given)
+            yield Definition(f"spread_{k}", (), spreads, changes.statements, self._given)
 
     def _few(self, name: str, results, statements=()) -> Definition:
         """A routine that names the few arguments it uses."""

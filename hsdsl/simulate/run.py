@@ -70,10 +70,10 @@ class Run(Problem):
             assert series is not None
             return taylor_stepper(method, series, self.arithmetic)
         jacobian = self.kernel.jacobian(mode, here.segment.data)
-        smooth, scales = not here.mode.jumps, here.arc.scales
+        terms, scales = self.kernel.terms(mode, here.segment.data), here.arc.scales
         own = here.mode.jacobian.elimination, here.mode.measured, here.mode.jacobian.variation
         return method.stepper(
-            jacobian, self.settings.tolerance, self.arithmetic, scales, smooth, *own, self.control.first
+            jacobian, self.settings.tolerance, self.arithmetic, scales, terms, *own, self.control.first
         )
 
     def place(

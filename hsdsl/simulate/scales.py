@@ -29,8 +29,8 @@ def error_ratio(
         if method.scales is not None:
             scales = method.scales(True)
         else:
-            derivatives = run.kernel.jacobian(here.flow, here.segment.data) if here.mode.jumps else None
-            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic, derivatives)
+            terms = run.kernel.terms(here.flow, here.segment.data)
+            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic, terms)
     except DOMAIN_ERRORS:
         return ratio
     ratio = control.ratio(h, error, z, scales, had)

@@ -212,7 +212,7 @@ class _Writer:
             self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),
             self.elimination(mode.jacobian.elimination),
             str(int(mode.affine)),
-            str(int(mode.jumps)),
+            self.routines(mode.terms)["terms"] if mode.terms else "0",
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
             str(-1 if mode.held is None else mode.held),
             str(len(mode.measured)),

@@ -49,7 +49,7 @@ def _sizes(program: Program, table: ButcherTableau) -> str:
 def _functions(program: Program) -> Iterable[str]:
     data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
     for j, mode in enumerate(program.modes):
-        for name, definition in mode_definitions(mode).items():
+        for name, definition in mode_definitions(mode, terms=True).items():
             yield function(f"mode_{j}_{name}", definition, data)
 
 
@@ -67,12 +67,13 @@ def _mode(j: int, mode: ModeProgram, states: tuple[str, ...]) -> str:
     flow, values, magnitudes, outputs = (f"mode_{j}_{name}" for name in plain)
     gradients, rates = (array(f"mode_{j}_{kind}_{k}" for k in surfaces) for kind in ("gradient", "rate"))
     places = array(str(states.index(name)) for name in mode.states)
+    terms = f"Some(mode_{j}_terms)" if mode.terms else "None"
     return (
         f"    Mode {{\n        name: {string(mode.name)},\n        dimension: {len(mode.states)},\n"
         f"        edges: &[{edges}],\n        surfaces: {len(surfaces)},\n        is_final: {_truth(mode.final)},\n"
         f"        flow: {flow},\n        values: {values},\n        magnitudes: {magnitudes},\n"
         f"        outputs: {outputs},\n        gradients: &{gradients},\n        rates: &{rates},\n"
-        f"        jumps: {_truth(mode.jumps)},\n        states: &{places},\n    }},\n"
+        f"        terms: {terms},\n        states: &{places},\n    }},\n"
     )
 
 

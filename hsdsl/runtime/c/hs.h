@@ -3,7 +3,7 @@
    A model is generated as straight-line routines and constant tables of them; this header is all that either side
    knows of the other. A routine has a value (0 is returned and `out` is written) or it has none (anything else is
    returned), exactly where the Python kernel raises. `p` holds parameter values, then (a, b, c) of each sampled input's
-   segment; `x` the states, in a spread routine followed by their sizes; `out` must not overlap them. */
+   segment; `x` the states, in a spread or terms routine followed by their sizes; `out` must not overlap them. */
 
 #ifndef HS_H
 #define HS_H
@@ -112,7 +112,7 @@ typedef struct {
   hs_sparse jacobian;      /* of the flow by the states, row by row */
   const hs_elimination *elimination; /* 0 where implicit steps solve dense systems */
   int affine;              /* whether every surface's gradient is the same everywhere */
-  int jumps;               /* whether the flow has `sign` or `floor` */
+  hs_routine *terms;       /* the sizes of the terms of a flow that jumps; 0 of another */
   const int *state;        /* for each state its number among those of all modes */
   int held;                /* index of the mode with motion along its guards, behind the modes; -1 for none */
   int measures;            /* states whose slopes at the end of an implicit step go into the states before the last */

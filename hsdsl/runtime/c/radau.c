@@ -271,7 +271,7 @@ HS_INLINE int solved(hs_run *run, hs_blocks of, hs_time t, hs_real h, int exactl
     if (derive(run, t)) return NO_VALUE;
   }
   const int status = settle(run, of, t, h, exactly, 0);
-  return status == NO_CONVERGENCE && !run->here.table->jumps ? settle(run, of, t, h, exactly, 1) : status;
+  return status == NO_CONVERGENCE ? settle(run, of, t, h, exactly, 1) : status;
 }
 
 HS_INLINE hs_real larger(hs_real a, hs_real b) { return fabs(a) >= fabs(b) ? a : b; }

@@ -56,15 +56,12 @@ static int flow_terms(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
   return 0;
 }
 
-/* The same by the derivatives of the flow, run->jacobian: of one that jumps. */
-static void derived_terms(const hs_run *run, const hs_real *moved, hs_real *found) {
+/* The same by a bound on them, of a flow that jumps. */
+static int bounded_terms(const hs_run *run, hs_time t, const hs_real *x, const hs_real *moved, hs_real *found) {
   const int n = run->here.dimension;
-  const hs_sparse *const rows = &run->here.table->jacobian;
-  for (int s = 0; s < n; s++) found[s] = 0.0;
-  for (int k = 0; k < rows->count; k++) {
-    hs_real *const size = &found[rows->place[k] / n];
-    *size = *size + fabs(run->jacobian[k]) * moved[rows->place[k] % n];
-  }
+  copy(run->both, x, n);
+  copy(run->both + n, moved, n);
+  return run->here.table->terms(run->here.p, t, run->both, found);
 }
 
 /* The derivative of a state's flow by itself. */
@@ -82,13 +79,12 @@ static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const h
   const int n = run->here.dimension;
   hs_real *const moved = run->resolved, *const least = run->least;
   if (run->here.table->flow(run->here.p, t, x, run->unmoved)) return 1;
-  const int jumps = run->here.table->jumps;
-  if (jumps && run->here.table->jacobian.values(run->here.p, t, x, run->jacobian)) return 1;
   for (int s = 0; s < n; s++) moved[s] = run->scales[s], run->lifted[s] = 0;
   for (int round = 0; round < n; round++) {
     int further = 0;
-    if (jumps) derived_terms(run, moved, least);
-    else if (flow_terms(run, t, x, run->unmoved, moved, least)) return 1;
+    if (run->here.table->terms ? bounded_terms(run, t, x, moved, least)
+                               : flow_terms(run, t, x, run->unmoved, moved, least))
+      return 1;
     for (int s = 0; s < n; s++) {
       hs_real size = h * least[s];
       if (rows) size = size / (1 + h * fabs(own_derivative(run, rows, s)));

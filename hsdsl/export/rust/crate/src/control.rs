@@ -50,7 +50,7 @@ impl<S> Run<'_, S> {
             scales[s] = self.scale_of(s);
         }
         let ratio = self.ratio_to(h, &error, &scales);
-        if !(ratio > 1.0) || self.here().jumps {
+        if !(ratio > 1.0) {
             return ratio;
         }
         let again = self.t == self.control.failed_at;
@@ -68,7 +68,19 @@ impl<S> Run<'_, S> {
         }
     }
 
-    /// The sizes of the terms of a flow, by what the last digits of the states `moved` change in it.
+    /// The sizes of the terms of a flow: a bound on them where it jumps.
+    fn terms(&self, slope: &State, moved: &State) -> Option<State> {
+        let Some(bound) = self.here().terms else { return self.flow_terms(slope, moved) };
+        let (n, mut both, mut found) = (self.dimension, [0.0; 2 * W], [0.0; W]);
+        both[..n].copy_from_slice(&self.x[..n]);
+        both[n..2 * n].copy_from_slice(&moved[..n]);
+        if bound(&self.p, self.t, &both[..2 * n], &mut found) {
+            return None;
+        }
+        Some(found)
+    }
+
+    /// The same of one that does not, by what the last digits of the states `moved` change in it.
     fn flow_terms(&self, slope: &State, moved: &State) -> Option<State> {
         let probes = [[2.0, 2.0], [-2.0, 2.0], [6.0, -2.0], [-6.0, -6.0]];
         let mut found = [0.0; W];
@@ -98,7 +110,7 @@ impl<S> Run<'_, S> {
             return None;
         }
         for _ in 0..n {
-            let least = self.flow_terms(&slope, &moved)?;
+            let least = self.terms(&slope, &moved)?;
             let mut further = false;
             for s in 0..n {
                 let length = h * least[s];

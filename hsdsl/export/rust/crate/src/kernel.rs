@@ -2,7 +2,7 @@
 
 use crate::model::{D, E, P, W};
 
-/// A routine called with the numbers it is bound to, time, states (of a spread their sizes too) and results.
+/// A routine called with the numbers it is bound to, time, states (of spreads and terms their sizes too) and results.
 /// It returns whether it has no value.
 pub type Routine = fn(&[f64], f64, &[f64], &mut [f64]) -> bool;
 pub type State = [f64; W];
@@ -32,8 +32,8 @@ pub struct Mode {
     pub outputs: Routine,
     pub gradients: &'static [Routine],
     pub rates: &'static [Routine],
-    /// Whether the flow has `sign`, `floor` or `atan2`.
-    pub jumps: bool,
+    /// The sizes of the terms of a flow that jumps.
+    pub terms: Option<Routine>,
     /// For each state its number among those of all modes.
     pub states: &'static [usize],
 }
