@@ -110,7 +110,8 @@ def test_impacts_of_many_balls_and_their_derivatives(tmp_path: Path) -> None:
 @pytest.mark.parametrize("reset", ["select(v, v, -0.3*v)", "max(-0.4*v, 0)"])
 def test_a_body_rests_where_its_reset_has_kinks(reset: str, tmp_path: Path) -> None:
     model = hsdsl.loads(
-        f"hsdsl: 1\nmodes:\n  m: {{flow: {{x: v, v: -3}}, transitions: [{{when: x <= 0, to: m, reset: {{v: '{reset}'}}}}]}}\n"
+        "hsdsl: 1\nmodes: {m: {flow: {x: v, v: -3}, transitions: [{when: x <= 0, to: m, "
+        f"reset: {{v: '{reset}'}}}}]}}}}\n"
         "initial: {mode: m, x: 1, v: 0}\nexperiment: {until: 4}\n"
     )
     module = imported(model, tmp_path)

@@ -115,7 +115,8 @@ experiment: {until: 2}
 @pytest.mark.parametrize("reset", ["select(v, v, -0.3*v)", "max(-0.4*v, 0)", "abs(v)/3"])
 def test_a_body_rests_where_its_reset_has_kinks(reset: str, tmp_path: Path) -> None:
     model = hsdsl.loads(
-        f"hsdsl: 1\nmodes:\n  m: {{flow: {{x: v, v: -3}}, transitions: [{{when: x <= 0, to: m, reset: {{v: '{reset}'}}}}]}}\n"
+        "hsdsl: 1\nmodes: {m: {flow: {x: v, v: -3}, transitions: [{when: x <= 0, to: m, "
+        f"reset: {{v: '{reset}'}}}}]}}}}\n"
         "initial: {mode: m, x: 1, v: 0}\nexperiment: {until: 4}\n"
     )
     compare(model, tmp_path, ADAPTIVE)
