@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import TypeVar
 
+V = TypeVar("V")
 LOOKALIKES = "·²³"  # Unicode allows some of them in names; in mathematics they are operators
 # controls, line ends that are none in YAML, marks of direction, and what has no width
 INVISIBLE = re.compile(
@@ -106,6 +108,12 @@ def without_memory(names: Iterable[str]) -> tuple[str, ...]:
 def counted(number: int, noun: str) -> str:
     """A number with its noun."""
     return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def seen(values: Mapping[str, V]) -> Mapping[str, V]:
+    """Values by name without the memory of events."""
+    names = without_memory(values)
+    return values if len(names) == len(values) else {name: values[name] for name in names}
 
 
 def listed(names: Iterable[str]) -> str:

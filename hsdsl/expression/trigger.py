@@ -69,6 +69,16 @@ class Reached:
         return same if same or self.residual == -other.residual else None
 
 
+def without_roundoff(expression: Any) -> Any:
+    """An expression without the round-off that conditions of events allow for: it depends on time where they do."""
+    noise = {
+        part: sp.S.Zero
+        for part in sp.preorder_traversal(expression)
+        if part.is_Mul and abs(part.args[0]) in (_NEAR, 2 * _NEAR) and part.atoms(absolute)
+    }
+    return expression.xreplace(noise) if noise else expression
+
+
 def reached(left: Any, right: Any) -> Any:
     """1 where one number is not below another one but by round-off; 0 elsewhere."""
     return Reached(left, right, left - right, False, "", "").holds({})

@@ -26,6 +26,7 @@ from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
 from hsdsl.parts import meant_alone, numbers_of
 from hsdsl.sensitivity.result import Sensitivity
 from hsdsl.simulate.surfaces import TIE
+from hsdsl.written import written_edges
 
 if TYPE_CHECKING:
     from hsdsl.execution import Array, Transition
@@ -330,7 +331,7 @@ def _still(found: Closed) -> bool:
 
 
 def _edge(model: Model, section: str) -> str:
-    names = [edge.name for mode in model.program.modes for edge in mode.edges]
+    names = [edge.name for mode in model.program.modes for edge in written_edges(mode.edges)]
     if section not in names:
         hint = did_you_mean(section, names)
         if section in model.columns:

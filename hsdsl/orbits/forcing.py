@@ -11,6 +11,7 @@ import sympy as sp
 
 from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
+from hsdsl.expression.trigger import without_roundoff
 from hsdsl.lower.straight import replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, Surface
 
@@ -104,6 +105,6 @@ def _expressions(system: HybridSystem) -> Iterator[sp.Basic]:
         yield from map(sp.sympify, mode.flow)
         yield from (sp.sympify(surface.residual) for surface in mode.surfaces)
         for edge in mode.edges:
-            yield from map(sp.sympify, edge.reset)
+            yield from (without_roundoff(sp.sympify(value)) for value in edge.reset)
             if edge.condition is not None:
-                yield edge.condition
+                yield without_roundoff(edge.condition)

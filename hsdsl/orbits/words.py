@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hsdsl.execution import Array
-from hsdsl.names import called
+from hsdsl.names import called, seen
 from hsdsl.orbits.orbit import Orbit
 from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
@@ -21,6 +21,7 @@ def as_json(orbit: Orbit) -> dict[str, Any]:
         name: getattr(orbit, name)
         for name in ("section", "laps", "mode", "state", "phase", "period", "drift", "residual", "verdict", "reasons")
     }
+    result["state"] = seen(orbit.state)
     result["multipliers"] = _pairs(orbit.multipliers)
     if orbit.sides:
         result["sides"] = {edge: _pairs(found) for edge, found in orbit.sides.items()}
@@ -43,7 +44,7 @@ def _facts(orbit: Orbit) -> Iterator[tuple[str, str]]:
     yield "period", number(orbit.period, 12)
     if orbit.phase is not None:
         yield "phase", f"t = {number(orbit.phase, 12)} within the period of the forcing"
-    yield "state", f"mode {orbit.mode}, {values(orbit.state)}"
+    yield "state", f"mode {orbit.mode}, {values(seen(orbit.state))}"
     if orbit.drift:
         yield "drift", f"{values(orbit.drift)} in a period; nothing depends on it"
     yield "multipliers", shown(orbit.multipliers)

@@ -15,6 +15,7 @@ import numpy as np
 
 from hsdsl import decimals
 from hsdsl.execution import Execution, Transition
+from hsdsl.names import seen
 
 STAGES = ("load", "compile", "simulate")
 WIDTH = 100
@@ -36,12 +37,16 @@ def record(execution: Execution) -> dict[str, Any]:
     """Return the object of `run --json` with the run's own values, to be printed by :func:`dumps`."""
     settings = dict(execution.settings)
     left_out = {"left_out": settings.pop("left_out")} if "left_out" in settings else {}
+    final = _named(execution.final, "time", "mode", "state", "outputs")
+    state = final["state"]
+    if memory := state.keys() - seen(state):  # what a run needs to go on from here
+        final |= {"state": seen(state), "memory": {name: state[name] for name in state if name in memory}}
     run = _named(execution, "model", "engine", "scheme", "method") | {
         "settings": settings,
         "overrides": execution.overrides,
         "stop": _named(execution.stop, "reason", "time", "message"),
         "transitions": [_transition(transition) for transition in execution.transitions],
-        "final": _named(execution.final, "time", "mode", "state", "outputs"),
+        "final": final,
         "verdict": _named(execution.verdict, "theorem", "reasons"),
         "seconds": {stage: execution.seconds.get(stage) for stage in STAGES},
     }
@@ -60,8 +65,8 @@ def _transition(t: Transition) -> dict[str, Any]:
         "edge": t.edge,
         "from": t.source,
         "to": t.target,
-        "before": t.before,
-        "after": t.after,
+        "before": seen(t.before),
+        "after": t.after and seen(t.after),
         "alternatives": t.alternatives,
     }
 

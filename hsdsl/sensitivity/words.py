@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from hsdsl.names import called
+from hsdsl.names import called, seen
 from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
@@ -50,11 +50,11 @@ def _tie(tie: Tie) -> dict[str, Any]:
 
 
 def _end(end: EndSlopes) -> dict[str, Any]:
-    return {"mode": end.mode, "time": end.time, "state": end.state, "outputs": end.outputs}
+    return {"mode": end.mode, "time": end.time, "state": seen(end.state), "outputs": end.outputs}
 
 
 def _transition(made: TransitionSlopes) -> dict[str, Any]:
-    return vars(made)
+    return vars(made) | {"before": seen(made.before), "after": seen(made.after)}
 
 
 def _columns(found: Sensitivity, slopes: Any) -> dict[str, Any]:
@@ -88,7 +88,7 @@ def _lines(found: Sensitivity, parts: Sequence[str]) -> Iterator[str]:
 def _final(found: Sensitivity) -> Iterator[str]:
     run, end = found.execution, found.final
     rows = [["t", number(run.final.time, 10), *map(_slope, end.time.values())]]
-    rows += [[x, number(run.final.state[x], 10), *map(_slope, row.values())] for x, row in end.state.items()]
+    rows += [[x, number(run.final.state[x], 10), *map(_slope, row.values())] for x, row in seen(end.state).items()]
     rows += [[y, number(run.final.outputs[y], 10), *map(_slope, row.values())] for y, row in end.outputs.items()]
     yield from _table(f"end of the run, mode {end.mode}", ["", "value", *_heads(found)], rows)
 

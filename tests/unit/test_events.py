@@ -16,9 +16,10 @@ from hsdsl.cli.verbs import obey
 from hsdsl.export import files_of, source_of
 from hsdsl.model.guards import guard_lines
 from hsdsl.plot.view import View
-from hsdsl.report import mode_graph
+from hsdsl.report import as_json, dumps, mode_graph
 from hsdsl.report.model import model_html
 from hsdsl.report.summary import summary
+from hsdsl.sensitivity import words as derivative_words
 
 HEAD = "hsdsl: 1\nmodes:\n  m:\n"
 
@@ -316,6 +317,43 @@ def test_memory_is_hidden_where_readers_look(delayed, tmp_path):
     assert not [text for text in texts if "@armed" in text]
     run.save(tmp_path / "named.csv", columns=["x", "rise@armed"])
     assert (tmp_path / "named.csv").read_text().startswith("time,mode,j,x,rise@armed\n")
+
+
+def test_memory_in_json_is_apart(delayed):
+    found = as_json(delayed.simulate(until=0.6))
+    memory = found["final"].pop("memory")
+    assert memory.keys() > MEMORY and memory["rise@waiting"] == 1 and found["final"]["state"].keys() == {"x", "y"}
+    assert found["transitions"] and "@" not in dumps(found)
+    derivatives = delayed.sensitivity("initial.x", until=2)
+    assert "@" not in derivative_words.summary(derivatives) + dumps(derivative_words.as_json(derivatives))
+
+
+CYCLE = """hsdsl: 1
+parameters: {growth: 0.21, made: 0.4}
+modes:
+  rest:
+    flow: {m: growth*m, c: made*m - 0.3*c}
+    transitions: [{name: begin, event: c >= 1.4 or m > 9, to: copy}]
+  copy:
+    flow: {m: growth*m, c: made*m - 0.9*c}
+    transitions: [{name: split, event: m >= 5 and c > 0.1, to: rest, reset: {m: 0.45*m, c: 0.2*c}}]
+initial: {mode: rest, m: 1, c: 0}
+experiment: {until: 40}
+"""
+
+
+def test_an_event_of_several_comparisons_is_no_forcing():
+    """Its conditions allow for the round-off of time, on which the model does not depend otherwise."""
+    model = hsdsl.loads(CYCLE)
+    found = model.orbit("split")
+    assert found.phase is None and found.period == pytest.approx(math.log(1 / 0.45) / 0.21, rel=1e-9)
+    assert "@" not in found.summary + dumps(found.as_json())
+    with pytest.raises(UsageError, match="no transition 'begn'") as refusal:
+        model.orbit("begn")
+    assert refusal.value.hint == "did you mean 'begin'?"
+    with pytest.raises(UsageError) as refusal:
+        model.orbit("zz")
+    assert refusal.value.hint == "known here: begin, split"
 
 
 def test_memory_is_kept_and_a_run_goes_on_from_it(delayed, tmp_path):
