@@ -27,7 +27,7 @@ def html(execution: Execution, *, limit: int = 60) -> str:
 def _transitions(execution: Execution, limit: int) -> str:
     if not execution.transitions:
         return "<p>No transitions.</p>"
-    table = words.Table.of(execution.transitions, limit)
+    table = words.Table.of(execution, limit)
     rows = ["<tr>" + "".join(f"<td>{_escaped(cell)}</td>" for cell in row) + "</tr>" for row in table.rows]
     if table.left_out:
         rows.insert(table.cut, f'<tr><td colspan="6">&hellip; {table.left_out} more &hellip;</td></tr>')

@@ -53,7 +53,7 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
     if not execution.transitions:
         yield "No transitions."
         return
-    table = words.Table.of(execution.transitions, limit)
+    table = words.Table.of(execution, limit)
     cells = list(zip(words.COLUMNS, *table.rows, strict=True))
     *aligned, notes = [column for column in cells if set(column[1:]) != {"-"} or column[0] != "delay"]
     for i, (line, note) in enumerate(zip(_aligned(aligned), notes, strict=True)):

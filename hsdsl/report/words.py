@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,10 +11,12 @@ from typing import Any
 from hsdsl import decimals
 from hsdsl.defaults import kept_digits
 from hsdsl.execution import Execution, Transition
-from hsdsl.names import called, without_memory
+from hsdsl.names import called, seen, without_memory
 from hsdsl.parts import change, compact, of_all
 from hsdsl.report.alike import condensed
 
+DIGITS = 10  # of a run without a tolerance, whose error nothing says
+_LEAST_DIGITS, _MOST_DIGITS = 3, 16
 COLUMNS = ("#", "time", "delay", "edge", "from -> to", "state")
 
 
@@ -24,9 +27,15 @@ def number(x: Any, digits: int = 6) -> str:
     return f"{float(x):.{digits}g}"
 
 
-def values(named: Mapping[str, Any]) -> str:
+def values(named: Mapping[str, Any], digits: int = DIGITS) -> str:
     """Write named values."""
-    return ", ".join(f"{name} = {number(value, 10)}" for name, value in named.items())
+    return ", ".join(f"{name} = {number(value, digits)}" for name, value in named.items())
+
+
+def meant_digits(execution: Execution) -> int:
+    """How many digits of its times and states a run means: those of its tolerance and one more, where it has one."""
+    tolerance = execution.settings.get("tolerance")
+    return DIGITS if not tolerance else min(_MOST_DIGITS, max(_LEAST_DIGITS, 1 - math.floor(math.log10(tolerance))))
 
 
 def heading(execution: Execution) -> str:
@@ -73,8 +82,9 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     waiting = ", waiting in a strip" if final.kind == "strip" else ""
     yield "stop", stop(execution)
     yield "final", f"mode {compact(final.mode)} after {count}{waiting}"
-    yield "state", values({name: final.state[name] for name in without_memory(final.state)})
-    yield "outputs", values({name: value for name, value in final.outputs.items() if value == value})
+    digits = meant_digits(execution)
+    yield "state", values(seen(final.state), digits)
+    yield "outputs", values({name: value for name, value in final.outputs.items() if value == value}, digits)
     if left_out is not None:
         yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
     yield "verdict", ": ".join(filter(None, (execution.verdict.theorem, "; ".join(_reasons(execution)))))
@@ -103,26 +113,27 @@ class Table:
     left_out: int
 
     @staticmethod
-    def of(transitions: Sequence[Transition], limit: int) -> Table:
+    def of(execution: Execution, limit: int) -> Table:
         """Write the first and the last transitions, ``limit`` in all."""
+        transitions, digits = execution.transitions, meant_digits(execution)
         count = len(transitions)
         cut = (limit + 1) // 2 if count > limit else count
         chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
-        instants = times([t.time for t in chosen])
+        instants = times([t.time for t in chosen], digits)
         rows = [
-            (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t))
+            (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t, min(6, digits)))
             for t, instant in zip(chosen, instants, strict=True)
         ]
         return Table(rows, cut, count - len(chosen))
 
 
-def times(values: Sequence[Any]) -> list[str]:
-    """Write times with one number of decimals, about ten significant digits for the largest."""
+def times(values: Sequence[Any], digits: int) -> list[str]:
+    """Write times with one number of decimals, about so many significant digits for the largest."""
     finite = [float(t) for t in values if decimals.is_finite(t)]
     largest = max((abs(t) for t in finite), default=0.0)
     if largest >= 1e9 or 0.0 < largest < 1e-3:
-        return [f"{float(t):.10g}" for t in values]
-    places = 10 - len(str(int(largest)))
+        return [f"{float(t):.{digits}g}" for t in values]
+    places = max(0, digits - len(str(int(largest))))
     return [f"{float(t):.{places}f}" for t in values]
 
 
@@ -134,9 +145,9 @@ def _delay(transition: Transition) -> str:
     return f"{waited:.2e}" if waited else "-"
 
 
-def _changes(transition: Transition) -> str:
+def _changes(transition: Transition, digits: int) -> str:
     """What a transition changed in the state, and what is special about it."""
-    words = [_state(transition)]
+    words = [_state(transition, digits)]
     if transition.entry:
         words.append("at once on entering the mode")
     if transition.alternatives:
@@ -144,16 +155,16 @@ def _changes(transition: Transition) -> str:
     return "; ".join(words)
 
 
-def _state(transition: Transition) -> str:
+def _state(transition: Transition, digits: int) -> str:
     before, after = transition.before, transition.after
     if after is None:
         return "the run ended in the strip"
     old, new = without_memory(before), without_memory(after)
     words = [
-        f"{name}: {number(before[name])} -> {number(after[name])}"
+        f"{name}: {number(before[name], digits)} -> {number(after[name], digits)}"
         for name in new
         if name in before and before[name] != after[name]
     ]
-    words += [f"{name}: {number(after[name])} (new)" for name in new if name not in before]
+    words += [f"{name}: {number(after[name], digits)} (new)" for name in new if name not in before]
     words += [f"{name} dropped" for name in old if name not in after]
     return ", ".join(words) or "unchanged"

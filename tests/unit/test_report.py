@@ -245,3 +245,15 @@ def test_product_modes_in_tables_and_legends():
     assert parts.compact(NAMES[0]) == "body=move leg[1..2]=air a=on"
     assert parts.short_names(NAMES) == dict(zip(NAMES, ["leg[1]=air", "leg[1]=down"], strict=True))
     assert parts.short_names(["free", NAMES[0]]) == {"free": "free", NAMES[0]: parts.compact(NAMES[0])}
+
+
+@pytest.mark.parametrize(("tolerance", "digits"), [(1e-4, 5), (3e-7, 8), (1e-9, 10), (2e-12, 13)])
+def test_numbers_have_the_digits_that_the_tolerance_means(tolerance, digits):
+    text = "hsdsl: 1\nmodes: {m: {flow: {x: x}, transitions: [{when: x >= 7, to: m, reset: {x: x/3}}]}}\n"
+    run = hsdsl.loads(f"{text}initial: {{mode: m, x: 1}}\nexperiment: {{until: 3}}\n").simulate(tolerance=tolerance)
+    lines = summary(run).splitlines()
+    (row,) = [line for line in lines if "m->m" in line]
+    (end,) = [line for line in lines if line.strip().startswith("x = ")]
+    assert row.split()[1] == f"{math.log(7):.{digits - 1}f}"
+    assert len(end.split("= ")[1].replace(".", "").lstrip("0")) <= digits
+    assert float(end.split("= ")[1]) == pytest.approx(math.exp(3) / 3, rel=10 * tolerance)
