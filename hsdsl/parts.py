@@ -171,6 +171,17 @@ def short_names(names: Sequence[str]) -> dict[str, str]:
     return {name: short.get(name) or compact(name) for name in names}
 
 
+def parts_in(names: Sequence[str]) -> dict[str, dict[str, str]] | None:
+    """By part the mode that it has in each product mode, of the parts that differ; None where these are no products."""
+    if not names or not all("=" in name for name in names):
+        return None
+    found: dict[str, dict[str, str]] = {}
+    for name in names:
+        for part, mode in _items(name):
+            found.setdefault(part, {})[name] = mode
+    return {part: modes for part, modes in found.items() if len({*modes.values()}) > 1 or len(modes) < len(names)}
+
+
 def _items(product: str) -> list[tuple[str, str]]:
     """The parts and their modes in the name of a product mode."""
     return [(part, mode) for part, _, mode in (item.partition("=") for item in product.split())]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -39,6 +39,8 @@ class Fit:
         What is not smooth at the values found, so that the covariance may not hold, and what was met on the way.
     execution : Execution
         The run with these values.
+    units : mapping
+        The units that the model gives.
     """
 
     values: dict[str, float]
@@ -52,6 +54,7 @@ class Fit:
     nonsmooth: tuple[str, ...]
     measured: Measurements = field(repr=False)
     execution: Execution = field(repr=False)
+    units: Mapping[str, str] = field(default_factory=dict[str, str], repr=False)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} {number(value, 6)}" for name, value in self.values.items())
@@ -98,4 +101,6 @@ class Fit:
         """Draw the measurements and the run to a .png or .svg file."""
         from hsdsl.plot.analyses import plot_measured
 
-        plot_measured(path, self.execution, self.measured.times, self.measured.columns)
+        values = ", ".join(f"{name} = {number(value, 6)}" for name, value in self.values.items())
+        said = f"fit to {self.measured.count} measurements: {values}; left over {number(self.deviation, 4)}"
+        plot_measured(path, self.execution, self.measured.times, self.measured.columns, self.units, said)

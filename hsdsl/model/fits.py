@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,7 +53,7 @@ def fit(
         _evaluate(model, by, arguments), measured, _weights(measured, sigma, weights), start, progress
     )
     scales = {label: abs(value) or _span(bounds[label]) for label, value in start.items()}
-    return fitted(objective, bounds, bool(sigma), scales)
+    return replace(fitted(objective, bounds, bool(sigma), scales), units=model.program.units)
 
 
 def _evaluate(model: Model, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:

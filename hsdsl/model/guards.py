@@ -3,16 +3,36 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from functools import reduce
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
+from hsdsl.functions import FUNCTIONS
 from hsdsl.model.values import Values
 from hsdsl.names import without_memory
 from hsdsl.plot import GuardLine
+from hsdsl.system import TIME
+
+Array = npt.NDArray[Any]
+_OWN: dict[str, Callable[..., Any]] = {  # functions of the language that SymPy's printer for NumPy does not know
+    "abs": np.abs,
+    "sign": np.sign,
+    "floor": np.floor,
+    "min": lambda *values: reduce(np.minimum, values),
+    "max": lambda *values: reduce(np.maximum, values),
+    "select": lambda number, bound, a, b: np.where(np.asarray(number) < bound, a, b),
+}
+NUMPY = {str(getattr(FUNCTIONS[name][0], "__name__", name)): function for name, function in _OWN.items()}
 
 
 def guard_lines(values: Values) -> list[GuardLine]:
-    """Return the level of every guard and wall that compares one state with parameters."""
+    """Return the level of every guard and wall that compares one state with parameters, and with time."""
     system = values.system
     parameters = set(system.parameter_symbols)
     lines: list[tuple[str, str, sp.Expr, str]] = []
@@ -22,11 +42,27 @@ def guard_lines(values: Values) -> list[GuardLine]:
         labelled += [(wall, wall.text) for wall in mode.walls]
         for surface, label in labelled:
             for side, level in ((surface.left, surface.right), (surface.right, surface.left)):
-                if isinstance(side, sp.Symbol) and side in states and level.free_symbols <= parameters:
+                if isinstance(side, sp.Symbol) and side in states and level.free_symbols <= parameters | {TIME}:
                     lines.append((mode.name, states[side], level, label))
     lines = list(dict.fromkeys(lines))  # an event has several edges at one level
-    levels = values.evaluate({f"level_{k}": level for k, (_, _, level, _) in enumerate(lines)}) if lines else {}
-    return [
+    fixed = [line for line in lines if TIME not in line[2].free_symbols]
+    levels = values.evaluate({f"level_{k}": level for k, (_, _, level, _) in enumerate(fixed)}) if fixed else {}
+    found = [
         GuardLine(mode, state, float(level), label)
-        for (mode, state, _, label), level in zip(lines, levels.values(), strict=True)
+        for (mode, state, _, label), level in zip(fixed, levels.values(), strict=True)
     ]
+    moving = (line for line in lines if TIME in line[2].free_symbols)
+    return found + [GuardLine(m, s, math.nan, label, _over_time(level, values)) for m, s, level, label in moving]
+
+
+def _over_time(level: sp.Expr, values: Values) -> Callable[[Array], Array]:
+    """The values of a level at times; not-a-number where it has none."""
+    names = [*map(symbol, values.program.parameters), TIME]
+    function = sp.lambdify(names, level, modules=[NUMPY, "numpy"], dummify=True)
+    numbers = [float(number) for number in values.parameters]
+
+    def at(times: Array) -> Array:
+        with np.errstate(all="ignore"):
+            return np.broadcast_to(np.asarray(function(*numbers, times), float), times.shape)
+
+    return at

@@ -5,19 +5,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
+from textwrap import fill
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hsdsl.execution import Array, Execution
+from hsdsl.plot.curves import curves, limits_of, line
+from hsdsl.plot.panel import label
 from hsdsl.plot.style import FAINT, PALETTE, legend_below, to_file
+from hsdsl.report import words
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BANDS = ("#0b5394", "#c8c8c8", "#b45f06")  # colours of distances over time
 DECADES = 12  # below the largest value: smaller ones are drawn there
-POINTS = 2000  # of a fitted run
 LONGEST = 40  # letters of a label of runs from nearby
 MOST = 12  # sequences of transitions in their legend
 MARKERS = {"fold": "o", "flip": "D", "torus": "s", "grazing": "X"}
@@ -49,23 +53,29 @@ def plot_over_time(times: Array, bounds: dict[str, tuple[Array, Array]], title: 
     return figure
 
 
-def measured(run: Execution, times: Array, columns: Mapping[str, Array]) -> Figure:
-    """Draw measurements and the run fitted to them, a panel for each column; jumps are not joined."""
+def measured(
+    run: Execution,
+    times: Array,
+    columns: Mapping[str, Array],
+    units: Mapping[str, str] = MappingProxyType({}),
+    values: str = "",
+) -> Figure:
+    """Draw measurements and the run fitted to them, a panel for each column; ``values`` are what was fitted."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(9, 1 + 2.4 * len(columns)), layout="constrained")
+    figure = Figure(figsize=(9, 1.3 + 2.4 * len(columns)), layout="constrained")
     axes = figure.subplots(len(columns), 1, squeeze=False, sharex=True)[:, 0]
-    cuts = [float(run.times[0]), *(float(made.time) for made in run.transitions), float(run.times[-1])]
+    drawn = curves(run)
     for axis, (name, column) in zip(axes, columns.items(), strict=True):
-        for start, end in pairwise(cuts):
-            dense = np.linspace(start, end, max(2, int(POINTS * (end - start) / (cuts[-1] or 1))))[:-1]
-            if len(dense):
-                axis.plot(dense, run.sample(dense)[name].astype(float), color=PALETTE[0], label="run")
-        axis.plot(times, column, ".", color=PALETTE[1], markersize=3, label="measured")
-        axis.set_ylabel(name, parse_math=False)
-    axes[-1].set_xlabel("time t")
-    drawn = dict(zip(*reversed(axes[0].get_legend_handles_labels()), strict=True))  # one for all pieces of the run
-    legend_below(figure, list(drawn.values()), 9.0)
+        low, high = limits_of([drawn], name)
+        along = line(drawn.samples.time, drawn.column(name), drawn.begins, (*drawn.span, low, high))
+        axis.plot(*along, color=PALETTE[0], label="run")
+        axis.plot(times, column, ".", color=PALETTE[1], markersize=max(3.0, 7.0 - len(times) / 50), label="measured")
+        axis.set_ylabel(label(name, units), parse_math=False)
+    axes[-1].set_xlabel(f"time t [{units['t']}]" if "t" in units else "time t", parse_math=False)
+    figure.suptitle(words.heading(run), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
+    axes[0].set_title(fill(values, 110), loc="left", fontsize=8.5, color="#555555", parse_math=False)
+    legend_below(figure, axes[0].get_legend_handles_labels()[0], 9.0)
     return figure
 
 

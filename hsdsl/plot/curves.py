@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -20,16 +20,21 @@ CELLS = 3000  # of the picture's width and height: two points in one cell look l
 BANDS = 400  # with more changes of mode than this, time is cut into BINS and a bin may be of several modes
 BINS = 1500
 SEVERAL = "several modes"
+ROUND_OFF = 1e-12  # of the size of a state
 
 
 @dataclass(frozen=True)
 class GuardLine:
-    """A guard that is a level of one state: in ``mode`` something fires where ``state`` reaches ``value``."""
+    """A guard that is a level of one state: in ``mode`` something fires where ``state`` reaches ``value``.
+
+    A guard that moves has its values at times in ``moving``, and not-a-number for ``value``.
+    """
 
     mode: str
     state: str
     value: float
     label: str
+    moving: Callable[[Array], Array] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +43,7 @@ class Curves:
 
     ``begins`` marks the first point of each arc, ``jumps`` are the indices of points behind transitions. ``bands`` are
     the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many.
+    ``error`` is how much of its size a state may be off: one that changes by less is drawn as a constant.
     """
 
     samples: Samples
@@ -45,6 +51,7 @@ class Curves:
     jumps: Array
     bands: list[tuple[str, float, float]]
     ends_badly: bool = False
+    error: float = ROUND_OFF
 
     @property
     def span(self) -> tuple[float, float]:
@@ -82,7 +89,8 @@ def curves(execution: Execution) -> Curves:
     begins = np.zeros(len(rows), dtype=bool)
     begins[np.searchsorted(rows, first)] = True
     jumps = np.flatnonzero(np.diff(samples.jump)) + 1
-    return Curves(samples, begins, jumps, _bands(run), not run.stop.complete)
+    error = max(ROUND_OFF, 10 * float(run.settings.get("tolerance") or 0))
+    return Curves(samples, begins, jumps, _bands(run), not run.stop.complete, error)
 
 
 def _in_float64(execution: Execution) -> Execution:
@@ -110,7 +118,7 @@ def _points(run: Execution) -> tuple[Array, Array]:
 
 
 def _bands(run: Execution) -> list[tuple[str, float, float]]:
-    bands = _merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
+    bands = merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
     if len(bands) <= BANDS:
         return _visible(bands)
     edges = np.linspace(bands[0][1], bands[-1][2], BINS + 1)
@@ -118,7 +126,7 @@ def _bands(run: Execution) -> list[tuple[str, float, float]]:
     earliest: list[int] = np.searchsorted(ends, edges[:-1], side="right").tolist()
     latest: list[int] = (np.searchsorted(begins, edges[1:], side="left") - 1).tolist()
     modes = [bands[i][0] if i == k else SEVERAL for i, k in zip(earliest, latest, strict=True)]
-    return _merged(list(zip(modes, edges[:-1].tolist(), edges[1:].tolist(), strict=True)))
+    return merged(list(zip(modes, edges[:-1].tolist(), edges[1:].tolist(), strict=True)))
 
 
 def _visible(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
@@ -128,10 +136,11 @@ def _visible(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, fl
     start, end = bands[0][1], bands[-1][2]
     wide = [band for band in bands if band[2] - band[1] >= (end - start) / CELLS]
     begins = [start, *(band[1] for band in wide[1:]), end]
-    return _merged([(band[0], *span) for band, span in zip(wide, pairwise(begins), strict=True)])
+    return merged([(band[0], *span) for band, span in zip(wide, pairwise(begins), strict=True)])
 
 
-def _merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
+def merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
+    """Make one band of those that follow each other in one mode."""
     merged: list[tuple[str, float, float]] = []
     for mode, begin, end in bands:
         if begin == end:
@@ -158,14 +167,16 @@ def line(x: Array, y: Array, begins: Array, limits: tuple[float, float, float, f
 
 def limits_of(runs: Sequence[Curves], name: str) -> tuple[float, float]:
     """Choose the ends of an axis on which all runs are."""
-    ends = [limits(run.column(name), run.samples.time, run.ends_badly) for run in runs if run.has_values(name)]
+    ends = [
+        limits(run.column(name), run.samples.time, run.ends_badly, run.error) for run in runs if run.has_values(name)
+    ]
     return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else (-1.0, 1.0)
 
 
-def limits(values: Array, time: Array, ends_badly: bool) -> tuple[float, float]:
+def limits(values: Array, time: Array, ends_badly: bool, error: float = ROUND_OFF) -> tuple[float, float]:
     """Choose the lower and upper end of an axis.
 
-    A range of round-off, relative to the values, is shown as constant; small values are not. Where the run ended badly
+    A range within the error of the values is shown as constant; small values are not. Where the run ended badly
     its last values are arbitrary, and the last thirtieth of the time does not count.
     """
     if ends_badly and len(time) > 1:
@@ -176,7 +187,7 @@ def limits(values: Array, time: Array, ends_badly: bool) -> tuple[float, float]:
         return -1.0, 1.0
     low, high = float(finite.min()), float(finite.max())
     size = max(abs(low), abs(high))
-    if high - low <= 1e-12 * size:
+    if high - low <= error * size:
         room = 0.1 * size or 1.0
         return low - room, high + room
     room = high / 16 - low / 16

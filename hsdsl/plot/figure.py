@@ -18,7 +18,7 @@ from hsdsl.execution import Execution
 from hsdsl.names import shown
 from hsdsl.parts import short_names
 from hsdsl.plot.curves import Curves, GuardLine, curves, modes_of
-from hsdsl.plot.panel import draw_panel, draw_ribbons, name_bands, raise_of
+from hsdsl.plot.panel import MOST_BANDS, MOST_ROWS, draw_panel, draw_ribbons, draw_rows, name_bands, raise_of, rows_of
 from hsdsl.plot.phase import draw_phase
 from hsdsl.plot.style import fills, legend_below, looks
 from hsdsl.plot.view import Pair, View
@@ -51,11 +51,11 @@ class Plan:
     height: float
 
     @classmethod
-    def of(cls, names: int, pairs: int, runs: int) -> Plan:
-        """Give every panel room to be read."""
+    def of(cls, names: int, pairs: int, rows: int) -> Plan:
+        """Give every panel room to be read; ``rows`` of bars above them show modes."""
         across = 1 if names <= 6 else 2 if names <= 16 else 3
         down = max(1, -(-names // across))
-        ribbon = RIBBON * runs + LINE if runs > 1 else 0.0
+        ribbon = RIBBON * min(rows, MOST_ROWS) + LINE if rows > 1 else 0.0
         height = down * HEIGHTS.get(down, LOWEST) + ribbon
         phase_down = min(pairs, max(1, round(height / LARGEST), ceil(sqrt(pairs))))
         phase_across = -(-pairs // phase_down) if pairs else 0
@@ -84,14 +84,23 @@ def picture(runs: Sequence[Execution], view: View) -> Figure:
 
 def size_of(runs: Sequence[Execution], view: View) -> tuple[float, float]:
     """Return the inches that a figure of runs takes."""
-    return Plan.of(len(view.names(runs)), len(view.pairs(runs)), len(runs)).size
+    many = len(runs) == 1 and len({arc.mode for arc in runs[0].arcs}) > MOST_BANDS
+    rows = _rows([curves(runs[0])]) if many else 0 if len(runs) == 1 else len(runs)
+    return Plan.of(len(view.names(runs)), len(view.pairs(runs)), rows).size
+
+
+def _rows(data: Sequence[Curves]) -> int:
+    """How many rows of bars show modes: one for each of several runs; of one run, where it has many modes."""
+    if len(data) > 1:
+        return len(data)
+    return max(2, len(rows_of(data[0]))) if len(data[0].modes) > MOST_BANDS else 0
 
 
 def draw(runs: Sequence[Execution], view: View, figure: FigureBase) -> list[Axes]:
     """Draw runs to a figure; return the axes: panels over time, then phase plots."""
     names, pairs, labels = view.names(runs), view.pairs(runs), view.called(runs)
-    plan = Plan.of(len(names), len(pairs), len(runs))
     data = [curves(run) for run in runs]
+    plan = Plan.of(len(names), len(pairs), _rows(data))
     visited = {arc.mode for run in runs for arc in run.arcs}
     guards = [guard for guard in view.guards if guard.mode in visited]
     widths = [plan.width, plan.phase * plan.phase_across] if pairs else [1]
@@ -100,11 +109,14 @@ def draw(runs: Sequence[Execution], view: View, figure: FigureBase) -> list[Axes
     for name, axis in zip(names, panels, strict=False):
         draw_panel(axis, data, name, [guard for guard in guards if guard.state == name], view, plan.room)
     _time_labels(panels, plan.across, view)
-    if ribbon is not None:
+    rows: list[Patch] | None = None
+    if ribbon is not None and len(data) == 1:
+        rows = draw_rows(ribbon, data[0])
+    elif ribbon is not None:
         draw_ribbons(ribbon, data, labels)
     phases = _phases(figure, outer[0, 1], plan, pairs, data, guards, view) if pairs else []
     _headings(figure, ribbon or panels[0], runs, view, plan)
-    _legend(figure, panels[0], data, labels, plan)
+    _legend(figure, panels[0], data, labels, plan, rows)
     if isinstance(figure, Figure):
         figure.align_ylabels(panels)
     return [*panels, *phases]
@@ -152,7 +164,7 @@ def _headings(figure: FigureBase, top: Axes, runs: Sequence[Execution], view: Vi
     figure.suptitle(heading, x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
     facts = _facts(runs[0]) if len(runs) == 1 else _facts_of_several(runs)
     facts = textwrap.fill(facts, int(plan.width / (plan.across if len(runs) == 1 else 1) * 14))
-    pad = 16 + raise_of(top) if len(runs) == 1 else 6
+    pad = 16 + raise_of(top) if plan.ribbon == 0 else 6
     top.set_title(facts, loc="left", fontsize=8.5, color="#555555", pad=pad, parse_math=False)
 
 
@@ -170,12 +182,21 @@ def _facts_of_several(runs: Sequence[Execution]) -> str:
     return f"{len(runs)} runs" + (f", {badly} stopped before the end" if badly else "")
 
 
-def _legend(figure: FigureBase, top: Axes, data: Sequence[Curves], labels: Sequence[str], plan: Plan) -> None:
+def _legend(
+    figure: FigureBase,
+    top: Axes,
+    data: Sequence[Curves],
+    labels: Sequence[str],
+    plan: Plan,
+    rows_shown: list[Patch] | None,
+) -> None:
     """Write names of modes above their bands, or in a legend below everything, where it covers nothing."""
     modes = modes_of(data)
     names = short_names(modes)
     handles: list[Any] = []
-    if len(data) > 1:
+    if rows_shown is not None:
+        handles = [*rows_shown]
+    elif len(data) > 1:
         handles = [
             Line2D([], [], linewidth=1.6, label=shown(label, LONGEST), **look)
             for label, look in zip(labels, looks(len(data)), strict=True)

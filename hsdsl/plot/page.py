@@ -69,7 +69,9 @@ def _summaries(runs: Sequence[Execution], labels: Sequence[str], view: View) -> 
 
 def _model(view: View, columns: list[str], shown: list[str], pairs: Sequence[Pair], modes: list[str]) -> dict[str, Any]:
     colour, names = colours(modes), short_names(modes)
-    guards = {(guard.state, guard.value): guard.label for guard in view.guards if guard.mode in modes}
+    guards = {
+        (guard.state, guard.value): guard.label for guard in view.guards if guard.mode in modes and guard.moving is None
+    }
     return {
         "columns": list(map(visible, columns)),
         "units": {visible(name): visible(unit) for name, unit in view.units.items()},

@@ -3,18 +3,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from hsdsl.names import shown
-from hsdsl.parts import short_names
-from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, modes_of
+from hsdsl.parts import parts_in, short_names
+from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, merged, modes_of
 from hsdsl.plot.style import ALARM, FAINT, INK, LETTER, Look, fills, looks
 from hsdsl.plot.view import View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
 
+MOST_BANDS = 9  # modes whose colours and hatches are told apart
+MOST_ROWS = 40  # of bars of modes that each have a name
+MOVING = 1000  # points of a guard that moves
 BOTH_SIDES = 60  # transitions up to which the values before and after are marked
 AFTER_ONLY = 400  # and up to which the value after is
 LONGEST = 24  # letters of a run's label
@@ -30,14 +36,19 @@ def draw_panel(
     start, end = min(run.span[0] for run in runs), max(run.span[1] for run in runs)
     if start == end:
         start, end = start - 0.5, end + 0.5
-    low, high = with_guards(limits_of(runs, name), [guard.value for guard in guards])
+    levels = [guard.value for guard in guards if guard.moving is None]
+    for _, _, values in moving_levels(runs, guards):
+        levels += [float(end) for end in (np.nanmin(values), np.nanmax(values))] if np.isfinite(values).any() else []
+    low, high = with_guards(limits_of(runs, name), levels)
     axis.set_xlim(start - 0.008 * (end - start), end + 0.008 * (end - start))  # room for markers at the ends
     axis.set_ylim(low, high)
     if len(runs) == 1:
-        draw_bands(axis, runs[0])
-        _draw_guards(axis, runs[0], guards, (low, high), room)
+        if len(runs[0].modes) <= MOST_BANDS:
+            draw_bands(axis, runs[0])
+        _draw_guards(axis, runs[0], [guard for guard in guards if guard.moving is None], (low, high), room)
     elif guards:
         _draw_levels(axis, guards)
+    _draw_moving(axis, runs, guards)
     for run, look in zip(runs, looks(len(runs)), strict=True):
         _draw_curve(axis, run, name, look, (start, end, low, high))
     if not any(run.has_values(name) for run in runs):
@@ -69,6 +80,44 @@ def draw_bands(axis: Axes, data: Curves) -> None:
         axis.broken_barh(spans, (0, 1), transform=axis.get_xaxis_transform(), zorder=0, label=mode, **fill)
 
 
+def rows_of(run: Curves) -> dict[str, list[tuple[str, float, float]]]:
+    """Bars of many modes by what is written beside them: for each part with several modes, else for each mode."""
+    parts = parts_in([mode for mode in run.modes if mode != SEVERAL])
+    if parts is None:
+        return {mode: [band for band in run.bands if band[0] == mode] for mode in run.modes}
+    return {
+        part: merged([(modes.get(mode, SEVERAL), begin, end) for mode, begin, end in run.bands])
+        for part, modes in parts.items()
+    }
+
+
+def draw_rows(axis: Axes, run: Curves) -> list[Patch]:
+    """Draw the modes of one run as rows of bars; return what a legend says of them: nothing where rows are modes."""
+    from matplotlib.patches import Patch
+
+    rows = rows_of(run)
+    named = dict.fromkeys(mode for bands in rows.values() for mode, _, _ in bands)
+    by_part = [*named] != [*rows]
+    one: Look = {"facecolor": INK, "linewidth": 0}
+    fill = fills([*named], light=False) if by_part else dict.fromkeys(named, one)
+    for row, bands in enumerate(rows.values()):
+        for mode in dict.fromkeys(mode for mode, _, _ in bands):
+            spans = [(begin, end - begin) for name, begin, end in bands if name == mode]
+            axis.broken_barh(spans, (row - 0.4, 0.8), **fill[mode])
+    _rows_named(axis, [*rows])
+    return [Patch(label=shown(mode, LONGEST), **fill[mode]) for mode in named] if by_part else []
+
+
+def _rows_named(axis: Axes, names: Sequence[str]) -> None:
+    axis.set_ylim(len(names) - 0.5, -0.5)
+    named = range(0, len(names), -(-len(names) // MOST_ROWS))
+    axis.set_yticks(named, [shown(names[row], LONGEST) for row in named])
+    for text in axis.get_yticklabels():
+        text.set_parse_math(False)
+    axis.tick_params(left=False, labelbottom=False)
+    axis.spines["left"].set_visible(False)
+
+
 def draw_ribbons(axis: Axes, runs: Sequence[Curves], labels: Sequence[str]) -> None:
     """Draw a bar of modes for each run, the first on top."""
     fill = fills(modes_of(runs), light=False)
@@ -76,12 +125,7 @@ def draw_ribbons(axis: Axes, runs: Sequence[Curves], labels: Sequence[str]) -> N
         for mode in run.modes:
             spans = [(begin, end - begin) for name, begin, end in run.bands if name == mode]
             axis.broken_barh(spans, (row - 0.4, 0.8), label=mode, **fill[mode])
-    axis.set_ylim(len(runs) - 0.5, -0.5)
-    axis.set_yticks(range(len(runs)), [shown(text, LONGEST) for text in labels])
-    for text in axis.get_yticklabels():
-        text.set_parse_math(False)
-    axis.tick_params(left=False, labelbottom=False)
-    axis.spines["left"].set_visible(False)
+    _rows_named(axis, labels)
 
 
 def raise_of(axis: Axes) -> float:
@@ -134,8 +178,37 @@ def with_guards(ends: tuple[float, float], levels: Sequence[float]) -> tuple[flo
     return low, high
 
 
+def moving_levels(runs: Sequence[Curves], guards: Sequence[GuardLine]) -> Iterator[tuple[str, Array, Array]]:
+    """The label of each guard that moves, and its finite values at times at which its mode is occupied."""
+    for guard in guards:
+        for run in runs if guard.moving else ():
+            own = [(begin, end) for mode, begin, end in run.bands if mode in (guard.mode, SEVERAL)]
+            times = np.linspace(*run.span, MOVING)
+            inside = np.any([(begin <= times) & (times <= end) for begin, end in own], axis=0) if own else times < 0
+            assert guard.moving is not None
+            yield guard.label, times, np.where(inside, guard.moving(times), np.nan)
+
+
+def _draw_moving(axis: Axes, runs: Sequence[Curves], guards: Sequence[GuardLine]) -> None:
+    """Draw guards that move as dotted lines, each with its label at its last time."""
+    named = set[str]()
+    for text, times, values in moving_levels(runs, guards):
+        finite = np.flatnonzero(np.isfinite(values))
+        if not len(finite):
+            continue
+        axis.plot(times, values, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)
+        if text not in named:
+            named.add(text)
+            last = finite[-1]
+            label = axis.annotate(
+                shown(text, LONGEST), (times[last], values[last]), xytext=(-3, -4), textcoords="offset points",
+                ha="right", va="top", fontsize=7.5, color="#444444", parse_math=False,
+            )  # fmt: skip
+            label.set_in_layout(False)
+
+
 def _draw_levels(axis: Axes, guards: Sequence[GuardLine]) -> None:
-    for level in dict.fromkeys(guard.value for guard in guards):
+    for level in dict.fromkeys(guard.value for guard in guards if guard.moving is None):
         axis.axhline(level, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)
 
 

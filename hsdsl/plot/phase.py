@@ -21,7 +21,8 @@ LEVEL: dict[str, Any] = {"color": "#444444", "linestyle": "dotted", "linewidth":
 
 def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, guards: Sequence[GuardLine], view: View) -> None:
     """Draw one run coloured by mode where it has several, or several with a look for each; guards are dotted."""
-    levels = [[guard.value for guard in guards if guard.state == name] for name in pair]
+    fixed = [guard for guard in guards if guard.moving is None]
+    levels = [[guard.value for guard in fixed if guard.state == name] for name in pair]
     across, up = (with_guards(limits_of(runs, name), at) for name, at in zip(pair, levels, strict=True))
     axis.set(xlim=across, ylim=up)
     for run, look in zip(runs, looks(len(runs)), strict=True):

@@ -12,6 +12,7 @@ import pytest
 import hsdsl
 from hsdsl import UsageError
 from hsdsl.cli.verbs import obey
+from hsdsl.plot import style
 
 OSCILLATOR = "models/oscillator-with-stop-1.yaml"
 TRUE = {"c": 0.9, "a": 0.05}
@@ -184,3 +185,27 @@ def test_command(samples: dict[str, Any], tmp_path: Path, capsys: pytest.Capture
     found = json.loads(capsys.readouterr().out)
     assert found["values"]["c"] == pytest.approx(0.9, abs=1e-10)
     assert picture.stat().st_size > 1000
+
+
+def test_a_picture_of_a_fit_has_a_title_units_and_no_gaps(tmp_path):
+    text = """hsdsl: 1
+title: A ball that was dropped
+units: {t: s, h: m, v: m/s}
+parameters: {e: 0.6}
+modes: {fly: {flow: {h: v, v: -9.81}, transitions: [{when: h <= 0, to: fly, reset: {v: -e*v}}]}}
+initial: {mode: fly, h: 2, v: 0}
+experiment: {until: 2}
+"""
+    data = {"t": [0.2, 0.7, 1.1, 1.5], "h": [1.8, 0.25, 0.95, 0.6], "v": [-2, 4, 0, -3]}
+    found = hsdsl.loads(text).fit(data, "e")
+    assert found.units == {"t": "s", "h": "m", "v": "m/s"}
+    seen = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(style, "write_figure", lambda figure, *_: seen.append(figure))
+        found.plot(tmp_path / "fit.png")
+    (figure,) = seen
+    height, speed = figure.axes
+    assert figure.get_suptitle() == "A ball that was dropped" and "e = " in height.get_title("left")
+    assert (height.get_ylabel(), speed.get_xlabel()) == ("h [m]", "time t [s]")
+    assert not np.isnan(height.get_lines()[0].get_ydata()).any()  # the height does not jump
+    assert np.isnan(speed.get_lines()[0].get_ydata()).any()

@@ -335,3 +335,61 @@ def test_ends_of_several_runs_have_their_colours():
     axis = _figure(*runs).axes[1]
     ends = [drawn for drawn in axis.get_lines() if list(drawn.get_ydata()) == [0, 1] and len(drawn.get_xdata()) == 2]
     assert [drawn.get_color() for drawn in ends] == list(RUN_COLOURS[:3])
+
+
+SHAKEN = """hsdsl: 1
+parameters: {minimum: 0.3, w: 4}
+modes:
+  fly:
+    flow: {h: v, v: -1}
+    transitions:
+      - {name: low, when: "h <= max(minimum*sin(w*t), -0.1)", to: fly, reset: {v: 2 - v/2}}
+      - {name: gate, when: "h >= select(t - 1, 9, 4) + floor(t)", to: fly, reset: {v: -1}}
+initial: {mode: fly, h: 1, v: 0}
+experiment: {until: 3}
+"""
+
+
+def test_guards_that_move_are_drawn_where_they_are():
+    """A parameter may have the name of a function that formulas are printed with."""
+    run = hsdsl.loads(SHAKEN).simulate(parameters={"w": 5})
+    dotted = [one for one in _figure(run, **run.view()).axes[0].get_lines() if one.get_linestyle() == ":"]
+    low, gate = (np.array(one.get_data()) for one in dotted)
+    assert low[1] == pytest.approx(np.maximum(0.3 * np.sin(5 * low[0]), -0.1), abs=1e-12)
+    assert gate[1] == pytest.approx(np.where(gate[0] > 1, 9, 4) + np.floor(gate[0]))
+    assert (low[0, 0], low[0, -1]) == (0, 3)
+
+
+def test_a_state_that_changes_within_its_error_is_a_constant():
+    text = "hsdsl: 1\nmodes: {m: {flow: {x: 4e-8*cos(20*t)}}}\ninitial: {mode: m, x: 5}\nexperiment: {until: 3}\n"
+    model = hsdsl.loads(text)
+    wide, close = (_figure(model.simulate(tolerance=tolerance)).axes[0].get_ylim() for tolerance in (1e-9, 1e-13))
+    assert wide == pytest.approx((4.5, 5.5)) and close == pytest.approx((5, 5), abs=1e-7)
+
+
+def test_many_modes_are_rows_of_bars():
+    steps = "".join(
+        f"  m{k}: {{flow: {{x: 1}}, transitions: [{{when: x >= {k}/5, to: m{k % 11 + 1}}}]}}\n" for k in range(1, 12)
+    )
+    run = hsdsl.loads(f"hsdsl: 1\nmodes:\n{steps}initial: {{mode: m1, x: 0}}\nexperiment: {{until: 2}}\n").simulate()
+    figure = _figure(run)
+    rows = [text.get_text() for text in figure.axes[-1].get_yticklabels()]
+    assert rows == [f"m{k}" for k in range(1, 11)] and not figure.legends
+
+
+def test_parts_with_many_modes_together_have_a_row_each():
+    text = """hsdsl: 1
+automata:
+  lamp:
+    parameters: {rate: 1}
+    modes:
+      off: {flow: {x: rate}, transitions: [{name: on, when: x >= 1, to: lit}]}
+      lit: {flow: {x: -rate}, transitions: [{name: out, when: x <= 0, to: off}]}
+system: {lamp: {automaton: lamp, count: 4, initial: {mode: off, x: 0}, parameters: {rate: index + 0.3}}}
+experiment: {until: 4}
+"""
+    figure = _figure(hsdsl.loads(text).simulate())
+    names = [[text.get_text() for text in axis.get_yticklabels()] for axis in figure.axes]
+    (rows,) = [row for row in names if row[0] == "lamp[1]"]
+    assert rows == ["lamp[1]", "lamp[2]", "lamp[3]", "lamp[4]"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["off", "lit"]
