@@ -129,3 +129,13 @@ def running(show: Show | None, run: Any) -> None:
 def counted(show: Show | None, noun: str) -> Callable[[int, int], None] | None:
     """A function of how much is done and how much there is."""
     return show and (lambda done, of: show(lambda: f"{bar(done / of if of else 1.0)}, {done:,} of {of:,} {noun}"))
+
+
+def counted_runs(show: Show | None, followed: str = "") -> Callable[[int, float | None], None] | None:
+    """A function of how many runs there were, and of the value of a parameter that is followed."""
+
+    def tell(runs: int, value: float | None) -> None:
+        if show:
+            show(lambda: f"run {runs:,}" + ("" if value is None else f", {followed} = {value:.6g}"))
+
+    return show and tell

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from hsdsl.cli.console import say
+from hsdsl.cli.console import progress, say
 from hsdsl.cli.options import AS_RUN, Answer, Located, Model, option, overriding
 from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
+from hsdsl.progress import counted_runs
 
 SECTION = "The transition that the orbit is cut at, by its name."
 LAPS = "How many transitions of the section close the orbit."
@@ -36,10 +37,12 @@ def orbit(
 
         call = located.settings(overrides, until=until, laps=laps, period=period)
         loaded = load(model)
-        if follow is None:
-            found = loaded.orbit(section, **call)
-        else:
-            found = loaded.continuation(section, *_range(follow), **call)
+        with progress(answer.hidden) as show:
+            if follow is None:
+                found = loaded.orbit(section, progress=counted_runs(show), **call)
+            else:
+                name, *ends = _range(follow)
+                found = loaded.continuation(section, name, *ends, progress=counted_runs(show, name), **call)
         if plot is not None:
             found.plot(plot)
             say(f"wrote {plot}")

@@ -14,7 +14,7 @@ from hsdsl.integrators.linear import Matrix, Vector
 from hsdsl.integrators.stepper import Flow, State
 
 SHARE = 32  # the terms of a flow may move a state by so many times its scale in a step
-PROBES = (2, 2), (-2, 2), (6, -2), (-6, -6)  # units of round-off by which time and states of odd and even place differ
+MOVES = 2, -2, 6, -6  # units of round-off; in each probe another digit of a place, to this base, says which
 BLUR_UNITS = 4  # units of round-off of its terms that a flow changes by with them
 
 
@@ -51,12 +51,16 @@ def resolved(
 def flow_terms(
     flow: Flow, t: Number, x: State, slope: State, moved: Sequence[Number], arithmetic: Arithmetic
 ) -> Vector:
-    """The sizes of the terms of a flow, by what the last digits of states that were ``moved`` so far change in it."""
+    """The sizes of the terms of a flow, by what the last digits of states that were ``moved`` so far change in it.
+
+    No two of 255 states, and no state and time, move alike in all probes: the terms of a difference do not stay equal.
+    """
     unit = arithmetic.unit
     found: Vector = [arithmetic.zero for _ in x]
-    for odd, even in PROBES:
-        near = tuple(a + (even if i % 2 else odd) * unit * s for i, (a, s) in enumerate(zip(x, moved, strict=True)))
-        other = flow(t + even * unit * t, *near)
+    for probe, every in enumerate((1, 4, 16, 64)):
+        moves = [MOVES[(i // every + probe) % 4] * unit for i in range(len(x) + 1)]
+        near = tuple(a + move * s for a, move, s in zip(x, moves, moved, strict=False))
+        other = flow(t + moves[-1] * t, *near)
         found = [max(d, abs(a - b)) for d, a, b in zip(found, other, slope, strict=True)]
     return [d / (BLUR_UNITS * unit) for d in found]
 

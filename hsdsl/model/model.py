@@ -20,7 +20,7 @@ from hsdsl.model.values import with_parameters
 from hsdsl.model.visible import visible_run, with_output_function
 from hsdsl.names import NO_FILE, called, did_you_mean, visible
 from hsdsl.program import Program
-from hsdsl.progress import counted, in_notebook, running
+from hsdsl.progress import counted, counted_runs, in_notebook, running
 from hsdsl.simulate import Prepared
 from hsdsl.simulate.recorder import Progress
 from hsdsl.simulate.review import BecomesStiff
@@ -254,7 +254,15 @@ class Model:
         """
         return self._sliding_for(arguments)._differentiator.sensitivity(wrt, arguments)
 
-    def orbit(self, section: str, *, laps: int = 1, period: Any = None, **arguments: Any) -> Orbit:
+    def orbit(
+        self,
+        section: str,
+        *,
+        laps: int = 1,
+        period: Any = None,
+        progress: Callable[[int, float | None], None] | None = None,
+        **arguments: Any,
+    ) -> Orbit:
         """Find a periodic orbit by shooting on a section, with its Floquet multipliers.
 
         The first guess is where the model's own run changes least from one passage of the section to the next.
@@ -267,6 +275,8 @@ class Model:
             How many transitions of the section close the orbit.
         period : number or str, optional
             The period of the forcing; left out, that of the sines and cosines of time in the model.
+        progress : callable, optional
+            Called before every run with which it is, and the value of the parameter that is followed, if any.
         **arguments
             Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
 
@@ -274,7 +284,9 @@ class Model:
         """
         from hsdsl.model.orbits import Orbits
 
-        return Orbits(self._sliding_for(arguments), section, laps, period, arguments).find()
+        with in_notebook() as show:
+            progress = progress or counted_runs(show)
+            return Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments).find()
 
     def continuation(
         self,
@@ -285,6 +297,7 @@ class Model:
         *,
         laps: int = 1,
         period: Any = None,
+        progress: Callable[[int, float | None], None] | None = None,
         **arguments: Any,
     ) -> Branch:
         """Follow a periodic orbit in a parameter, around folds, with its bifurcations located.
@@ -293,7 +306,7 @@ class Model:
 
         Parameters
         ----------
-        section, laps, period, **arguments
+        section, laps, period, progress, **arguments
             As for :meth:`orbit`.
         parameter : str
         start, end : number or str
@@ -303,7 +316,10 @@ class Model:
         """
         from hsdsl.model.orbits import Orbits
 
-        return Orbits(self._sliding_for(arguments), section, laps, period, arguments).continued(parameter, start, end)
+        with in_notebook() as show:
+            progress = progress or counted_runs(show, parameter)
+            orbits = Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments)
+            return orbits.continued(parameter, start, end)
 
     def orbital_stability(
         self,

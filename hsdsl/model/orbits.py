@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -36,10 +36,12 @@ REFUSED = ("step", "scheme", "samples", "precision")
 MOST_GUESSES = 6
 ENOUGH = 16  # times as many transitions as the guess makes, in a lap that another one is looked for
 SHORTER = "passages become ever shorter, so the execution ends in a point"
+NO_TIME = "Newton's method goes to where a passage takes no time"
 SHRUNK = 1e-6  # a period below this share of the guess is none
 
 
 Entered = tuple[str, tuple[str, ...]]
+Progress = Callable[[int, float | None], None]
 
 
 @dataclass(frozen=True)
@@ -61,20 +63,29 @@ class Guess:
 class Orbits:
     """The orbits of a model through one section, with the arguments of its runs."""
 
-    def __init__(self, model: Model, section: str, laps: int, period: Any, arguments: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        model: Model,
+        section: str,
+        laps: int,
+        period: Any,
+        progress: Progress | None,
+        arguments: Mapping[str, Any],
+    ) -> None:
         from hsdsl.orbits.forcing import PHASE, forced, shifted
 
         check_arguments(arguments, "an orbit", REFUSED)
         self.model, self.laps, self.arguments = model, whole(laps, "laps", 1), dict(arguments)
         self.edge = _edge(model, section)
+        self._parameters = _numbers(model, arguments)
         self.forced = forced(model.system)
         if period is not None and not self.forced:
             raise UsageError("the model does not depend on time, so its forcing has no period")
         self._period = period
         self._phase = PHASE if self.forced else None
         self._moving: Model = type(model)(Pipeline(shifted(model.system))) if self.forced else model
-        self._parameters = overrides_of(arguments, "parameters", self.model.program)
         self._stiff = False
+        self._progress, self._runs, self._followed = progress, 0, ""
         self._guess: Guess | None = None
 
     def forcing(self, parameters: Mapping[str, Any]) -> float | None:
@@ -104,6 +115,9 @@ class Orbits:
         def run(start: Mapping[str, float], phase: float, until: float, most: int, wrt: Sequence[str]) -> Sensitivity:
             given = dict(parameters) | ({self._phase: phase} if self._phase else {})
             call: dict[str, Any] = {"max_transitions": most, **arguments}
+            self._runs += 1
+            if self._progress:
+                self._progress(self._runs, parameters.get(self._followed))
             return self._moving.sensitivity(wrt, until=until, initial={"mode": mode, **start}, parameters=given, **call)
 
         parts, near = self.model.program.parts, self._guess
@@ -185,10 +199,17 @@ class Orbits:
                 return self.shoot(guess, self._parameters)
             except NotClosed as error:
                 problem = problem or str(error)
+        problem = SHORTER if problem == NO_TIME and self._shortens(run) else problem
         raise UsageError(
             f"no periodic orbit was found near the run: {problem}{ending}",
             "begin closer to it with --set initial.NAME=VALUE, or try more laps",
         )
+
+    def _shortens(self, run: Execution) -> bool:
+        """Whether each passage of a run is shorter than the one before it."""
+        passed = [float(made.time) for made in run.transitions if made.edge == self.edge]
+        lasted = np.diff(passed)
+        return len(lasted) > 1 and bool(np.all(np.diff(lasted) < 0))
 
     def _run_arguments(self) -> dict[str, Any]:
         from hsdsl.model.differentiate import located_arguments
@@ -207,7 +228,7 @@ class Orbits:
         sections = self.section(parameters), self.section(parameters, COARSER)
         found = closed(*sections, guess.point, phase, 1.5 * guess.time, multiple)
         if not found.passage.time > SHRUNK * guess.time:
-            raise NotClosed(SHORTER)
+            raise NotClosed(NO_TIME)
         if self.forced is False and _still(found):
             raise NotClosed("it closes where the flow is at rest, so the execution ends in a point")
         return self.judge(found, parameters, forcing)
@@ -226,7 +247,7 @@ class Orbits:
         value = own if min(low, high) <= own <= max(low, high) else low
         self._parameters = self._parameters | {parameter: value}
         self.arguments["parameters"] = self._parameters
-        first = self.find()
+        first, self._followed = self.find(), parameter
         multiple = None if first.phase is None else round(first.period / (self.forcing(self._parameters) or 1.0))
         lasted = first.period
 
@@ -251,7 +272,9 @@ class Orbits:
         except NoReturn as error:
             raise UsageError(f"the orbit at {parameter} = {value:g} cannot be followed: {error}") from None
         points = [*reversed(parts[0][0]), *parts[1][0][1:]]
-        bifurcations = [*reversed(parts[0][1]), *parts[1][1]]
+        own = len(parts[0][0]) - 1  # where the branch began
+        bifurcations = [replace(each, after=own - each.after - 1) for each in reversed(parts[0][1])]
+        bifurcations += [replace(each, after=own + each.after) for each in parts[1][1]]
         names = self._entered()[1]
         ends = tuple(why for *_, why in parts)
         return Branch(self.edge, parameter, names, tuple(points), tuple(bifurcations), ends, first)
@@ -273,7 +296,7 @@ class Orbits:
             None if forcing is None else found.phase % forcing,
             passage.time,
             multipliers,
-            {states[k]: float(passage.point[k] - found.point[k]) for k in found.drifting},
+            {states[k]: float(passage.point[k] - found.point[k]) for k in found.symmetry.drifting},
             found.residual,
             verdict,
             reasons,
@@ -302,6 +325,13 @@ class Orbits:
                 if not np.isnan(slopes).any():
                     sides[edge] = multipliers_of(found, slopes, forced)
         return sides
+
+
+def _numbers(model: Model, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters that a call gives, as numbers: its runs need not read their texts again."""
+    given = overrides_of(arguments, "parameters", model.program)
+    values = with_parameters(model.pipeline.values(FLOAT64), given)
+    return {name: values.parameters[model.program.parameters.index(name)] for name in given}
 
 
 def _with_sizes(guess: Guess, run: Execution) -> Guess:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
+from hsdsl.execution import Array
 from hsdsl.names import called
 from hsdsl.orbits.continuation import Bifurcation, Point
 from hsdsl.orbits.orbit import Orbit
@@ -29,6 +31,8 @@ class Branch:
         In the order of the branch: ``parameter``, ``state``, ``phase``, ``period``, ``multipliers``, ``unstable``.
     bifurcations : tuple of Bifurcation
         ``kind`` (fold, flip, torus or grazing), ``parameter``, ``state``.
+    stable : list of (float, float)
+        The ranges of the parameter of its stable pieces, in the order of the branch.
     ends : tuple of str
         Why the branch ends on either side.
     first : Orbit
@@ -65,9 +69,38 @@ class Branch:
                 "parameter": self.parameter,
                 "points": points,
                 "bifurcations": found,
+                "stable": self.stable,
                 "ends": self.ends,
             }
         )
+
+    @property
+    def knots(self) -> list[tuple[float, Array, bool | None]]:
+        """The points and, between them, the bifurcations: the parameter, the state, and whether the orbit is stable.
+
+        A bifurcation ends what is stable on one side of it, so it is neither.
+        """
+        found: list[tuple[float, Array, bool | None]] = []
+        for b in self.bifurcations:
+            if b.after < 0:
+                found.append((b.parameter, b.state, None))
+        for k, p in enumerate(self.points):
+            found.append((p.parameter, p.state, p.unstable == 0))
+            found += [(b.parameter, b.state, None) for b in self.bifurcations if b.after == k]
+        return found
+
+    @property
+    def stable(self) -> list[tuple[float, float]]:
+        """The ranges of the parameter of the pieces that are stable, in the order of the branch."""
+        found: list[tuple[float, float]] = []
+        knots = self.knots
+        for stable, part in groupby(range(len(knots)), key=lambda k: knots[k][2]):
+            if stable:
+                piece = list(part)
+                ends = range(max(piece[0] - 1, 0), min(piece[-1] + 2, len(knots)))
+                values = [knots[k][0] for k in ends if knots[k][2] is not False]
+                found.append((min(values), max(values)))
+        return found
 
     @property
     def summary(self) -> str:
@@ -81,9 +114,8 @@ class Branch:
             yield f"  to {self.parameter} = {number(way.parameter, 10)}: {why}"
         for found in self.bifurcations:
             yield f"  {found.kind} at {self.parameter} = {number(found.parameter, 12)}"
-        stable = [p.parameter for p in self.points if not p.unstable]
-        if stable:
-            yield f"  stable for some {self.parameter} from {number(min(stable))} to {number(max(stable))}"
+        for low, high in self.stable:
+            yield f"  stable from {self.parameter} = {number(low, 10)} to {number(high, 10)}"
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the state that varies most over the parameter to a .png or .svg file, with its bifurcations."""
@@ -99,7 +131,7 @@ class Branch:
             path,
             self.parameter,
             self.states[k],
-            [(p.parameter, float(p.state[k]), p.unstable == 0) for p in self.points],
+            [(value, float(state[k]), stable) for value, state, stable in self.knots],
             marks,
             f"{called(self.first.execution.title, self.first.execution.model)}: orbits through {self.section}",
         )

@@ -62,11 +62,15 @@ class Point:
 
 @dataclass(frozen=True)
 class Bifurcation:
-    """A place of a branch where orbits change: one of :data:`KINDS`, the parameter, and the state there."""
+    """A place of a branch where orbits change: one of :data:`KINDS`, the parameter, and the state there.
+
+    It lies between the points ``after`` and the next one of the branch.
+    """
 
     kind: str
     parameter: float
     state: Array
+    after: int = 0
 
 
 class Follower:
@@ -80,8 +84,8 @@ class Follower:
         n = len(first.point)
         _, self.multiple, _ = passage(first.point, first.phase, value)
         self.forced = self.multiple is not None
-        self.kept = [k for k in range(n + self.forced) if k not in first.drifting] + [n + 1]
-        self.rows = [k for k in range(n + self.forced) if k not in first.drifting]
+        self.symmetry, self.count = first.symmetry, n + self.forced
+        self.kept = [*self.symmetry.kept(self.count), n + 1]
         self.scale = np.concatenate([first.sizes, [self.multiple or 1.0], [abs(range_[1] - range_[0])]])
         self.start = np.concatenate([first.point, [first.phase, value]])
 
@@ -93,9 +97,13 @@ class Follower:
         matrix[:n, :n] -= np.eye(n)
         if self.forced:
             matrix[n, n + 1] -= slope
-        missing = gap(passage, unknowns[:n], multiple) / self.scale[: n + 1]
-        scaled = matrix * self.scale / self.scale[: n + 1, None]
-        return missing[self.rows], scaled[np.ix_(self.rows, self.kept)], passage
+        kept, scale = self.kept, self.scale[self.kept]
+        missing = self._shown(gap(passage, unknowns[:n], multiple)) / scale[:-1]
+        return missing, self._shown(matrix)[:, kept] * scale / scale[:-1, None], passage
+
+    def _shown(self, rows: Array) -> Array:
+        """Rows of states and time but for shifts."""
+        return self.symmetry.without_shifts(rows[: self.count])
 
     def solution(self, unknowns: Array, along: Array) -> Solution:
         """Correct unknowns across a direction, and find the tangent that leads on in it.
@@ -147,7 +155,7 @@ class Follower:
         n = len(here.unknowns) - 2
         matrix = here.passage.slopes[:, : n + 1].copy()
         matrix[n, n] += self.forced
-        values = np.linalg.eigvals(matrix[np.ix_(self.rows, self.rows)])
+        values = np.linalg.eigvals(self._shown(matrix)[:, self.kept[:-1]])
         return values[np.argsort(-np.abs(values), kind="stable")][:-1]
 
     def tests(self, here: Solution) -> dict[str, float]:
@@ -179,10 +187,14 @@ def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcatio
             if length >= LEAST:
                 continue
             if ahead is None or not same:
-                found.append(_grazing(previous, here))
+                found.append(replace(_grazing(previous, here), after=len(points) - 1))
                 return points, found, why
         assert ahead is not None
-        found += _between(follower, here, ahead, length)
+        passed = _between(follower, here, ahead, length)
+        if len(passed) > 1 and length > LEAST:  # each has a step of its own, so the orbits on both its sides are known
+            length /= 2
+            continue
+        found += [replace(each, after=len(points) - 1) for each in passed]
         previous, here, length = here, ahead, min(LARGEST, 1.3 * length)
         points.append(follower.point(here))
         if not low <= points[-1].parameter <= high:

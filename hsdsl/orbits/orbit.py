@@ -92,7 +92,7 @@ class Orbit:
 
 
 def multipliers_of(found: Closed, slopes: Array, forced: bool) -> Array:
-    """The eigenvalues of a return map, the largest first, without the zero along the flow and those of drifting states.
+    """The eigenvalues of a return map, the largest first, without the zero along the flow and those of shifts.
 
     The map does not depend on where along the flow it begins: that direction has the eigenvalue zero.
     """
@@ -100,8 +100,8 @@ def multipliers_of(found: Closed, slopes: Array, forced: bool) -> Array:
     matrix = slopes[:, : n + 1].copy()
     if forced:
         matrix[n, n] += 1  # the phase moves with the time
-    kept = [k for k in range(n + forced) if k not in found.drifting]
-    values = np.linalg.eigvals(matrix[np.ix_(kept, kept)])
+    of, count = found.symmetry, n + forced
+    values = np.linalg.eigvals(of.without_shifts(matrix[:count])[:, of.kept(count)])
     order = np.argsort(-np.abs(values), kind="stable")
     return values[order][:-1]
 

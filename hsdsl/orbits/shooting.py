@@ -8,13 +8,13 @@ import numpy as np
 
 from hsdsl.execution import Array
 from hsdsl.orbits.section import NoReturn, Return, Section
-from hsdsl.sensitivity.state_names import derivative_name, own, shift_name
+from hsdsl.orbits.symmetry import Symmetry, symmetry
 
 MOST_STEPS, MOST_HALVINGS = 40, 12
+MOST_IDLE = 8  # steps in which the gap does not become half as large
 SMALLEST = 1e-10  # singular values below this share of the largest one are directions in which orbits form families
 CLOSED = 1e-9  # of the sizes of states: a residual below this is round-off of a run; so is one below the run's error
 ROUNDOFF = float(np.finfo(float).eps)
-SYMMETRY = 1e-9  # a column of the identity to this
 COARSER = 1e-10  # a tolerance for runs that show how good others are
 
 
@@ -22,15 +22,14 @@ COARSER = 1e-10  # a tolerance for runs that show how good others are
 class Closed:
     """A fixed point: where, at which phase, the last passage, and how far from closing it is relative to the sizes.
 
-    ``drifting`` has the indices of states that nothing depends on: they may end elsewhere than they began. ``sizes``
-    are the scales of the states.
+    It closes but for shifts along its ``symmetry``. ``sizes`` are the scales of the states.
     """
 
     point: Array
     phase: float
     passage: Return
     residual: float
-    drifting: tuple[int, ...]
+    symmetry: Symmetry
     sizes: Array
 
 
@@ -61,7 +60,7 @@ def closed(
     sizes = _sizes(passage, point, other)
     enough = max(CLOSED, float(np.max(np.abs(passage.point - other.point) / sizes, initial=0.0)))
     best = _looked_at(point, phase, passage, sizes, multiple)
-    here = best
+    here, mark, idle = best, best.residual, 0
     for _ in range(MOST_STEPS):
         if here.residual <= ROUNDOFF:
             return here
@@ -74,16 +73,18 @@ def closed(
         if here.residual >= best.residual and best.residual < enough:
             return best
         best = here if here.residual < best.residual else best
+        mark, idle = (best.residual, 0) if best.residual < mark / 2 else (mark, idle + 1)
+        if idle == MOST_IDLE:
+            break
     if best.residual < enough:
         return best
-    raise NotClosed(f"after {MOST_STEPS} steps of Newton's method the orbit does not close, by {best.residual:.2g}")
+    raise NotClosed(f"Newton's method comes no closer: the orbit does not close, by {best.residual:.2g} of the sizes")
 
 
 def _looked_at(point: Array, phase: float, passage: Return, sizes: Array, multiple: float | None) -> Closed:
-    free = drifting(passage)
-    missing = np.abs(gap(passage, point, multiple)) / np.append(sizes, multiple or 1.0)
-    missing[list(free)] = 0
-    return Closed(point, phase, passage, float(np.max(missing)), free, sizes)
+    found, scale = symmetry(passage, sizes), np.append(sizes, multiple or 1.0)
+    missing = np.abs(found.without_shifts(gap(passage, point, multiple))) / scale[found.kept(len(scale))]
+    return Closed(point, phase, passage, float(np.max(missing)), found, sizes)
 
 
 def _sizes(passage: Return, point: Array, coarse: Return) -> Array:
@@ -108,47 +109,17 @@ def gap(passage: Return, point: Array, multiple: float | None) -> Array:
     return np.append(passage.point - point, late)
 
 
-def drifting(passage: Return) -> tuple[int, ...]:
-    """The states that shift the return by as much and change nothing else, all along a passage."""
-    n = len(passage.point)
-    found: list[int] = []
-    for k in range(n):
-        column = passage.slopes[:, k].copy()
-        column[k] -= 1
-        if np.max(np.abs(column)) < SYMMETRY and _shifts(passage, passage.sensitivity.wrt[k]):
-            found.append(k)
-    return tuple(found)
-
-
-def _shifts(passage: Return, by: str) -> bool:
-    """Whether a state that begins elsewhere shifts states by constants all along a passage, and no transition."""
-    run, table = passage.execution, passage.execution.arc_table
-    arc = np.repeat(np.arange(len(table.first)), np.diff(table.first, append=len(run.times)))
-    for number, states in enumerate(table.layouts):
-        rows = np.flatnonzero((run.times <= passage.time) & (table.layout[arc] == number))
-        for column in (k for k, x in enumerate(states) if x in _columns(own(states), by)):
-            moved = run.values[rows, column].astype(float)
-            if states[column] != shift_name(by):
-                moved -= run.values[table.first[arc[rows]], column].astype(float)
-            if np.max(np.abs(moved), initial=0.0) >= SYMMETRY:
-                return False
-    return True
-
-
-def _columns(states: tuple[str, ...], by: str) -> set[str]:
-    return {shift_name(by), *(derivative_name(x, by) for x in states)}
-
-
 def newton_step(here: Closed, multiple: float | None) -> Array:
     """The step of states and phase towards a fixed point: of least length where orbits form a family."""
-    n = len(here.point)
-    kept = [k for k in range(n + (multiple is not None)) if k not in here.drifting]
+    n, of = len(here.point), here.symmetry
+    count = n + (multiple is not None)
+    kept = of.kept(count)
     matrix = here.passage.slopes[:, : n + 1] - np.eye(n + 1)
     if multiple is not None:
         matrix[n, n] += 1  # the time itself must be the multiple, not as much as the phase
     scale = np.append(here.sizes, multiple or 1.0)
-    scaled = matrix[np.ix_(kept, kept)] * scale[kept] / scale[kept][:, None]
-    missing = gap(here.passage, here.point, multiple)[kept] / scale[kept]
+    scaled = of.without_shifts(matrix[:count])[:, kept] * scale[kept] / scale[kept][:, None]
+    missing = of.without_shifts(gap(here.passage, here.point, multiple)[:count]) / scale[kept]
     step = np.zeros(n + 1)
     step[kept] = -np.linalg.lstsq(scaled, missing, rcond=SMALLEST)[0] * scale[kept]
     return step

@@ -115,24 +115,29 @@ def plot_nearby(points: Sequence[tuple[float, float, tuple[str, ...]]], title: s
     return figure
 
 
+def _stable(*ends: bool | None) -> bool:
+    """Whether the orbits between two points are stable."""
+    return True in ends and False not in ends
+
+
 @to_file
 def plot_branch(
     parameter: str,
     state: str,
-    points: Sequence[tuple[float, float, bool]],
+    points: Sequence[tuple[float, float, bool | None]],
     marks: Sequence[tuple[str, float, float]],
     title: str,
 ) -> Figure:
     """Draw points (parameter, state, stable) in their order, and marks (kind, parameter, state).
 
-    Stable orbits are solid, others dashed.
+    Stable orbits are solid, others dashed. A point that ends a stable or unstable piece has None.
     """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8, 5), layout="constrained")
     axis = figure.subplots()
     pieces = [(a, b) for a, b in pairwise(points)]
-    for stable, part in groupby(pieces, key=lambda piece: piece[0][2] and piece[1][2]):
+    for stable, part in groupby(pieces, key=lambda piece: _stable(piece[0][2], piece[1][2])):
         along = list(part)
         line = [along[0][0], *(b for _, b in along)]
         style, colour = ("-", PALETTE[5]) if stable else ("--", PALETTE[6])

@@ -229,3 +229,60 @@ def test_stick_slip_on_a_belt() -> None:
     assert orbit.period == pytest.approx(6.608448370445725, abs=1e-12)
     assert orbit.verdict == "stable"
     assert np.allclose(orbit.multipliers, 0, atol=1e-12)
+
+
+WORLD = """
+hsdsl: 1
+title: A monopod whose foot has a place in the world
+parameters: {k: 18500, m: 74, g: 9.81, angle: 21*pi/180, push: 171.125}
+let:
+  l: sqrt((x - foot)**2 + (y - ground)**2)
+  out: ((x - foot)*u + (y - ground)*v)/l
+  leg: k*(0.925 - l) - 46.25*out
+modes:
+  air:
+    flow: {x: u, y: v, u: 0, v: -g, ground: 0}
+    transitions:
+      - {name: down, when: y - ground <= 0.925*cos(angle), if: v < 0, to: shorter, reset: {foot: x + 0.925*sin(angle)}}
+      - {name: fallen, when: y <= ground, to: end}
+  shorter:
+    flow: {x: u, y: v, u: "leg*(x - foot)/l/m", v: "leg*(y - ground)/l/m - g", ground: 0, foot: 0}
+    transitions: [{name: turn, when: out >= 0, to: longer}]
+  longer:
+    flow: {x: u, y: v, u: "(leg + push)*(x - foot)/l/m", v: "(leg + push)*(y - ground)/l/m - g", ground: 0, foot: 0}
+    transitions: [{name: up, when: l >= 0.925, to: air}]
+  end: {final: true}
+initial: {mode: air, x: 2, y: 3.923306046, u: 3.880553995, v: 0, ground: 3}
+experiment: {until: 3}
+"""
+FROM_FOOT = """
+hsdsl: 1
+parameters: {k: 18500, m: 74, g: 9.81, angle: 21*pi/180, push: 171.125}
+let: {l: sqrt(x**2 + y**2), out: (x*u + y*v)/l, leg: k*(0.925 - l) - 46.25*out}
+modes:
+  air:
+    flow: {y: v, u: 0, v: -g}
+    transitions:
+      - {name: down, when: y <= 0.925*cos(angle), if: v < 0, to: shorter, reset: {x: -0.925*sin(angle)}}
+  shorter:
+    flow: {x: u, y: v, u: leg*x/l/m, v: leg*y/l/m - g}
+    transitions: [{name: turn, when: out >= 0, to: longer}]
+  longer:
+    flow: {x: u, y: v, u: (leg + push)*x/l/m, v: (leg + push)*y/l/m - g}
+    transitions: [{name: up, when: l >= 0.925, to: air}]
+initial: {mode: air, y: 0.923306046, u: 3.880553995, v: 0}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize(("section", "moving"), [("down", {"x", "foot"}), ("up", {"x"})])
+def test_shifts_of_several_states_together(section: str, moving: set[str]) -> None:
+    """The place of the foot shifts with that of the body, and the ground with the height: as measured from the foot."""
+    other = hsdsl.loads(FROM_FOOT).orbit("up")
+    orbit = hsdsl.loads(WORLD).orbit(section)
+    assert orbit.period == pytest.approx(other.period, rel=1e-9)
+    assert close(np.trim_zeros(np.where(abs(orbit.multipliers) < 1e-9, 0, orbit.multipliers)), other.multipliers, 1e-7)
+    drift = {name: value for name, value in orbit.drift.items() if abs(value) > 1e-9}
+    assert drift.keys() == moving
+    assert set(orbit.drift) - moving == {"y", "ground"}
+    assert len(set(np.round(list(drift.values()), 9))) == 1

@@ -310,6 +310,15 @@ def test_a_branch_says_which_lines_are_stable():
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["stable", "unstable", "fold"]
 
 
+def test_a_stable_piece_of_a_branch_ends_at_its_marks():
+    from hsdsl.plot import analyses
+
+    points = [(1.0, 4.0, False), (0.5, 3.5, None), (0.6, 3.0, True), (0.9, 2.0, None), (1.2, 1.0, False)]
+    figure = analyses.plot_branch.__wrapped__("c", "x", points, [("fold", 0.5, 3.5), ("flip", 0.9, 2.0)], "title")
+    lines = [(line.get_linestyle(), np.asarray(line.get_xdata()).tolist()) for line in figure.axes[0].lines]
+    assert lines[:3] == [("--", [1.0, 0.5]), ("-", [0.5, 0.6, 0.9]), ("--", [0.9, 1.2])]
+
+
 @pytest.mark.parametrize(("states", "jump"), [(["s", "w"], [(1, 0), (0, 0)]), (["s"], [(1, 1), (1, 0)])])
 def test_an_orbit_is_closed_by_the_jump_of_its_section(states, jump):
     """A timer over one period: s rises to 1 and is set to 0, w is 0."""

@@ -42,14 +42,14 @@ static hs_real root(hs_real x, int m) {
    its value is `slope`. Not 0 where it has none nearby. */
 static int flow_terms(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope, const hs_real *moved,
                       hs_real *found) {
-  static const hs_real probes[4][2] = {{2, 2}, {-2, 2}, {6, -2}, {-6, -6}};
+  static const hs_real moves[4] = {2, -2, 6, -6};
   const int n = run->here.dimension;
   hs_real *const near = run->near, *const other = run->nearby;
   for (int s = 0; s < n; s++) found[s] = 0.0;
-  for (int i = 0; i < 4; i++) {
-    const hs_real odd = probes[i][0], even = probes[i][1];
-    for (int s = 0; s < n; s++) near[s] = x[s] + (s % 2 ? even : odd) * HS_UNIT * moved[s];
-    if (run->here.table->flow(run->here.p, t + even * HS_UNIT * t, near, other)) return 1;
+  for (int probe = 0, every = 1; probe < 4; probe++, every *= 4) {
+    for (int s = 0; s < n; s++) near[s] = x[s] + moves[(s / every + probe) % 4] * HS_UNIT * moved[s];
+    const hs_time later = t + moves[(n / every + probe) % 4] * HS_UNIT * t;
+    if (run->here.table->flow(run->here.p, later, near, other)) return 1;
     for (int s = 0; s < n; s++) found[s] = hs_max(found[s], fabs(other[s] - slope[s]));
   }
   for (int s = 0; s < n; s++) found[s] = found[s] / (BLUR_UNITS * HS_UNIT);

@@ -13,7 +13,7 @@ SAFETY, LEAST, MOST = 0.9, 0.2, 5.0
 ALMOST = 1 - 2.0**-30
 MOST_HALVINGS, CREEPING_HALVINGS, MOST_CREEPING, IDLE_UNITS, MOST_IDLE = 122, 10, 2000, 64, 64
 MOST_REJECTIONS, STRETCH, NOTHING, SHARE, BLUR_UNITS = 2000, 1e-3, 2.0**-960, 32, 4
-PROBES = (2, 2), (-2, 2), (6, -2), (-6, -6)
+MOVES = 2, -2, 6, -6
 
 
 def cut(h, t, limit):
@@ -50,12 +50,12 @@ def error_ratio(model, config, lane, flow, h, error, z):
 
 def resolved(model, flow, t, h, x, scales):
     """Scales, none below a share of what the terms of the flow could move the state by in a step."""
-    slope, moved, odd_place = flow(t, x), scales, jnp.arange(model.W) % 2 == 0
+    slope, moved, places = flow(t, x), scales, jnp.arange(model.W + 1)
     for _ in range(model.W):
         change = jnp.zeros(model.W)
-        for odd, even in PROBES:
-            near = x + jnp.where(odd_place, odd, even) * UNIT * moved
-            change = jnp.maximum(change, jnp.abs(flow(t + even * UNIT * t, near) - slope))
+        for probe in range(4):
+            by = jnp.array(MOVES)[(places // 4**probe + probe) % 4] * UNIT
+            change = jnp.maximum(change, jnp.abs(flow(t + by[-1] * t, x + by[:-1] * moved) - slope))
         least = h * change / (BLUR_UNITS * UNIT)
         more = jnp.isfinite(least) & (least > SHARE * scales)
         moved = jnp.where(more, jnp.maximum(moved, least), moved)

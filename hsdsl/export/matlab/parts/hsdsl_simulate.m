@@ -350,13 +350,12 @@ function scales = resolved(w, q, t, h, x, k1, d, scales)
   n = numel(x);
   moved = scales;
   lifted = false(n, 1);
-  first = mod((1:n).', 2) == 1;
-  probes = [2, 2; -2, 2; 6, -2; -6, -6];
+  moves = [2; -2; 6; -6];
   for round = 1:n
     change = zeros(n, 1);
-    for i = 1:4
-      near = x + unit * moved .* (probes(i, 1) * first + probes(i, 2) * ~first);
-      change = max(change, abs(slope(w, q, t + probes(i, 2) * unit * t, near, d) - k1));
+    for i = 0:3
+      by = unit * moves(mod(floor((0:n).' / 4^i) + i, 4) + 1);
+      change = max(change, abs(slope(w, q, t + by(end) * t, x + by(1:n) .* moved, d) - k1));
     end
     least = h * change / (4 * unit);
     more = isfinite(least) & least > 32 * scales;

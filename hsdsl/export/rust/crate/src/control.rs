@@ -82,14 +82,14 @@ impl<S> Run<'_, S> {
 
     /// The same of one that does not, by what the last digits of the states `moved` change in it.
     fn flow_terms(&self, slope: &State, moved: &State) -> Option<State> {
-        let probes = [[2.0, 2.0], [-2.0, 2.0], [6.0, -2.0], [-6.0, -6.0]];
+        let by = |probe: usize, s: usize| [2.0, -2.0, 6.0, -6.0][(s / 4_usize.pow(probe as u32) + probe) % 4] * UNIT;
         let mut found = [0.0; W];
-        for probe in &probes {
+        for probe in 0..4 {
             let (mut near, mut other) = (self.x, [0.0; W]);
             for s in 0..self.dimension {
-                near[s] = self.x[s] + probe[s % 2] * UNIT * moved[s];
+                near[s] = self.x[s] + by(probe, s) * moved[s];
             }
-            if self.flow(self.t + probe[1] * UNIT * self.t, &near, &mut other) {
+            if self.flow(self.t + by(probe, self.dimension) * self.t, &near, &mut other) {
                 return None;
             }
             for s in 0..self.dimension {
