@@ -31,12 +31,17 @@ class Deferred:
         values.update(now, _later=later)
         return made
 
+    def _elsewhere(self, name: str) -> str:
+        """Where the value of a public name is that is no attribute, as a hint."""
+        return ""
+
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
             make = self.__dict__.get("_later", {}).get(name)
             if make is None:
-                raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'")
+                hint = self._elsewhere(name) if self.__dict__ and not name.startswith("_") else ""
+                raise AttributeError(f"'{type(self).__name__}' object has no attribute '{name}'{hint}")
             value = self.__dict__[name] = make(self)
             return value
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -163,6 +163,20 @@ class Execution(Deferred):
         from hsdsl.plot.notebook import run_html
 
         return run_html(self)
+
+    if not TYPE_CHECKING:
+
+        def __getitem__(self, name: Any) -> Any:
+            raise TypeError(f"a run has no items{self._elsewhere(name) or '; run.rows() has columns by name'}")
+
+        __iter__ = None
+
+    def _elsewhere(self, name: str) -> str:
+        if name in ("t", "time"):
+            return "; its times are run.times"
+        if name in (*self.states, *self.output_names):
+            return f"; its values are run.rows()['{name}'], at times run.sample(times)['{name}']"
+        return ""
 
     def plot(self, figure: Any = None, **options: Any) -> list[Any]:
         """Draw the run with Matplotlib, and return the axes: those over time, then those of phase plots.

@@ -68,6 +68,15 @@ def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limit
     return Model(pipeline_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
 
 
+ELSEWHERE = {
+    "parameters": "their names are model.program.parameters",
+    "states": "their names are model.program.all_states, with outputs model.columns",
+    "outputs": "their names are model.program.outputs",
+    "inputs": "write their numbers as parameters in the file, and give these to model.simulate(parameters=...)",
+    "run": "model.simulate() runs it",
+}
+
+
 class Model:
     """A checked model. ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` holds both.
 
@@ -88,6 +97,14 @@ class Model:
 
     def __reduce__(self) -> tuple[type[Model], tuple[Pipeline]]:
         return type(self), (self.pipeline,)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            try:
+                return object.__getattribute__(self, name)
+            except AttributeError as error:
+                raise AttributeError(f"{error}{'; ' * (name in ELSEWHERE)}{ELSEWHERE.get(name, '')}") from None
 
     def __repr__(self) -> str:
         name = visible(called(None, Path(self.program.path).name).removeprefix("a model "))

@@ -7,6 +7,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.plot.curves import GuardLine
 from hsdsl.plot.style import FORMATS, check_suffixes, save, styled, write_figure
@@ -62,6 +63,11 @@ def axes(runs: Execution | Sequence[Execution], figure: Any = None, **options: A
     Raises UsageError: an unknown name.
     """
     several, view = _several(runs), View(**options)
+    if isinstance(figure, (str, os.PathLike)):
+        raise UsageError(
+            f"expected a figure of Matplotlib, got the path '{os.fspath(figure)}'",
+            f"hsdsl.plot.plot(run, '{os.fspath(figure)}') writes a picture",
+        )
     with styled():
         from hsdsl.plot.figure import draw, size_of
 
