@@ -55,14 +55,22 @@ def _watch(show: Any, runs: int, values: Mapping[str, float], total: float) -> N
     show(lambda: f"{runs} runs, sum of squares {total:.4g}, {listed}")
 
 
-def _numbers(name: str, pairs: list[str] | None) -> dict[str, float] | None:
+def _numbers(name: str, pairs: list[str] | None) -> dict[str, float] | float | None:
+    """Read NAME=NUMBER, or the number of the only column."""
     found: dict[str, float] = {}
     for pair in pairs or ():
+        if len(pairs or ()) == 1 and (alone := _number(pair)) is not None:
+            return alone
         column, equals, value = (part.strip() for part in pair.partition("="))
-        try:
-            found[column] = float(value)
-        except ValueError:
-            equals = ""
-        if not equals or not column:
+        number = _number(value)
+        if not equals or not column or number is None:
             raise UsageError(f"{name}: expected NAME=NUMBER, got '{pair}'", f"for example {name} x=0.1")
+        found[column] = number
     return found or None
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

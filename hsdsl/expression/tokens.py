@@ -121,7 +121,7 @@ def _equals(text: str, at: int, expected: Expected) -> ExpressionError:
             return ExpressionError("HS107", f"`{wrong}` is not an inequality", at, at + 2, f"write `{right}`")
     hint = {
         "number": "write the right-hand side alone",
-        "condition": "write `==` to compare",
+        "condition": "write `==`",
         "inequality": "write `>=` or `<=`",
     }[expected]
     return ExpressionError("HS107", "`=` has no meaning in an expression", at, at + 1, hint)

@@ -30,8 +30,8 @@ def fit(
     model: Model,
     data: Any,
     wrt: str | Sequence[str],
-    sigma: Mapping[str, float] | None,
-    weights: Mapping[str, float] | None,
+    sigma: Mapping[str, float] | float | None,
+    weights: Mapping[str, float] | float | None,
     progress: Progress | None,
     arguments: Mapping[str, Any],
 ) -> Fit:
@@ -50,7 +50,11 @@ def fit(
     start = {t.label: float(known[t.label]) for t in by}
     bounds = {t.label: _bounds(values, t) for t in by}
     objective = Objective(
-        _evaluate(model, by, arguments), measured, _weights(measured, sigma, weights), start, progress
+        _evaluate(model, by, arguments),
+        measured,
+        _weights(measured, _by_column(measured, sigma), _by_column(measured, weights)),
+        start,
+        progress,
     )
     scales = {label: abs(value) or _span(bounds[label]) for label, value in start.items()}
     return replace(fitted(objective, bounds, bool(sigma), scales), units=model.program.units)
@@ -84,6 +88,15 @@ def _bounds(values: Any, target: Target) -> tuple[float, float]:
 def _span(bounds: tuple[float, float]) -> float:
     span = bounds[1] - bounds[0]
     return span if np.isfinite(span) and span > 0 else 1.0
+
+
+def _by_column(measured: Measurements, given: Mapping[str, float] | float | None) -> Mapping[str, float] | None:
+    """Numbers by column; a number alone is that of the only one."""
+    if given is None or isinstance(given, Mapping):
+        return given
+    if len(measured.columns) > 1:
+        raise UsageError(f"expected a number for each of {', '.join(measured.columns)}, got {given} alone")
+    return dict.fromkeys(measured.columns, given)
 
 
 def _weights(

@@ -380,8 +380,8 @@ class Model:
         data: Any,
         wrt: str | Sequence[str],
         *,
-        sigma: Mapping[str, float] | None = None,
-        weights: Mapping[str, float] | None = None,
+        sigma: Mapping[str, float] | float | None = None,
+        weights: Mapping[str, float] | float | None = None,
         progress: Callable[[int, Mapping[str, float], float], None] | None = None,
         **arguments: Any,
     ) -> Fit:
@@ -394,9 +394,9 @@ class Model:
         wrt : str or sequence of str
             What to fit: parameters, within the bounds of the file, and initial states as ``initial.NAME``. The first
             values are those of the file, or of ``parameters`` and ``initial``.
-        sigma : mapping, optional
-            The standard deviation of each column.
-        weights : mapping, optional
+        sigma : mapping or number, optional
+            The standard deviation of each column, or of the only one.
+        weights : mapping or number, optional
             Weights of columns instead; left out, one over the largest size of each.
         progress : callable, optional
             Called after every run with how many there were, the values, and the weighted sum of squares.

@@ -94,7 +94,9 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
 def _reasons(execution: Execution) -> list[str]:
     """The reasons of the verdict; a stop that the lines above describe is only named."""
     reason, message = execution.stop.reason, execution.stop.message
-    return condensed([text.replace(message, f"the run stops ({reason})") for text in execution.verdict.reasons])
+    stops = f"the run stops ({reason})"
+    named = [text.replace(message, stops) for text in execution.verdict.reasons]
+    return condensed([text for text in named if text != stops or sum(stops in other for other in named) == 1])
 
 
 def stop(execution: Execution) -> str:

@@ -68,7 +68,8 @@ class Diagnostics:
     def accumulates(self, edge: str, end: Number, t: Number) -> Stop:
         """Transitions accumulate at ``end``, and no motion along the guard goes on there: the run stops at t."""
         sentence = (
-            f"the transitions of {edge} accumulate at t = {show(end)}, and no motion along its guard is known there"
+            f"the transitions of {edge} accumulate at t = {show(end)}, and no motion along its guard is known there: "
+            "one that goes on along it needs a mode of its own"
         )
         self.departures.append(f"Zeno at t = {show(end)}: {sentence}")
         return Stop("zeno", t, sentence)

@@ -39,6 +39,8 @@ def test_flip_and_grazing() -> None:
     assert found["flip"] == pytest.approx(0.5182098665978726, rel=1e-11)
     assert found["grazing"] == pytest.approx(np.hypot(1 - 0.64, 2 * 0.05 * 0.8), rel=1e-8)
     assert all((point.unstable == 0) == (point.parameter > found["flip"]) for point in branch.points)
+    assert branch.stable == [(found["flip"], 0.7)]
+    assert "stable from F = 0.5182098666 to 0.7" in branch.summary
 
 
 def test_fold_and_grazing() -> None:
@@ -54,6 +56,7 @@ def test_fold_and_grazing() -> None:
     assert found.keys() == {"fold", "grazing"}
     assert found["fold"] == pytest.approx(lowest, rel=1e-9)
     assert found["grazing"] == pytest.approx(1, rel=1e-7)
+    assert all(found["fold"] in piece for piece in branch.stable)
     for point in branch.points:
         v = point.state[1]
         assert point.parameter == pytest.approx(size * np.hypot(1 + p * v, q * v / forcing), rel=1e-9)

@@ -52,6 +52,24 @@ def test_noiseless(model: Any, samples: dict[str, Any], columns: list[str], firs
     assert found.deviation < 1e-10
 
 
+def test_a_number_alone_is_that_of_the_only_column(
+    model: Any, samples: dict[str, Any], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = {name: samples[name] for name in ("t", "v")}
+    by_name, alone = (model.fit(data, "c", sigma=sigma) for sigma in ({"v": 0.03}, 0.03))
+    assert alone.covariance == pytest.approx(by_name.covariance)
+    with pytest.raises(UsageError, match="a number for each of x, v"):
+        model.fit(samples, "c", sigma=0.03)
+    path = tmp_path / "v.csv"
+    np.savetxt(path, np.column_stack([data["t"], data["v"]]), delimiter=",", header="t,v", comments="")
+    words = ["fit", OSCILLATOR, str(path), "--wrt", "c", "--json", "--sigma"]
+    found: list[Any] = []
+    for given in ("0.03", "v=0.03"):
+        obey([*words, given])
+        found.append(json.loads(capsys.readouterr().out)["errors"])
+    assert found[0] == found[1]
+
+
 def test_a_csv_file_with_gaps(model: Any, samples: dict[str, Any], tmp_path: Path) -> None:
     path = tmp_path / "data.csv"
     rows = zip(samples["t"], samples["x"], samples["v"], strict=True)
