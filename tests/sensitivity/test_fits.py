@@ -66,7 +66,7 @@ def test_a_number_alone_is_that_of_the_only_column(
     found: list[Any] = []
     for given in ("0.03", "v=0.03"):
         obey([*words, given])
-        found.append(json.loads(capsys.readouterr().out)["errors"])
+        found.append(json.loads(capsys.readouterr().out)["deviations"])
     assert found[0] == found[1]
 
 

@@ -22,7 +22,8 @@ RUN: Any = MODEL.simulate()
 
 
 @pytest.mark.parametrize(
-    ("name", "place"), [("t", "run.times"), ("level", r"run.rows\(\)\['level'\]"), ("share", "run.sample"), ("u", "'u'$")]
+    ("name", "place"),
+    [("t", "run.times"), ("level", r"run.rows\(\)\['level'\]"), ("share", "run.sample"), ("u", "'u'$")],
 )
 def test_of_a_run(name: str, place: str) -> None:
     with pytest.raises(AttributeError, match=place):
@@ -37,13 +38,13 @@ def test_of_a_run(name: str, place: str) -> None:
 def test_of_a_model(name: str, place: str) -> None:
     with pytest.raises(AttributeError, match=place):
         getattr(MODEL, name)
-    with pytest.raises(AttributeError, match="no attribute 'other'$"):
+    with pytest.raises(AttributeError, match=r"no attribute 'other'$"):
         _ = MODEL.other
     assert not hasattr(MODEL, name)
     assert copy.copy(MODEL).columns == pickle.loads(pickle.dumps(MODEL)).columns == ["level", "share"]
 
 
 def test_a_picture_at_a_path() -> None:
-    with pytest.raises(UsageError, match="figure of Matplotlib, got the path 'level.png'") as caught:
+    with pytest.raises(UsageError, match="figure of Matplotlib, got the path 'level") as caught:
         RUN.plot("level.png")
     assert "hsdsl.plot.plot(run, 'level.png')" in str(caught.value.hint)
