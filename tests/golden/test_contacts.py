@@ -8,6 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import mpmath
+import numpy as np
 import pytest
 from engines import assert_engines_agree
 
@@ -349,3 +350,35 @@ experiment: {until: 3}
         assert run.stop.reason == "until", method
         assert run.final.state["h"] == pytest.approx(math.sin(27) / 20, abs=1e-9)
         assert run.final.state["v"] == pytest.approx(0.45 * math.cos(27), abs=1e-8)
+
+
+WEDGE = """
+hsdsl: 1
+parameters: {{a: {a}, b: {b}, e: {e}, g: {g}}}
+modes:
+  fall:
+    flow: {{x: v, y: w, v: 0, w: -g}}
+    transitions:
+      - {{name: right, when: y - a*x <= 0, to: fall,
+         reset: {{v: v + (1 + e)*a*(w - a*v)/(1 + a**2), w: w - (1 + e)*(w - a*v)/(1 + a**2)}}}}
+      - {{name: left, when: y + b*x <= 0, to: fall,
+         reset: {{v: v - (1 + e)*b*(w + b*v)/(1 + b**2), w: w - (1 + e)*(w + b*v)/(1 + b**2)}}}}
+initial: {{mode: fall, x: {x}, y: 3/4, v: -1/4, w: 0}}
+experiment: {{until: 6}}
+"""
+WEDGES = (
+    {"a": 0.55, "b": 0.4, "e": 0.45, "g": 6.5, "x": -0.1},
+    {"a": 0.7, "b": 0.3, "e": 0.5, "g": 4, "x": 0.15},
+    {"a": 0.35, "b": 0.8, "e": 0.4, "g": 9.81, "x": 0.05},
+)
+
+
+@pytest.mark.parametrize("engine", ["c", "python"])
+@pytest.mark.parametrize("numbers", WEDGES, ids=str)
+def test_a_ball_in_a_wedge_loses_energy_until_it_rests_at_the_bottom(numbers: dict[str, float], engine: str) -> None:
+    # hundreds of impacts on walls in turn: carried sizes once grew by a factor with each, and fast impacts were kept
+    run = hsdsl.loads(WEDGE.format(**numbers)).simulate(engine=engine)
+    energy = run.values[:, 1] * numbers["g"] + (run.values[:, 2] ** 2 + run.values[:, 3] ** 2) / 2
+    assert np.all(np.diff(energy) < 1e-9)
+    assert run.stop.reason == "until" and run.verdict.theorem == "left"
+    assert max(map(abs, run.final.state.values())) < 1e-9
