@@ -94,7 +94,7 @@ class Located(NamedTuple):
     engine: EngineName = "auto"
 
     def settings(self, overrides: list[str] | None, **more: Any) -> dict[str, Any]:
-        """Arguments of the model's method; a method or tolerance of ``--set`` is one that was asked for, as here."""
+        """Arguments of the model's method; a method or tolerance of ``--set`` counts as one of the call."""
         given, own = values_of(overrides), self._asdict()
         own |= {name: given["settings"].pop(name, None) for name in ("method", "tolerance") if own[name] is None}
         return given | with_method(own) | more

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Patch
 
-MOST_BANDS = 9  # modes whose colours and hatches are told apart
+MOST_BANDS = 9  # modes whose colours and hatches differ
 MOST_ROWS = 40  # of bars of modes that each have a name
 MOVING = 1000  # points of a guard that moves
 BOTH_SIDES = 60  # transitions up to which the values before and after are marked

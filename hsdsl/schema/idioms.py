@@ -110,7 +110,7 @@ def _start(root: Mapping, findings: Findings) -> None:
         if key not in _STARTS or taken or not isinstance(value, (Mapping, Sequence)) or "mode" in keys(value):
             continue
         if key == "initial" and isinstance(value, Mapping):
-            continue  # it lacks a mode, and that is said
+            continue  # it lacks a mode, which has a finding of its own
         first = keys(modes)[0] if len(keys(modes)) == 1 else None
         states = [str(name) for name in keys(child(child(modes, first or ""), "flow"))]
         entries = list(value) if isinstance(value, Mapping) else _paired(states, value)

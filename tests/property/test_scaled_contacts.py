@@ -1,4 +1,4 @@
-"""Motion along guards, whatever the units of guards, of each state and of time are."""
+"""Motion along guards in any units of guards, of each state and of time."""
 
 from __future__ import annotations
 

@@ -183,7 +183,7 @@ def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
 
 
 def _sides(dynamics: Dynamics, edge: Edge) -> tuple[Any, Any]:
-    """A surface function and its opposite: one surface for whoever gives it another level."""
+    """A surface function and its opposite: one surface, once either has another level."""
     residual = dynamics.residual(edge.surface)
     return residual, -residual
 
