@@ -74,7 +74,7 @@ def without_roundoff(expression: Any) -> Any:
     noise = {
         part: sp.S.Zero
         for part in sp.preorder_traversal(expression)
-        if part.is_Mul and abs(part.args[0]) in (_NEAR, 2 * _NEAR) and part.atoms(absolute)
+        if part.is_Mul and sp.Abs(part.args[0]) in (_NEAR, 2 * _NEAR) and part.atoms(absolute)
     }
     return expression.xreplace(noise) if noise else expression
 
