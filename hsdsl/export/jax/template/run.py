@@ -24,7 +24,7 @@ from .trials import advance, along_step
 from .verdicts import followed
 
 ROUND = 16  # trial steps between two looks at what they found
-MOST_ROUNDS = 10_000_000
+MOST_STEPS = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def run(model, config, p, mode, x0, rounds=None):
     state = start(model, config, mode, x0)
     if rounds is None:
         state = lax.while_loop(
-            lambda s: (s[0].stop == RUNNING) & (s[0].steps < MOST_ROUNDS),
+            lambda s: (s[0].stop == RUNNING) & (s[0].steps < MOST_STEPS),
             lambda s: one_round(model, config, p, s),
             state,
         )
