@@ -35,7 +35,10 @@ def values(named: Mapping[str, Any], digits: int = DIGITS) -> str:
 def meant_digits(execution: Execution) -> int:
     """How many digits of its times and states a run means: those of its tolerance and one more, where it has one."""
     tolerance = execution.settings.get("tolerance")
-    return DIGITS if not tolerance else min(_MOST_DIGITS, max(_LEAST_DIGITS, 1 - math.floor(math.log10(tolerance))))
+    if not tolerance:
+        return DIGITS
+    finest = 10.0 ** (1 - _MOST_DIGITS)  # of many digits it may be below all floats
+    return max(_LEAST_DIGITS, 1 - math.floor(math.log10(max(tolerance, finest))))
 
 
 def heading(execution: Execution) -> str:

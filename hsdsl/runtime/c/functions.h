@@ -217,7 +217,10 @@ static int curves_along(hs_run *run);
 
 /* dense_steps.c */
 static int span_point(hs_run *run, hs_real s, hs_time *time, hs_real **state);
+HS_INLINE void part_at(const hs_run *run, const hs_polynomial *piece, hs_real theta, int from, int to, hs_real *value);
 static void span_cut(hs_run *run, hs_real s, hs_polynomial *piece);
+static int span_place(hs_run *run, hs_real s, hs_time *time, hs_real **state);
+static void span_rest(hs_run *run, hs_real s, hs_real *state);
 HS_INLINE hs_real span_size(const hs_run *run, const hs_span *span, hs_real s, int state);
 static void begin_span(hs_run *run, hs_real h, hs_time t1);
 HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
