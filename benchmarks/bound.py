@@ -27,7 +27,7 @@ import hsdsl
 from hsdsl.chart import Scene
 from hsdsl.chart.judge import Judgement, judge
 from hsdsl.chart.plan import own_runs
-from hsdsl.chart.result import Attempt, Result
+from hsdsl.chart.result import Attempt, Result, Tool
 from hsdsl.chart.stopwatch import Timed, race
 
 HERE = Path(__file__).parent
@@ -64,7 +64,7 @@ def main() -> None:
             attempts = list(own_runs(scene, ["located"], ["taylor"], ["c"], TOLERANCES, (), []))
             for rest in rests:
                 hand = by_hand(library, scene, model, rest)
-                attempts += [Attempt(HAND, "", "", "tolerance", value, partial(hand, value)) for value in TOLERANCES]
+                attempts += [Attempt(Tool(HAND), "tolerance", value, partial(hand, value)) for value in TOLERANCES]
             print(name)
             report(list(race(attempts, lambda _, result, scene=scene: judge(scene, result), 9, 5.0, lambda _: None)))
 
@@ -77,7 +77,7 @@ def report(rows: list[tuple[Attempt, Judgement, Timed]]) -> None:
             min(
                 timed.spread[0] * 1e6
                 for attempt, judgement, timed in rows
-                if (attempt.tool == HAND) is hand and judgement.verdict == "right" and judgement.error <= target
+                if (attempt.tool.name == HAND) is hand and judgement.verdict == "right" and judgement.error <= target
             )
             for hand in (False, True)
         ]

@@ -72,7 +72,7 @@ def fastest(rows: Sequence[Row], target: float) -> dict[str, Row]:
     found: dict[str, Row] = {}
     for row in rows:
         if row.judgement.verdict == "right" and row.judgement.error <= target:
-            tool = "hsdsl" if row.attempt.tool.startswith("hsdsl") else row.attempt.tool
+            tool = "hsdsl" if row.attempt.tool.name.startswith("hsdsl") else row.attempt.tool.name
             if tool not in found or row.timed.spread[0] < found[tool].timed.spread[0]:
                 found[tool] = row
     return found
@@ -84,7 +84,7 @@ def lines(name: str, rows: Sequence[Row], tools: Sequence[str]) -> Iterator[str]
         best = fastest(rows, target)
         micro = {tool: best[tool].timed.spread[0] * 1e6 if tool in best else inf for tool in ("hsdsl", *tools)}
         ours = best.get("hsdsl")
-        how = f"{ours.attempt.method} {ours.attempt.value:.1e}" if ours else "-"
+        how = f"{ours.attempt.tool.method} {ours.attempt.value:.1e}" if ours else "-"
         peer = min((micro[tool] for tool in tools), default=inf)
         columns = " ".join(f"{micro[tool]:>10.0f}" if micro[tool] < inf else f"{'-':>10}" for tool in tools)
         ratio = f"{peer / micro['hsdsl']:8.1f}" if peer < inf and ours else f"{'-':>8}"

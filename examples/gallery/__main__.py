@@ -45,17 +45,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _settings(tools: Sequence[str]) -> list[Setting]:
     every = [*own_settings(), *peer_settings()]
-    return [setting for setting in every if not tools or setting.tool in tools]
+    return [setting for setting in every if not tools or setting.name in tools]
 
 
 def _run(file: Path, chosen: Sequence[Entry], settings: Sequence[Setting], processes: int) -> None:
     """Run scene by scene; what is done is written at once."""
     numbers = versions()
-    present = [s for s in settings if s.tool not in PEERS or numbers[s.tool]]
+    present = [s for s in settings if s.name not in PEERS or numbers[s.name]]
     for entry in chosen:
         found: list[Record] = []
-        for tool in dict.fromkeys(setting.tool for setting in present):
-            group = [setting for setting in present if setting.tool == tool]
+        for tool in dict.fromkeys(setting.name for setting in present):
+            group = [setting for setting in present if setting.name == tool]
             _say(f"{entry.name}: {tool}")
             found += [Record(entry.name, setting, each) for setting, each in outcomes(entry, group, processes)]
         old = read(file).rows if file.is_file() else ()

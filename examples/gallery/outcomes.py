@@ -35,6 +35,6 @@ def _run(entry: Entry, setting: Setting) -> Outcome:
     except MemoryError:
         return Outcome("crashes", "no memory left")
     except Exception as error:  # a peer's own, which is its answer
-        if setting.tool.startswith("hsdsl"):
+        if setting.name.startswith("hsdsl"):
             raise
         return Outcome("refuses", f"{type(error).__name__}: {error}")

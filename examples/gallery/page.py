@@ -119,14 +119,14 @@ def _section(records: Records, entry: Entry) -> str:
 def _others(records: Records, entry: Entry) -> Iterator[str]:
     """Every outcome that is not right, those with the same word and reason together."""
     found = [r for r in records.rows if r.scene == entry.name and r.outcome.word != "right"]
-    ours = [r for r in found if r.setting.tool in OURS]
-    theirs = [r for r in found if r.setting.tool not in OURS]
+    ours = [r for r in found if r.setting.name in OURS]
+    theirs = [r for r in found if r.setting.name not in OURS]
     for (scheme, word), group in groupby(sorted(ours, key=_kind), key=_kind):
         members = list(group)
         methods = ", ".join(dict.fromkeys(f"`{r.setting.method}`" for r in members if r.setting.method))
         why = Counter(r.outcome.why for r in members).most_common(1)[0][0]
         yield f"- {scheme}{f' with {methods}' if methods else ''}: {_shown(word)} ({_plain(why)})"
-    for tool, group in groupby(theirs, key=lambda r: r.setting.tool):
+    for tool, group in groupby(theirs, key=lambda r: r.setting.name):
         reasons: dict[tuple[str, str], list[str]] = {}
         for r in group:
             reasons.setdefault((r.outcome.word, r.outcome.why), []).append(f"{r.setting.tolerance:.0e}")

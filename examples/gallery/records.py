@@ -38,7 +38,7 @@ class Records:
 
     def of(self, scene: str, tool: str, scheme: str = "") -> list[Record]:
         """Those of a scene with a tool."""
-        return [r for r in self.rows if r.scene == scene and r.setting.tool == tool and r.setting.scheme == scheme]
+        return [r for r in self.rows if r.scene == scene and r.setting.name == tool and r.setting.scheme == scheme]
 
 
 def versions() -> dict[str, str]:
@@ -68,9 +68,9 @@ def read(path: Path) -> Records:
 def joined(old: Iterable[Record], new: Iterable[Record]) -> tuple[Record, ...]:
     """New records in place of old ones of the same scene and tool."""
     fresh = list(new)
-    done = {(r.scene, r.setting.tool) for r in fresh}
-    kept = [r for r in old if (r.scene, r.setting.tool) not in done]
-    return tuple(sorted([*kept, *fresh], key=lambda r: (r.scene, r.setting.tool)))
+    done = {(r.scene, r.setting.name) for r in fresh}
+    kept = [r for r in old if (r.scene, r.setting.name) not in done]
+    return tuple(sorted([*kept, *fresh], key=lambda r: (r.scene, r.setting.name)))
 
 
 def _row(record: Record) -> list[Any]:
@@ -78,11 +78,11 @@ def _row(record: Record) -> list[Any]:
     error = float(f"{found.error:.2g}") if isfinite(found.error) else None
     why = found.why if found.word != "right" else ""
     why = why if len(why) <= LONGEST else f"{why[:LONGEST]}..."
-    own = (setting.tool, setting.scheme, setting.method, setting.tolerance, setting.step)
+    own = (setting.name, setting.scheme, setting.method, setting.tolerance, setting.step)
     return [record.scene, *own, found.word, found.verdict, error, found.transitions, why]
 
 
 def _record(row: dict[str, Any]) -> Record:
-    setting = Setting(**{name: row[name] for name in ("tool", "scheme", "method", "tolerance", "step")})
+    setting = Setting(*(row[name] for name in ("tool", "scheme", "method", "tolerance", "step")))
     error = nan if row["error"] is None else row["error"]
     return Record(row["scene"], setting, Outcome(row["word"], row["why"], error, row["transitions"], row["verdict"]))

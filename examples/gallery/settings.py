@@ -11,6 +11,7 @@ from hsdsl.chart import PEERS, Refused
 from hsdsl.chart.outcome import Outcome, Tolerance, outcome
 from hsdsl.chart.peers import prepare
 from hsdsl.chart.plan import relaxation
+from hsdsl.chart.result import Tool
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.model.options import OWN_FORMULA
@@ -25,19 +26,11 @@ SAMPLED = ("", "midpoint", "dopri5", "taylor")  # methods of the Python engine, 
 
 
 @dataclass(frozen=True)
-class Setting:
-    """A tool with its settings; ``step`` is a share of the run, and peers have no scheme, method and step."""
+class Setting(Tool):
+    """A tool with its settings; ``step`` is a share of the run, and peers have no step."""
 
-    tool: str
-    scheme: str = ""
-    method: str = ""
     tolerance: float | None = None
     step: float | None = None
-
-    @property
-    def label(self) -> str:
-        """Tool, scheme and method."""
-        return " ".join(filter(None, (self.tool, self.scheme, self.method)))
 
     @property
     def size(self) -> str:
@@ -69,7 +62,7 @@ def peer_settings() -> Iterator[Setting]:
 def run(entry: Entry, setting: Setting) -> Outcome:
     """Run a scene with a tool and judge what comes."""
     try:
-        found = _own(entry, setting) if setting.tool.startswith("hsdsl") else _peer(entry, setting)
+        found = _own(entry, setting) if setting.name.startswith("hsdsl") else _peer(entry, setting)
     except (Refused, UsageError) as refusal:
         return Outcome("refuses", str(refusal))
     if entry.name in UNDECIDED and found.word == "right" and found.verdict not in ("left", "unknown"):
@@ -84,7 +77,7 @@ def _own(entry: Entry, setting: Setting) -> Outcome:
     options |= {"tolerance" if setting.tolerance else "step": value}
     if setting.scheme == "relaxed":
         options["relaxation"] = relaxation(setting.method, setting.tolerance or setting.step or 0) * min(1, entry.until)
-    engine = setting.tool.removeprefix("hsdsl ")
+    engine = setting.name.removeprefix("hsdsl ")
     run = entry.model.simulate(**options, engine=engine, max_transitions=MOST)
     result = scene.result(run)
     if result.problem:
@@ -94,4 +87,4 @@ def _own(entry: Entry, setting: Setting) -> Outcome:
 
 def _peer(entry: Entry, setting: Setting) -> Outcome:
     assert setting.tolerance is not None
-    return outcome(entry.scene, prepare(setting.tool, entry.scene)(setting.tolerance), WITHIN)
+    return outcome(entry.scene, prepare(setting.name, entry.scene)(setting.tolerance), WITHIN)

@@ -79,7 +79,7 @@ def work_precision(
     def judged(attempt: Attempt, result: Result) -> Judgement:
         judgement = judge(scene, result)
         if with_rho and result.execution is not None:
-            watch(f"rho of {attempt.label} {attempt.setting}")
+            watch(f"rho of {attempt.tool.label} {attempt.setting}")
             judgement = judgement.with_rho(rho(scene, result.execution))
         return judgement
 

@@ -64,7 +64,7 @@ def _looks(rows: Sequence[Row]) -> Looks:
     """A colour for each tool and scheme, and a marker for each method of theirs."""
     groups: dict[tuple[str, str], dict[str, None]] = {}
     for row in rows:
-        groups.setdefault((row.attempt.tool, row.attempt.scheme), {})[row.attempt.label] = None
+        groups.setdefault((row.attempt.tool.name, row.attempt.tool.scheme), {})[row.attempt.tool.label] = None
     return {
         label: {
             "color": PALETTE[group % len(PALETTE)],
@@ -92,9 +92,9 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, ylabel: bool) -> None:
     known = [(row, error) for row, error in errors if isfinite(error)]
     right_errors = [error for row, error in known if row.judgement.verdict == "right"]
     largest = WORST * max([LEAST_ERROR, *right_errors]) if right_errors else inf
-    labels = dict.fromkeys(row.attempt.label for row in rows)
+    labels = dict.fromkeys(row.attempt.tool.label for row in rows)
     for label in labels:
-        own = [(row, max(error, LEAST_ERROR)) for row, error in known if row.attempt.label == label]
+        own = [(row, max(error, LEAST_ERROR)) for row, error in known if row.attempt.tool.label == label]
         right = [(error, row.seconds) for row, error in own if row.judgement.verdict == "right"]
         wrong = [(min(error, largest), row.seconds) for row, error in own if row.judgement.verdict != "right"]
         if right:
@@ -111,7 +111,7 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, ylabel: bool) -> None:
     if ylabel:
         axis.set_ylabel("seconds, warm")
     axis.set_title(title, loc="left", parse_math=False, fontsize=9.5)
-    silent = [label for label in labels if label not in {row.attempt.label for row, _ in known}]
+    silent = [label for label in labels if label not in {row.attempt.tool.label for row, _ in known}]
     if silent:
         text = "no answer: " + ", ".join(silent)
         axis.text(0.02, 0.02, text, transform=axis.transAxes, fontsize=7, color=FAINT, wrap=True)

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from hsdsl.chart.peers import prepare
-from hsdsl.chart.result import Attempt, Refused, Result
+from hsdsl.chart.result import Attempt, Refused, Result, Tool
 from hsdsl.chart.scene import Scene
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
@@ -53,14 +53,14 @@ def peer_runs(scene: Scene, name: str, tolerances: Sequence[float], remarks: lis
     except Refused as refusal:
         remarks.append(f"{name}: {refusal}")
         return []
-    return [Attempt(name, "", "", "tolerance", value, partial(run, value)) for value in tolerances]
+    return [Attempt(Tool(name), "tolerance", value, partial(run, value)) for value in tolerances]
 
 
 def _attempt(scene: Scene, options: dict[str, Any], size: str, value: float) -> Attempt:
     if options["scheme"] == "relaxed":
         options = options | {"relaxation": relaxation(options["method"], value)}
     run = partial(_run, scene, options | {size: value})
-    return Attempt(f"hsdsl {options['engine']}", options["scheme"], options["method"], size, value, run)
+    return Attempt(Tool(f"hsdsl {options['engine']}", options["scheme"], options["method"]), size, value, run)
 
 
 def relaxation(method: str, value: float) -> float:

@@ -1,4 +1,4 @@
-"""Attempts, one tool at one setting each, and their results."""
+"""Tools, attempts of them at one setting each, and their results."""
 
 from __future__ import annotations
 
@@ -52,20 +52,27 @@ class Result:
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """One tool at one setting; ``run`` runs it from the start and samples it."""
+class Tool:
+    """A tool by its name; ours have a scheme and a method."""
 
-    tool: str
-    scheme: str
-    method: str
-    size: str  # tolerance or step
-    value: float
-    run: Callable[[], Result]
+    name: str
+    scheme: str = ""
+    method: str = ""
 
     @property
     def label(self) -> str:
-        """Tool, scheme and method."""
-        return " ".join(filter(None, (self.tool, self.scheme, self.method)))
+        """Name, scheme and method."""
+        return " ".join(filter(None, (self.name, self.scheme, self.method)))
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One tool at one setting; ``run`` runs it from the start and samples it."""
+
+    tool: Tool
+    size: str  # tolerance or step
+    value: float
+    run: Callable[[], Result]
 
     @property
     def setting(self) -> str:

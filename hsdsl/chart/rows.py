@@ -38,7 +38,7 @@ def record(row: Row) -> dict[str, Any]:
     """One row as plain values; a number that is not there is None."""
     attempt, judgement, rho = row.attempt, row.judgement, row.judgement.rho
     values = (
-        *(row.model, attempt.tool, attempt.scheme, attempt.method, attempt.size, attempt.value),
+        *(row.model, attempt.tool.name, attempt.tool.scheme, attempt.tool.method, attempt.size, attempt.value),
         *(row.seconds, *row.timed.spread, row.timed.first, judgement.error),
         *((rho.lower, rho.upper) if rho else (None, None)),
         *(judgement.transitions, judgement.verdict, judgement.why),
@@ -69,7 +69,7 @@ def as_text(rows: Iterable[Row], digits: int = 3) -> str:
         verdict = judgement.verdict + (f": {judgement.why}" if judgement.why else "")
         rho = f"{judgement.rho.upper:.{digits - 1}e}" if judgement.rho else ""
         error = f"{judgement.error:.{digits - 1}e}"
-        lines.append((row.attempt.label, row.attempt.setting, duration(row.seconds), error, rho, verdict))
+        lines.append((row.attempt.tool.label, row.attempt.setting, duration(row.seconds), error, rho, verdict))
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
 

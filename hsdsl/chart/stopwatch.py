@@ -48,21 +48,21 @@ def race(
     warmed: list[tuple[Attempt, Judged, float]] = []
     exhausted: set[str] = set()
     for attempt in attempts:
-        if attempt.label in exhausted:
+        if attempt.tool.label in exhausted:
             continue
-        watch(f"{attempt.label} {attempt.setting}")
+        watch(f"{attempt.tool.label} {attempt.setting}")
         began = time.perf_counter()
         result = attempt.run()
         seconds = time.perf_counter() - began
         warmed.append((attempt, judge(attempt, result), seconds))
         del result
         if seconds > patience:
-            exhausted.add(attempt.label)
+            exhausted.add(attempt.tool.label)
     turns: list[list[float]] = [[] for _ in warmed]
     for turn in range(rounds):
         for times, (attempt, _, seconds) in zip(turns, warmed, strict=True):
             if seconds <= patience:
-                watch(f"turn {turn + 1} of {rounds}: {attempt.label} {attempt.setting}")
+                watch(f"turn {turn + 1} of {rounds}: {attempt.tool.label} {attempt.setting}")
                 times.append(_turn(attempt))
     for times, (attempt, judged, seconds) in zip(turns, warmed, strict=True):
         yield attempt, judged, Timed(tuple(times or [seconds]), seconds)

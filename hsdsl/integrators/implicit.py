@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.kernel import Routine
+from hsdsl.sparsity import Elimination, Variation
 
 if TYPE_CHECKING:
     from hsdsl.integrators.stepper import Stepper
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """What implicit steps know of a mode's flow besides its values.
+
+    ``scales`` are those of the states, which grow along the run; ``terms`` is that of a flow that jumps;
+    ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode; ``varied`` says which states are
+    derivatives of others, whose errors may be larger where they do not last for the time ``soon``.
+    """
+
+    jacobian: Routine
+    scales: Sequence[Number]
+    terms: Routine | None = None
+    pattern: Elimination | None = None
+    measured: Sequence[int] = ()
+    varied: Variation | None = None
+    soon: Number = 0
 
 
 @dataclass(frozen=True)
@@ -31,11 +52,11 @@ class RadauMethod:
         """Return the method for a tolerance: itself."""
         return self
 
-    def stepper(self, *arguments: Any) -> Stepper:
+    def stepper(self, known: Derivatives, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:
         """Make its step functions, as `hsdsl.integrators.radau.radau_stepper` does."""
         from hsdsl.integrators.radau import radau_stepper
 
-        return radau_stepper(*arguments)
+        return radau_stepper(known, tolerance, arithmetic)
 
 
 RADAU = RadauMethod()

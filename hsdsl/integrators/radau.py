@@ -21,41 +21,30 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.integrators.blocks import BlockFactors, ComplexBlockFactors, linked
 from hsdsl.integrators.collocation import coefficients
 from hsdsl.integrators.implicit import RADAU as RADAU
+from hsdsl.integrators.implicit import Derivatives
 from hsdsl.integrators.linear import ComplexFactors, Factors, Matrix, Singular, Vector, factored, factored_complex
 from hsdsl.integrators.newton import Convergence, Increments, Iteration, NoConvergence
 from hsdsl.integrators.scales import resolved, rows_of
 from hsdsl.integrators.sparse import ComplexSparseFactors, SparseFactors, sparse_factored, sparse_factored_complex
 from hsdsl.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
-from hsdsl.kernel import Routine
-from hsdsl.sparsity import Elimination, Variation
+from hsdsl.sparsity import Elimination
 
 
-def radau_stepper(
-    jacobian: Routine,
-    tolerance: Number | None,
-    arithmetic: Arithmetic,
-    scales: Sequence[Number],
-    terms: Routine | None = None,
-    pattern: Elimination | None = None,
-    measured: Sequence[int] = (),
-    varied: Variation | None = None,
-    soon: Number = 0,
-) -> Stepper:
-    """Make step functions from a mode's Jacobian; ``tolerance`` is that of an adaptive run.
-
-    ``scales`` are those of the states, which grow along the run; ``terms`` is that of a flow that jumps;
-    ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode; ``varied`` says which states are
-    derivatives of others, whose errors may be larger where they do not last for the time ``soon``.
+def radau_stepper(known: Derivatives, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:
+    """Make step functions for a mode; ``tolerance`` is that of an adaptive run.
 
     The stages of a step are its three increments and, fourth, the error estimate. Its functions remember what they were
     called with: they are for one stretch of flow.
     """
-    steps = Steps(jacobian, tolerance, arithmetic, scales, terms, pattern, measured, varied, soon)
-
-    def error(h: Number, stages: Stages, end: State) -> State:
-        return stages[3]
-
-    return Stepper(RADAU.name, steps.step, steps.piece, error, landing=steps.landing, scales=steps.scales)
+    steps = Steps(known, tolerance, arithmetic)
+    return Stepper(
+        RADAU.name,
+        steps.step,
+        steps.piece,
+        lambda h, stages, end: stages[3],
+        landing=steps.landing,
+        scales=steps.scales,
+    )
 
 
 _Plain = tuple[Factors | SparseFactors, ComplexFactors | ComplexSparseFactors]
@@ -71,23 +60,11 @@ class Steps:
         Numbers of evaluations of the derivatives, of factorings, and of iterations.
     """
 
-    def __init__(
-        self,
-        jacobian: Routine,
-        tolerance: Number | None,
-        arithmetic: Arithmetic,
-        scales: Sequence[Number],
-        terms: Routine | None = None,
-        pattern: Elimination | None = None,
-        measured: Sequence[int] = (),
-        varied: Variation | None = None,
-        soon: Number = 0,
-    ) -> None:
-        self._pattern, self._varied = varied.elimination if varied else pattern, varied
-        self._measured, self._soon, self._lasting = measured, soon, list[Number]()
-        self._jacobian, self._tolerance, self._arithmetic = jacobian, tolerance, arithmetic
-        self._largest, self._terms = scales, terms
-        self._scales, self._floors = scales, list[Number]()
+    def __init__(self, of: Derivatives, tolerance: Number | None, arithmetic: Arithmetic) -> None:
+        self._of, self._tolerance, self._arithmetic = of, tolerance, arithmetic
+        self._pattern, self._varied = of.varied.elimination if of.varied else of.pattern, of.varied
+        self._largest = self._scales = of.scales
+        self._lasting, self._floors = list[Number](), list[Number]()
         self._tried: tuple[Flow, Number, Number, State] | None = None
         self._convergence = Convergence(tolerance, arithmetic)
         self._known = coefficients(arithmetic)
@@ -114,8 +91,8 @@ class Steps:
             return (), ((), (), (), ())
         found = self._solved(flow, t, h, x, exactly=True)
         end = tuple(_sum(x, found[2]))
-        if self._measured:
-            end = (*end[: -len(self._measured) - 1], *self._slopes(flow, t, h, x, end, found), self._one)
+        if self._of.measured:
+            end = (*end[: -len(self._of.measured) - 1], *self._slopes(flow, t, h, x, end, found), self._one)
         return end, (*map(tuple, found), ())
 
     def _slopes(self, flow: Flow, t: Number, h: Number, x: State, end: State, z: Increments) -> Iterator[Number]:
@@ -127,7 +104,7 @@ class Steps:
         weights, rows = self._known.end_slope, self._rows
         assert rows is not None
         size, at_end = abs(weights[0]) + abs(weights[1]) + abs(weights[2]), flow(t + h, *end)
-        for i in self._measured:
+        for i in self._of.measured:
             terms = self._arithmetic.zero
             for d, a in zip(rows[i], end, strict=True):
                 terms = terms + abs(d * a)
@@ -165,15 +142,15 @@ class Steps:
         """The scales of the states over the step last tried; ``closer``, with a look at the terms of the flow."""
         if closer and self._tried is not None:
             with suppress(*DOMAIN_ERRORS):
-                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic, self._terms)
+                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic, self._of.terms)
                 lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))
                 self._floors = list(self._scales) if lifted else []
         return self._scales
 
     def _derive(self, t: Number, x: State) -> None:
-        self._rows, self._derived_at, self._factors = rows_of(self._jacobian(t, *x), len(x)), t, None
+        self._rows, self._derived_at, self._factors = rows_of(self._of.jacobian(t, *x), len(x)), t, None
         columns = range(self._varied.own, self._varied.columns[-1]) if self._varied else ()
-        self._lasting = [1 / (1 + self._soon * abs(self._rows[i][i])) for i in columns]
+        self._lasting = [1 / (1 + self._of.soon * abs(self._rows[i][i])) for i in columns]
         self.derived += 1
 
     def _factor(self, h: Number) -> _Both:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
+from hsdsl.integrators.implicit import Derivatives
 from hsdsl.integrators.stepper import State, Stepper, stepper
 from hsdsl.integrators.taylor import taylor_stepper
 from hsdsl.kernel import ModeKernel
@@ -69,12 +70,12 @@ class Run(Problem):
             series = self.kernel.taylor(mode, here.segment.data)
             assert series is not None
             return taylor_stepper(method, series, self.arithmetic)
-        jacobian = self.kernel.jacobian(mode, here.segment.data)
-        terms, scales = self.kernel.terms(mode, here.segment.data), here.arc.scales
-        own = here.mode.jacobian.elimination, here.mode.measured, here.mode.jacobian.variation
-        return method.stepper(
-            jacobian, self.settings.tolerance, self.arithmetic, scales, terms, *own, self.control.first
-        )
+        known, data = here.mode.jacobian, here.segment.data
+        derivatives = Derivatives(
+            self.kernel.jacobian(mode, data), here.arc.scales, self.kernel.terms(mode, data),
+            known.elimination, here.mode.measured, known.variation, self.control.first,
+        )  # fmt: skip
+        return method.stepper(derivatives, self.settings.tolerance, self.arithmetic)
 
     def place(
         self,

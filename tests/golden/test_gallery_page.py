@@ -26,12 +26,12 @@ def test_every_scene_is_recorded_with_every_tool() -> None:
     records = read(DOCS / "gallery.json")
     tools = {name for name in PEERS if name not in SLOW and records.versions[name]} | {"hsdsl c", "hsdsl python"}
     for name in SCENES:
-        assert tools <= {row.setting.tool for row in records.rows if row.scene == name}, name
+        assert tools <= {row.setting.name for row in records.rows if row.scene == name}, name
         assert (DOCS / "images" / "gallery" / f"{name}.svg").read_text().startswith("<?xml")
 
 
 def test_no_run_of_ours_is_recorded_as_wrong() -> None:
-    ours = [row for row in read(DOCS / "gallery.json").rows if row.setting.tool.startswith("hsdsl")]
+    ours = [row for row in read(DOCS / "gallery.json").rows if row.setting.name.startswith("hsdsl")]
     wrong = {(row.scene, row.setting.label) for row in ours if row.outcome.word in ("wrong", "crashes")}
     assert not wrong
     assert {row.outcome.word for row in ours} <= {"right", "warns", "stops", "refuses", "hangs", "wrong"}

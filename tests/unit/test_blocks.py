@@ -8,6 +8,7 @@ import pytest
 import hsdsl
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.integrators import radau
+from hsdsl.integrators.implicit import Derivatives
 from hsdsl.integrators.radau import Steps
 from hsdsl.lower.ordering import ordering
 from hsdsl.sparsity import variation
@@ -44,7 +45,7 @@ def test_blocks_solve_the_whole_system(seed: int, is_sparse: bool) -> None:
     order = tuple(range(STATES)) if is_sparse else ordering(inside, STATES)
     of = variation(places, n, STATES, COLUMNS, order)
     assert (of.elimination is not None) == is_sparse
-    steps = Steps(lambda t, *x: jacobian.ravel().tolist(), 1e-6, FLOAT64, [1.0] * n, varied=of)
+    steps = Steps(Derivatives(lambda t, *x: jacobian.ravel().tolist(), [1.0] * n, varied=of), 1e-6, FLOAT64)
     steps._derive(0.0, (0.0,) * n)
     real, turning = steps._factor(STEP)
     known, right, flowing = steps._known, random.normal(size=(3, n)), n - 2
@@ -61,7 +62,8 @@ def test_blocks_solve_the_whole_system(seed: int, is_sparse: bool) -> None:
 def test_estimate_of_derivatives(soon: float) -> None:
     """Of S' = -2 S + x, where x stays zero: the first defect counts by the share that lasts, the second in full."""
     of, rate, h = variation((0, 2, 3), 2, 1, ((0,),), (0,)), 2.0, 0.1
-    steps = Steps(lambda t, x, s: (-rate, 0.0, 1.0, -rate), 1e-6, FLOAT64, [1.0, 1.0], varied=of, soon=soon)
+    known = Derivatives(lambda t, x, s: (-rate, 0.0, 1.0, -rate), [1.0, 1.0], varied=of, soon=soon)
+    steps = Steps(known, 1e-6, FLOAT64)
     end, stages = steps.step(lambda t, x, s: (-rate * x, x - rate * s), 0.0, h, (0.0, 1.0), (0.0, -rate))
     assert np.isclose(end[1], np.exp(-rate * h), rtol=1e-6)
     known, z = steps._known, [stage[1] for stage in stages[:3]]
@@ -78,9 +80,8 @@ def test_what_nothing_moves_stays_zero() -> None:
     jacobian = whole(np.random.default_rng(3))
     jacobian[4, :5] *= 1e6
     n, places = len(jacobian), tuple(np.flatnonzero(jacobian).tolist())
-    steps = Steps(
-        lambda t, *x: jacobian.ravel().tolist(), 1e-6, FLOAT64, [1.0] * n, varied=variation(places, n, 5, COLUMNS, ())
-    )
+    varied = variation(places, n, 5, COLUMNS, ())
+    steps = Steps(Derivatives(lambda t, *x: jacobian.ravel().tolist(), [1.0] * n, varied=varied), 1e-6, FLOAT64)
     steps._derive(0.0, (0.0,) * n)
     found = steps._factor(STEP)[0].solve([1.0 if i == 9 else 0.0 for i in range(n)])
     assert found[9] != 0 and not any(found[5:9])

@@ -18,7 +18,7 @@ import hsdsl
 from hsdsl.chart import PEERS, Refused, Scene, work_precision
 from hsdsl.chart.judge import judge
 from hsdsl.chart.peers import prepare
-from hsdsl.chart.result import Attempt, Result
+from hsdsl.chart.result import Attempt, Result, Tool
 from hsdsl.chart.rows import COLUMNS, as_csv
 from hsdsl.chart.stopwatch import race
 from hsdsl.chart.translation import as_function, in_floats, translate
@@ -123,7 +123,7 @@ def test_errors_fall_with_the_tolerance_and_rho_bounds_them(ball):
         ball, schemes=["relaxed"], methods=["dopri5", "rk4"], engines=["python"], tolerances=[1e-4, 1e-8], steps=[1e-2]
     )
     assert not remarks
-    loose, tight = (row for row in rows if row.attempt.method == "dopri5")
+    loose, tight = (row for row in rows if row.attempt.tool.method == "dopri5")
     assert tight.judgement.error < 1e-2 * loose.judgement.error
     for row in rows:
         assert row.judgement.verdict == "right"
@@ -154,12 +154,12 @@ def test_turns_alternate_and_the_slow_are_run_once():
         return run(name)
 
     attempts = [
-        Attempt("a", "", "", "step", 1.0, partial(slow, "a1")),
-        Attempt("a", "", "", "step", 0.1, partial(slow, "a2")),
-        Attempt("b", "", "", "step", 1.0, partial(run, "b1")),
+        Attempt(Tool("a"), "step", 1.0, partial(slow, "a1")),
+        Attempt(Tool("a"), "step", 0.1, partial(slow, "a2")),
+        Attempt(Tool("b"), "step", 1.0, partial(run, "b1")),
     ]
     done = list(race(attempts, lambda _, result: result, 2, 0.04, lambda _: None))
-    assert [attempt.tool for attempt, _, _ in done] == ["a", "b"]  # a2 left out: a1 was beyond patience
+    assert [attempt.tool.name for attempt, _, _ in done] == ["a", "b"]  # a2 left out: a1 was beyond patience
     assert calls.count("a1") == 1
     assert calls.count("b1") >= 3
 

@@ -15,6 +15,7 @@ import hsdsl
 from hsdsl.arithmetic import FLOAT64, multiprecision
 from hsdsl.backends.python import PythonKernel
 from hsdsl.integrators.collocation import coefficients
+from hsdsl.integrators.implicit import Derivatives
 from hsdsl.integrators.linear import Singular, factored, factored_complex
 from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.radau import radau_stepper
@@ -96,7 +97,7 @@ def test_increments_and_polynomial() -> None:
 
 def one_step(rate: float, h: float) -> tuple[float, float]:
     """End and error estimate of one step from 1 along x' = rate x."""
-    stepper = radau_stepper(lambda t, x: (rate,), 1e-14, FLOAT64, [1.0])
+    stepper = radau_stepper(Derivatives(lambda t, x: (rate,), [1.0]), 1e-14, FLOAT64)
     z, stages = stepper.step(lambda t, x: (rate * x,), 0.0, h, (1.0,), (rate,))
     assert stepper.error is not None
     return z[0], stepper.error(h, stages, (rate * z[0],))[0]
@@ -231,7 +232,7 @@ def test_a_flow_without_derivatives(scheme: str) -> None:
 
 
 def test_a_step_that_newton_does_not_solve() -> None:
-    stepper = radau_stepper(lambda t, x: (2 * x,), None, FLOAT64, [1.0])
+    stepper = radau_stepper(Derivatives(lambda t, x: (2 * x,), [1.0]), None, FLOAT64)
     with pytest.raises(NoConvergence):
         stepper.step(lambda t, x: (x * x,), 0.0, 10.0, (1.0,), (1.0,))
 

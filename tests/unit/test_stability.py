@@ -12,9 +12,10 @@ import numpy as np
 import pytest
 
 import hsdsl
+from hsdsl.chart.result import Tool
 from hsdsl.chart.stability import stability_map
 from hsdsl.chart.stability.axes import read_axes
-from hsdsl.chart.stability.cells import Bench, Tool
+from hsdsl.chart.stability.cells import Bench
 from hsdsl.chart.stability.limits import eigenvalues, grows_on_the_axis, largest_step, stability_polynomial
 from hsdsl.chart.stability.picture import plot_stability
 from hsdsl.chart.stability.table import as_csv, as_plain, as_text
@@ -98,19 +99,19 @@ def bench(text: str, rho: bool = False) -> Bench:
 
 def test_words_of_runs() -> None:
     swing = Bench(hsdsl.load(GALLERY / "two-crossings.yaml"), {}, True)
-    fine = swing.run(Tool("located", "dopri5"), {"tolerance": 1e-9})
+    fine = swing.run(Tool("", "located", "dopri5"), {"tolerance": 1e-9})
     assert (fine.word, fine.transitions) == ("converged", 20)
-    assert swing.run(Tool("located", "euler"), {"step": 1}).word == "blown up"
-    assert swing.run(Tool("located", "heun"), {"step": 0.5}).word == "inaccurate"
-    assert swing.run(Tool("located", "rk4"), {"step": 1}).word == "wrong transitions"
-    assert swing.run(Tool("paoli-schatzman"), {"step": 1e-2}).word == "refused"
-    assert swing.run(Tool(peer="scipy"), {"tolerance": 1e-6}).word == "wrong transitions"
+    assert swing.run(Tool("", "located", "euler"), {"step": 1}).word == "blown up"
+    assert swing.run(Tool("", "located", "heun"), {"step": 0.5}).word == "inaccurate"
+    assert swing.run(Tool("", "located", "rk4"), {"step": 1}).word == "wrong transitions"
+    assert swing.run(Tool("", "paoli-schatzman"), {"step": 1e-2}).word == "refused"
+    assert swing.run(Tool("scipy"), {"tolerance": 1e-6}).word == "wrong transitions"
     rolls = Bench(hsdsl.load(GALLERY / "rolling-ball.yaml"), {}, False)
-    assert rolls.run(Tool("located", "dopri5"), {"parameters": {"e": 0.4}}).word in ("no reference", "converged")
-    blown = bench(DECAY).run(Tool("located", "euler"), {"step": 0.05})
+    assert rolls.run(Tool("", "located", "dopri5"), {"parameters": {"e": 0.4}}).word in ("no reference", "converged")
+    blown = bench(DECAY).run(Tool("", "located", "euler"), {"step": 0.05})
     assert blown.word == "blown up"
     starts = Bench(hsdsl.load(GALLERY / "event-at-start.yaml"), {}, True)
-    late = starts.run(Tool("relaxed", "dopri5"), {"tolerance": 1e-9, "relaxation": 1e-6})
+    late = starts.run(Tool("", "relaxed", "dopri5"), {"tolerance": 1e-9, "relaxation": 1e-6})
     assert late.word == "converged"
     assert 1e-6 < late.rho < 1e-5  # three strips
 
@@ -128,8 +129,10 @@ initial: {mode: m, x: 0, y: 0}
 experiment: {until: 2}
 """
     here = bench(text)
-    assert here.run(Tool("located", "dop853"), {"tolerance": 1e-10}).word == "converged"
-    assert here.run(Tool("located", "euler"), {"step": 0.5, "parameters": {"late": -1e-3}}).word == "wrong transitions"
+    assert here.run(Tool("", "located", "dop853"), {"tolerance": 1e-10}).word == "converged"
+    assert (
+        here.run(Tool("", "located", "euler"), {"step": 0.5, "parameters": {"late": -1e-3}}).word == "wrong transitions"
+    )
 
 
 def test_references_follow_the_numbers() -> None:

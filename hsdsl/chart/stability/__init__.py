@@ -16,8 +16,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hsdsl.chart.result import Tool
 from hsdsl.chart.stability.axes import SIZES, Axis, read_axes
-from hsdsl.chart.stability.cells import STUCK, WORDS, Bench, Cell, Tool
+from hsdsl.chart.stability.cells import STUCK, WORDS, Bench, Cell
 from hsdsl.chart.stability.limits import eigenvalues, largest_step
 from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
@@ -25,7 +26,7 @@ from hsdsl.limits import cores
 from hsdsl.model import Model
 from hsdsl.processes import Lost, in_processes
 
-__all__ = ["WORDS", "Axis", "Cell", "Panel", "StabilityMap", "Tool", "stability_map"]
+__all__ = ["WORDS", "Axis", "Cell", "Panel", "StabilityMap", "stability_map"]
 Progress = Callable[[int, int], None]
 
 
@@ -157,16 +158,16 @@ def _tools(
         if method in METHODS and not METHODS[method].adaptive:
             raise UsageError(f"method {method}: it has a fixed step and keeps no tolerance", "map h")
     found = [
-        Tool(scheme, method if scheme != "paoli-schatzman" else "")
+        Tool("", scheme, method if scheme != "paoli-schatzman" else "")
         for scheme in schemes
         for method in (named if scheme != "paoli-schatzman" else named[:1])
     ]
-    return [*found, *(Tool(peer=name) for name in against)]
+    return [*found, *(Tool(name) for name in against)]
 
 
 def _limit(model: Model, base: Mapping[str, Any], tool: Tool, x: Axis, y: Axis) -> tuple[float | None, ...] | None:
     """The largest stable step at each value of y, where x is the step and the flow is linear."""
-    if x.kind != "step" or tool.peer or not tool.method:
+    if x.kind != "step" or tool.name or not tool.method:
         return None
     found: list[float | None] = []
     for value in y.values:

@@ -1,4 +1,7 @@
-"""The outcome of one run of a stability map, against a reference at the same numbers."""
+"""The outcome of one run of a stability map, against a reference at the same numbers.
+
+Tools are ours, without a name, or peers.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from typing import Any
 
 from hsdsl.chart.outcome import Outcome, Tolerance, outcome
 from hsdsl.chart.peers import prepare
-from hsdsl.chart.result import Refused
+from hsdsl.chart.result import Refused, Tool
 from hsdsl.chart.scene import Scene
 from hsdsl.errors import UsageError
 from hsdsl.exact import reference
@@ -43,20 +46,6 @@ class Cell:
     why: str = ""
 
 
-@dataclass(frozen=True)
-class Tool:
-    """Our scheme and method, or a peer by its name."""
-
-    scheme: str = ""
-    method: str = ""
-    peer: str = ""
-
-    @property
-    def label(self) -> str:
-        """What a panel is called."""
-        return self.peer or " ".join(filter(None, (self.scheme, self.method)))
-
-
 @dataclass
 class Bench:
     """Runs of a model: ``base`` are the arguments that all of them have; references are kept by what varies.
@@ -84,7 +73,7 @@ class Bench:
         if isinstance(scene, str):
             return Cell(UNKNOWN, why=scene)
         try:
-            return self._peer(scene, tool, arguments) if tool.peer else self._own(scene, tool, arguments)
+            return self._peer(scene, tool, arguments) if tool.name else self._own(scene, tool, arguments)
         except UsageError as error:
             return Cell(REFUSED, why=str(error))
         except Refused as refusal:
@@ -140,7 +129,7 @@ class Bench:
         return rho.upper if isfinite(rho.upper) and rho.upper - rho.lower <= LOOSE * rho.upper else nan
 
     def _peer(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
-        found = outcome(scene, prepare(tool.peer, scene)(arguments.get("tolerance", PEER_TOLERANCE)), WITHIN)
+        found = outcome(scene, prepare(tool.name, scene)(arguments.get("tolerance", PEER_TOLERANCE)), WITHIN)
         return _cell(scene, found, "stopped")
 
 

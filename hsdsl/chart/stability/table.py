@@ -26,7 +26,7 @@ def records(found: StabilityMap) -> Iterator[dict[str, Any]]:
 
 def _plain(panel: Panel, cell: Cell) -> dict[str, Any]:
     numbers = {name: value if isfinite(value) else None for name, value in (("rho", cell.rho), ("error", cell.error))}
-    tool = {"tool": panel.tool.peer or "hsdsl", "scheme": panel.tool.scheme, "method": panel.tool.method}
+    tool = {"tool": panel.tool.name or "hsdsl", "scheme": panel.tool.scheme, "method": panel.tool.method}
     return tool | {"outcome": cell.word} | numbers | {"transitions": cell.transitions, "why": cell.why}
 
 
