@@ -38,15 +38,15 @@ class Labelled:
 
     def over(self, a: Side, b: Side) -> Array:
         """Bound by the difference of the two polynomials."""
-        return largest_norm(a.powers - b.powers) + (a.mode != b.mode) + a.doubt + b.doubt
+        return largest_norm(a.powers - b.powers) + (a.mode != b.mode) + a.rounding + b.rounding
 
     def at(self, a: Side, b: Side, end: int, times: Array, enough: float = 0.0) -> tuple[Array, Array]:
         """Return D, less or more than rounding."""
         difference = a.at_end(end) - b.at_end(end)
         states = np.sqrt(np.sum(difference**2, axis=1))
         apart = states + (a.mode != b.mode)
-        doubt = a.doubt + b.doubt + (difference.shape[1] + 4) * UNIT * states
-        return np.maximum(0.0, apart - doubt), apart + doubt
+        rounding = a.rounding + b.rounding + (difference.shape[1] + 4) * UNIT * states
+        return np.maximum(0.0, apart - rounding), apart + rounding
 
     def motion(self, side: Side) -> Array:
         """Bound the way by the length of the control polygon."""
@@ -81,8 +81,8 @@ def rho_hat(a: Execution, b: Execution, coordinates: Sequence[str] | None = None
         apart = np.sqrt(np.sum(difference**2, axis=1))
         if len(apart) and apart.max() > largest:
             largest, time = float(apart.max()), float(times[chosen][int(np.argmax(apart))])
-    doubt = float(np.max(first.doubt + second.doubt)) + ROUNDOFF * largest
-    interval = Interval(max(0.0, largest - doubt), largest + doubt, SAMPLED)
+    rounding = float(np.max(first.rounding + second.rounding)) + ROUNDOFF * largest
+    interval = Interval(max(0.0, largest - rounding), largest + rounding, SAMPLED)
     return CurveDistance(interval, time, "rho-hat", cells.span, cells.note)
 
 

@@ -19,7 +19,7 @@ class Side:
     """One curve on n cells, each a part of a piece of ``trace``.
 
     ``powers`` (n, p + 1, w) are its polynomials by powers of u in [0, 1]; ``depth`` (n, 2) is the depth in the strip at
-    the cells' ends, 0 where the state flows; ``doubt`` is how far rounding may have moved any point of the curve.
+    the cells' ends, 0 where the state flows; ``rounding`` is how far rounding may have moved any point of the curve.
     """
 
     trace: Trace
@@ -27,7 +27,7 @@ class Side:
     powers: Array
     depth: Array
     duration: Array
-    doubt: Array
+    rounding: Array
 
     @property
     def stray(self) -> Array:
@@ -49,7 +49,7 @@ class Side:
         return self.powers[:, 0] if end == 0 else np.sum(self.powers, axis=1)
 
     def __getitem__(self, chosen: Array) -> Side:
-        arrays = (self.pieces, self.powers, self.depth, self.duration, self.doubt)
+        arrays = (self.pieces, self.powers, self.depth, self.duration, self.rounding)
         return Side(self.trace, *(array[chosen] for array in arrays))
 
 
@@ -125,13 +125,13 @@ class Cells:
         first, last = trace.share(pieces, self.begin), trace.share(pieces, self.end)
         powers = degree_raised(restrict(trace.coefficients[pieces], first, last), degree)
         depth = np.stack([trace.depths(pieces, first), trace.depths(pieces, last)], axis=1)
-        return Side(trace, pieces, powers, depth, self.end - self.begin, trace.doubt[pieces])
+        return Side(trace, pieces, powers, depth, self.end - self.begin, trace.rounding[pieces])
 
 
 def rounding_of(*curves: Trace) -> float:
     """Return how far apart two bounds on curves may be for rounding alone."""
     largest = max(float(np.max(np.abs(curve.coefficients[:, 0]), initial=0.0)) for curve in curves)
-    return ROUNDOFF * largest + 4 * sum(float(np.max(curve.doubt, initial=0.0)) for curve in curves)
+    return ROUNDOFF * largest + 4 * sum(float(np.max(curve.rounding, initial=0.0)) for curve in curves)
 
 
 def common_span(a: Trace, b: Trace) -> tuple[float, float]:

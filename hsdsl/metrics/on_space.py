@@ -28,7 +28,7 @@ class OnSpace:
             if self.strips:
                 apart = np.max(a.depth[same] + b.depth[same], axis=1)
                 bound[same] += apart
-        return bound + a.doubt + b.doubt
+        return bound + a.rounding + b.rounding
 
     def at(self, a: Side, b: Side, end: int, times: Array, enough: float) -> tuple[Array, Array]:
         """Bound at single times, mode pair by mode pair."""
@@ -41,8 +41,8 @@ class OnSpace:
             q = self._points(b[here], j, y[here], times[here], end)
             lower[here], upper[here] = self.metric.between(p, q, enough)
             enough = max(enough, float(lower[here].max()))
-        doubt = a.doubt + b.doubt
-        return np.maximum(0.0, lower - doubt), upper + doubt
+        rounding = a.rounding + b.rounding
+        return np.maximum(0.0, lower - rounding), upper + rounding
 
     def motion(self, side: Side) -> Array:
         """Bound the way by the length of the control polygon, with the depth and the time where they count."""

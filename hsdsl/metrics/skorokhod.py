@@ -33,10 +33,10 @@ def skorokhod(a: Execution, b: Execution, resolution: int = RESOLUTION) -> Curve
     if cells.same:
         return no_distance(cells, "skorokhod")
     p, q = polylines((cells.a, cells.b), (span, span), resolution)
-    coupled, doubt = coupling(p, q), cells.rounding + ROUNDOFF * max(map(abs, span))
+    coupled, rounding = coupling(p, q), cells.rounding + ROUNDOFF * max(map(abs, span))
     same_time = sup_norm(a, b).upper
-    upper = min(coupled + (p.reach + q.reach) / 2 + doubt, same_time)
-    lower = max(coupled - max(p.reach, q.reach) / 2 - doubt, switches_apart(cells.a, cells.b, span), 0.0)
+    upper = min(coupled + (p.reach + q.reach) / 2 + rounding, same_time)
+    lower = max(coupled - max(p.reach, q.reach) / 2 - rounding, switches_apart(cells.a, cells.b, span), 0.0)
     note = f"Curves by {len(p)} and {len(q)} points, up to {max(p.reach, q.reach):.2g} apart."
     notes = " ".join(filter(None, (cells.note, note)))
     return CurveDistance(Interval(lower, upper), None, "skorokhod", span, notes)

@@ -37,8 +37,8 @@ def tau_epsilon(a: Execution, b: Execution, tau: float | None = None, resolution
     spans = [(float(curve.start[0]), float(curve.end[-1])) for curve in curves]
     p, q = polylines(curves, spans, resolution, cuts=tau)
     found, labels = max(one_way(p, q, tau), one_way(q, p, tau)), other_modes(p, q, tau)
-    doubt = rounding_of(*curves) + ROUNDOFF * max(abs(time) for span in spans for time in span)
-    reach = max(p.reach, q.reach) / 2 + doubt
+    rounding = rounding_of(*curves) + ROUNDOFF * max(abs(time) for span in spans for time in span)
+    reach = max(p.reach, q.reach) / 2 + rounding
     interval = INFINITE if found == np.inf else Interval(max(found - reach, labels, 0.0), max(found + reach, labels))
     note = f"For t + j up to {tau:.10g}, runs by {len(p)} and {len(q)} points, up to {2 * reach:.2g} apart."
     return CurveDistance(interval, None, "tau-epsilon", (0.0, tau), note)

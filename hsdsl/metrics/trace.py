@@ -58,7 +58,7 @@ class Trace:
         return [self.edges[k] if k >= 0 else "" for k in numbers]
 
     @cached_property
-    def doubt(self) -> Array:
+    def rounding(self) -> Array:
         """How far rounding may move any point of each piece that is computed from its coefficients.
 
         The share of a piece and the shifted polynomial take some 8 p roundings of numbers that add up to no more than

@@ -154,7 +154,7 @@ static void begin(hs_run *run, int kind);
 static void strip(hs_run *run, int rows, hs_time (*row)[2], const hs_real *q);
 static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, const hs_real *after, int entry);
 static void note(hs_run *run, hs_notice kind, int surface, int64_t number, hs_time time, hs_time other);
-static void doubt(hs_run *run, int k, hs_time time);
+static void note_unsettled(hs_run *run, int k, hs_time time);
 
 /* hs.c */
 static hs_run open_run(hs_task *task);

@@ -150,8 +150,8 @@ static void lay_out_located(hs_run *run, hs_store *store) {
     hs_real *b = numbers(store, most + 1);
     if (store->numbers) run->cuts[i].b = b;
   }
-  run->doubted = take(store, (int64_t)run->model->modes * m, sizeof(int));
-  for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->doubted[i] = 0;
+  run->unsettled = take(store, (int64_t)run->model->modes * m, sizeof(int));
+  for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->unsettled[i] = 0;
   run->reach = numbers(store, run->model->modes);
   run->lost = take(store, run->model->modes, sizeof(int));
   for (int i = 0; store->numbers && i < run->model->modes; i++) run->reach[i] = 0.0, run->lost[i] = 0;

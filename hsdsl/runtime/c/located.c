@@ -70,7 +70,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
     const int holds = k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
     if (holds == RAISED) return RAISED;
     if (!holds && !(run->active_surfaces[k] && holds_next(run, k, crossing->time, crossing->state))) continue;
-    if (!rise.certain) doubt(run, k, crossing->time);
+    if (!rise.certain) note_unsettled(run, k, crossing->time);
     crossing->edge = k;
     crossing->depth = 0.0;
     return 1;

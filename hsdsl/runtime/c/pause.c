@@ -34,7 +34,7 @@ static void exchange(hs_run *run, hs_pause *pause, int back) {
   integer = hand_over_integers(integer, run->active_surfaces, m, back);
   integer = hand_over_integers(integer, run->emerging, m, back);
   if (!located) return;
-  integer = hand_over_integers(integer, run->doubted, all, back);
+  integer = hand_over_integers(integer, run->unsettled, all, back);
   hand_over_integers(integer, run->lost, modes, back);
 }
 

@@ -114,8 +114,8 @@ static void note(hs_run *run, hs_notice kind, int surface, int64_t number, hs_ti
 }
 
 /* Note that surface k would not settle on a polynomial: once for each. */
-static void doubt(hs_run *run, int k, hs_time time) {
-  int *const doubted = &run->doubted[run->here.mode * run->model->surfaces + k];
-  if (!*doubted) note(run, HS_UNSETTLED, k, 0, time, time);
-  *doubted = 1;
+static void note_unsettled(hs_run *run, int k, hs_time time) {
+  int *const unsettled = &run->unsettled[run->here.mode * run->model->surfaces + k];
+  if (!*unsettled) note(run, HS_UNSETTLED, k, 0, time, time);
+  *unsettled = 1;
 }

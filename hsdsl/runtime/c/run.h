@@ -250,7 +250,7 @@ typedef struct {
   int has_middle;
   hs_real *began;                   /* where a motion along a guard began */
   int still;                         /* whether it ended there */
-  int *doubted, noted_crowded;      /* doubted: for each mode and surface */
+  int *unsettled, noted_crowded;     /* unsettled: for each mode and surface */
   hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
   int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */
   hs_made made[FREE];

@@ -236,7 +236,7 @@ static void lose(hs_run *run) {
   for (int k = 0; k < curves->count; k++) {
     int certain = 1;
     for (int part = 0; part < curves->parts; part++) certain &= curves->certain[part * curves->count + k];
-    if (!certain) doubt(run, k, run->span.t);
+    if (!certain) note_unsettled(run, k, run->span.t);
   }
 }
 
