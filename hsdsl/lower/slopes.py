@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from hsdsl.completion import overlay
 from hsdsl.expression.stack import deep_stack
-from hsdsl.lower import LoweredMode, lowered_overlay, number
+from hsdsl.lower.mode import LoweredMode, lowered_overlay
+from hsdsl.lower.names import number
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient
 from hsdsl.lower.switches import with_switches
