@@ -153,7 +153,7 @@ class Findings:
 
 
 # One line a code: what the code is about. The codes are stable; a retired one is never used again.
-# Each has a page, with an example, in hsdsl/lint/errors.md.
+# Each has a page in hsdsl/lint/errors.md: a text, and most often a wrong and a right example.
 CODES: dict[str, str] = {
     # the file and its YAML
     "HS001": "the file is not UTF-8 text",

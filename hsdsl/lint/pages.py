@@ -9,6 +9,8 @@ from importlib import resources
 from hsdsl.errors import CODES
 from hsdsl.lint.rules import FAMILIES, RULES
 
+_WRONG = re.compile(r"(```yaml\n.*?)(?=```yaml)", re.DOTALL)
+
 
 def titles() -> dict[str, str]:
     """One line about every code."""
@@ -27,8 +29,11 @@ def rule_pages() -> dict[str, str]:
 
 
 def error_pages() -> dict[str, str]:
-    """The pages of errors, with their titles."""
-    return {code: f"{CODES[code][0].upper()}{CODES[code][1:]}.\n\n{page}" for code, page in _pages("errors.md").items()}
+    """The pages of errors, with their titles. The first example of a page is wrong, the second right."""
+    pages = {
+        code: _WRONG.sub(r"## Example\n\n\1## Use instead\n\n", page) for code, page in _pages("errors.md").items()
+    }
+    return {code: f"{CODES[code][0].upper()}{CODES[code][1:]}.\n\n{page}" for code, page in pages.items()}
 
 
 def _pages(file: str) -> dict[str, str]:
