@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 
 import sympy as sp
 
@@ -29,7 +30,7 @@ def branched(near: Nearby) -> Nearby | None:
     """What a motion depends on, with the branch of the reset that impacts take; None where they take no one branch."""
     if not near.moved.has(*KINKED) and not any(map(_is_root, near.moved.atoms(sp.Pow))):
         return near
-    impacts = [points for seed in SEEDS if all(points := [_impact(near, speed, seed) for speed in SPEEDS])]
+    impacts = [points for seed in SEEDS if len(points := _impacts(near, seed)) == len(SPEEDS)]
     if not impacts:
         return near
     branch = _Branch(near, impacts)
@@ -40,6 +41,11 @@ def branched(near: Nearby) -> Nearby | None:
     if reset == near.edge.reset:
         return near
     return near.by(replace(near.edge, reset=reset), impacts[0][0])
+
+
+def _impacts(near: Nearby, seed: int) -> list[Point]:
+    """Ever slower impacts at random points of a guard; fewer than speeds where none is found at one of them."""
+    return list(takewhile(bool, (_impact(near, speed, seed) for speed in SPEEDS)))
 
 
 def _impact(near: Nearby, speed: float, seed: int) -> Point | None:

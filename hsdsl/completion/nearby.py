@@ -154,12 +154,13 @@ def drawn(expressions: Sequence[sp.Expr], seed: int, either: Collection[Any] = (
 def solved(equations: Sequence[sp.Expr], free: Sequence[Any], start: Point) -> Point | None:
     """Solve equations for some names from a point on, by Newton's method; None where no solution is found."""
     at = dict(start)
-    slopes = jacobian(equations, free)
+    equations, slopes = [*map(sp.sympify, equations)], jacobian(equations, free)
     for _ in range(MOST_ROUNDS):
-        values = [value_at(e, at) for e in equations]
+        known = _known(at)
+        values = [_sized(e, known)[0] for e in equations]
         if not all(map(NUMBERS.isfinite, values)):
             return None
-        step, _ = _least(_rows_at(slopes, at), values)
+        step, _ = _least(_rows_at(slopes, known), values)
         for name, change in zip(free, step, strict=True):
             at[name] -= change
         if all(abs(change) <= ROUNDED * abs(start[name]) for name, change in zip(free, step, strict=True)):
@@ -246,14 +247,13 @@ def _evaluated(expr: sp.Basic, numbers: Sequence[Number]) -> Number:
         return NAN
 
 
-def _rows_at(matrix: sp.Matrix, at: Point) -> list[Row]:
-    known = _known(at)
+def _rows_at(matrix: sp.Matrix, known: dict[sp.Basic, Sized]) -> list[Row]:
     return [[_sized(value, known) for value in row] for row in matrix.tolist()]
 
 
 def rank(matrix: sp.Matrix, at: Point) -> int:
     """The rank of a matrix at a point; 0 where it has no finite value."""
-    rows = _rows_at(matrix, at)
+    rows = _rows_at(matrix, _known(at))
     if not all(NUMBERS.isfinite(number) for row in rows for number, _ in row):
         return 0
     return _least(rows, [NUMBERS.zero] * len(rows))[1]

@@ -79,14 +79,10 @@ experiment: {{until: 1}}
     return Model(elaborate("large.yaml", text=text.encode())).program
 
 
-# Newton's method for a point on its guard, in sixty digits, takes 20 s: too long, and to be mended
-SLOWER = (pytest.mark.campaign,)
-
-
 @pytest.mark.parametrize(
     "case",
     [
-        *(pytest.param(case, id=name, marks=SLOWER if name == "nested roots" else ()) for name, case in LARGE.items()),
+        *(pytest.param(case, id=name) for name, case in LARGE.items()),
         *(pytest.param(case, id=f"{name}, deep", marks=pytest.mark.campaign) for name, case in nested(60).items()),
     ],
 )
