@@ -5,12 +5,12 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+from shipped import bad_models
+
 TESTS = Path(__file__).resolve().parents[1]
 FOLDERS = (
     TESTS.parent / "models",
     TESTS / "conformance" / "cases",
-    TESTS / "golden" / "bad",
-    TESTS / "golden" / "mistakes",
     TESTS / "fuzz" / "crashes",
 )
 CANARY = "hsdsl_canary"
@@ -62,10 +62,9 @@ NAMES = (
 @cache
 def documents(legal: bool = False) -> tuple[bytes, ...]:
     """Every YAML file that there is, small enough to be worth mutating; on request only those that are models."""
-    folders = FOLDERS[:2] if legal else FOLDERS
-    paths = [path for folder in folders if folder.is_dir() for path in sorted(folder.glob("*.yaml"))]
+    paths = [path for folder in FOLDERS[: 2 if legal else 3] for path in sorted(folder.glob("*.yaml"))]
     found = [path.read_bytes() for path in paths if not path.name.endswith(".expect.yaml")]
-    return tuple(data for data in found if len(data) < 20_000)
+    return tuple(data for data in (*found, *(() if legal else bad_models().values())) if len(data) < 20_000)
 
 
 @cache
