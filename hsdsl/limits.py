@@ -9,9 +9,11 @@ from contextvars import ContextVar
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
 
 
+@checks_methods
 @dataclass(frozen=True)
 class Limits:
     """Caps on a model file, each checked before what it bounds is done.

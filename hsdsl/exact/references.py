@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from hsdsl.calls import checks_arguments
 from hsdsl.errors import UsageError
 from hsdsl.exact.residual import residual
 from hsdsl.execution import Execution, Point
@@ -34,6 +35,7 @@ class Referenced(Protocol):
     def simulate(self) -> Callable[..., Execution]: ...
 
 
+@checks_arguments
 def reference(model: Referenced, block: int = 0) -> Execution:
     """Return the exact execution of a model.
 

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from hsdsl.calls import checks_methods
 from hsdsl.execution.parts import COMPLETE
 from hsdsl.execution.run import Execution
 from hsdsl.execution.samples import Array
@@ -53,6 +54,7 @@ class TransitionTable:
         return slice(int(self.first[instance]), int(self.first[instance + 1]))
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False)
 class Ensemble:
     """The runs of an ensemble. Every array begins with :attr:`shape`, the common shape of what was varied.

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.records import Deferred, same
@@ -38,6 +39,7 @@ class CompiledRecord(Protocol):
         ...
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class Execution(Deferred):
     """A run's result; see the package's docstring for the arrays.

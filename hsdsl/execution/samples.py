@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution.records import Deferred
 from hsdsl.names import did_you_mean
@@ -20,6 +21,7 @@ Array = npt.NDArray[Any]
 HYBRID_TIME = ("time", "mode", "j")
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False)
 class Samples(Deferred):
     """Values of an execution at n points of hybrid time, by column.

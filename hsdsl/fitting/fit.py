@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.calls import checks_methods
 from hsdsl.execution import Array, Execution
 from hsdsl.fitting.data import Measurements
 from hsdsl.names import called, visible
@@ -16,6 +17,7 @@ from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit:
     """Values of parameters and initial states that measurements agree with best.

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hsdsl.calls import checks_methods
 from hsdsl.metrics.gate_sequence import gate_sequence
 from hsdsl.metrics.geometry import Array, Space
 from hsdsl.metrics.interval import CERTIFIED, INFINITE, SAMPLED, SEARCHED, Interval, up_to_hops
@@ -16,6 +17,7 @@ ROUNDING = 16 * 2.0**-53  # of a few sums, relative to themselves
 CLOSED = 1e-9  # relative: such a gap counts as none
 
 
+@checks_methods
 @dataclass(frozen=True)
 class SpacePoint:
     """A point: of a mode's domain or, with ``edge``, of that edge's strip at a depth from 0 to the relaxation.

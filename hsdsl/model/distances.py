@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import FLOAT64
+from hsdsl.calls import checks_arguments
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.metrics.budget import Budget
@@ -62,6 +63,7 @@ def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> In
     )
 
 
+@checks_arguments
 def distance_of_runs(
     run: Execution,
     other: Execution,

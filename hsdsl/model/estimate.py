@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hsdsl.arithmetic import Number
+from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution, Transition
 from hsdsl.simulate.stops import show
@@ -16,6 +17,7 @@ from hsdsl.simulate.verdict.agreement import Errors
 SAMPLES = 1000
 
 
+@checks_methods
 @dataclass(frozen=True)
 class Estimate:
     """The distance between a run and a finer one.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.arithmetic import FLOAT64
+from hsdsl.calls import checks_arguments, checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution import Ensemble, Execution
 from hsdsl.limits import Limits
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
 MOST_PREPARED = 16
 
 
+@checks_arguments
 def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: bytes | None = None) -> Model:
     """Read a model file; `-` is standard input.
 
@@ -58,6 +60,7 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: by
     return Model(pipeline_of(path, limits, text))
 
 
+@checks_arguments
 def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limits | None = None) -> Model:
     """Read a model from its text; data files are in ``folder``, or in the present one.
 
@@ -77,6 +80,7 @@ ELSEWHERE = {
 }
 
 
+@partial(checks_methods, elsewhere=ELSEWHERE)
 class Model:
     """A checked model. ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` holds both.
 

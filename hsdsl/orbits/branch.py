@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.calls import checks_methods
 from hsdsl.execution import Array
 from hsdsl.names import called
 from hsdsl.orbits.continuation import Bifurcation, Point
@@ -18,6 +19,7 @@ from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False)
 class Branch:
     """Periodic orbits over a parameter.

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.calls import checks_methods
 from hsdsl.execution import Array, Execution
 from hsdsl.names import called
 from hsdsl.orbits.shooting import Closed
@@ -16,6 +17,7 @@ from hsdsl.sensitivity.result import Sensitivity
 LEAST_MARGIN = 1e-8  # multipliers are not known better than this
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False)
 class Orbit:
     """A periodic orbit of a hybrid system.

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.calls import checks_methods
 from hsdsl.execution import Array
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
@@ -32,6 +33,7 @@ class Nearby:
     transitions: tuple[str, ...]
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False)
 class OrbitalStability:
     """What runs from nearby show of an execution.

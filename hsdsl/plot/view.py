@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.names import SINCE, did_you_mean, without_memory
@@ -14,6 +15,7 @@ from hsdsl.program import ModeProgram, Program
 Pair = tuple[str, str]
 
 
+@checks_methods
 @dataclass(frozen=True)
 class View:
     """What is shown of one run, or of several in one picture.

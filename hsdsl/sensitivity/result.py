@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.calls import checks_methods
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.parts import numbered, present, product_name
 from hsdsl.sensitivity.landing import landing, parted
@@ -81,6 +82,7 @@ class Setting:
     shown: Callable[[Execution], Execution]
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
     """The derivatives of an execution by parameters and initial states.

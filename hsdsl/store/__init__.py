@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from hsdsl.calls import checks_arguments
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.store.atomic import replacing, unplaced
@@ -25,6 +26,7 @@ __all__ = ["forget_sidecar", "load", "read_sidecar", "save"]
 _TABLES = {".csv": write_csv, ".parquet": write_parquet}
 
 
+@checks_arguments
 def save(
     execution: Execution,
     path: str | os.PathLike[str],

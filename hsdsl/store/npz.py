@@ -19,6 +19,7 @@ from typing import Any, BinaryIO, Literal, Union, cast, get_args, get_origin, ge
 import numpy as np
 
 from hsdsl import decimals
+from hsdsl.calls import checks_arguments
 from hsdsl.errors import UsageError
 from hsdsl.execution import Arc, Array, Execution, Kind, Point, Stop, Transition, Verdict
 from hsdsl.files import open_regular
@@ -61,6 +62,7 @@ def save_npz(execution: Execution, file: BinaryIO) -> None:
     np.savez(file, **arrays, header=text, arcs=np.array(arcs, dtype=np.int64))
 
 
+@checks_arguments
 def load(path: str | os.PathLike[str]) -> Execution:
     """Read an execution from an ``.npz`` file that :meth:`hsdsl.execution.Execution.save` wrote.
 

@@ -11,6 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
+from hsdsl.calls import checks_arguments
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution, Samples
 from hsdsl.report import as_json, dumps
@@ -33,6 +34,7 @@ def sidecar_of(table: Path) -> Path:
     return table.with_name(table.name + ".json")
 
 
+@checks_arguments
 def read_sidecar(table: str | os.PathLike[str]) -> dict[str, Any]:
     """Read what the sidecar of a table says, if it is that table's.
 

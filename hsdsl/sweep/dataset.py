@@ -16,6 +16,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from hsdsl.calls import checks_arguments, checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 from hsdsl.names import called, did_you_mean, visible
@@ -25,6 +26,7 @@ from hsdsl.sweep.manifest import Manifest
 from hsdsl.sweep.rows import TAG, column_of, library, schema
 
 
+@checks_methods
 @dataclass(frozen=True, eq=False)
 class Sweep:
     """The dataset in a folder, of all rows or of those that have been run.
@@ -156,6 +158,7 @@ def path_of(folder: Path, chunk: int) -> Path:
     return folder / f"chunk-{chunk:06}.parquet"
 
 
+@checks_arguments
 def load(folder: str | os.PathLike[str]) -> Sweep:
     """Open the dataset in a folder.
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import inspect
 import os
 import subprocess
 import sys
@@ -104,3 +106,55 @@ experiment: {until: 4}
     with pytest.raises(UsageError, match=r"<text>:4:30: .* pulse do not increase: 3\.0 after 3\.5") as refused:
         model.simulate(parameters={"T": 1.75})
     assert refused.value.hint == "give each time once, the earliest first"
+
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
+RUN = hsdsl.load(BALL).simulate(until=0.1)
+HANDED_ON = {  # functions with `**arguments`; of orbits, fits and sweeps see their own tests
+    "Model.ensemble": hsdsl.load(BALL).ensemble,
+    "Model.stream": lambda **unknown: hsdsl.load(BALL).stream("run.csv", **unknown),
+    "Model.plot": lambda **unknown: hsdsl.load(BALL).plot(RUN, "picture.png", **unknown),
+    "hsdsl.distance": lambda **unknown: hsdsl.distance(RUN, RUN, **unknown),
+    "Model.sensitivity": lambda **unknown: hsdsl.load(BALL).sensitivity("c", **unknown),
+    "Model.orbit": lambda **unknown: hsdsl.load(BALL).orbit("h = 0", **unknown),
+    "Execution.plot": RUN.plot,
+    "hsdsl.plot.plot": lambda **unknown: plot(RUN, "picture.png", **unknown),
+    "hsdsl.exact.precise": lambda **unknown: hsdsl.exact.precise(hsdsl.load(BALL), **unknown),
+}
+
+
+def public_functions():
+    """What the page on Python documents and has no `**arguments`, by name."""
+    from writing.python_api import MADE, SECTIONS
+
+    for name, members in (pair for pairs in SECTIONS.values() for pair in pairs):
+        module, _, last = name.rpartition(".")
+        thing = getattr(importlib.import_module(module), last)
+        if not isinstance(thing, type):
+            yield name, thing
+            continue
+        shown = vars(thing) if members == "*" else members.split()
+        found = ((key, vars(thing)[key]) for key in shown if not key.startswith("_"))
+        yield from ((f"{last}.{key}", value) for key, value in found if inspect.isfunction(value))
+        if name in MADE:
+            yield name, thing
+
+
+def named(function):
+    """Whether a function has a name for each of its arguments."""
+    return inspect.Parameter.VAR_KEYWORD not in [p.kind for p in inspect.signature(function).parameters.values()]
+
+
+CALLS = {name: function for name, function in public_functions() if named(function)} | HANDED_ON
+
+
+@pytest.mark.parametrize("name", CALLS)
+def test_an_argument_that_does_not_exist_is_a_usage_error(name):
+    with pytest.raises(UsageError, match="has no argument 'not_one'"):
+        CALLS[name](not_one=1)
+
+
+def test_what_stands_in_the_file_is_no_argument():
+    with pytest.raises(UsageError) as raised:
+        hsdsl.load(BALL).simulate(inputs={"u": 1})
+    assert "in the file" in str(raised.value.hint)
