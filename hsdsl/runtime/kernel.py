@@ -14,7 +14,7 @@ from hsdsl import limits
 from hsdsl.program import Program
 from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import NoCompiler, TooSlow
-from hsdsl.runtime.library import LOOP, is_kept, load
+from hsdsl.runtime.library import LOOP, is_kept, load, loop
 
 SYMBOL = "hs_the_model"
 
@@ -35,8 +35,7 @@ def runtime() -> ctypes.CDLL:
 
 @cache
 def _runtime() -> ctypes.CDLL:
-    text, symbol = LOOP
-    library = load(text, symbol, lambda: [text])
+    library = loop()
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
     library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64

@@ -67,6 +67,18 @@ def ship(folder: Path) -> Path:
     return library
 
 
+def loop() -> ctypes.CDLL:
+    """Load the loop: that of this package, or what is compiled at first use.
+
+    Raises
+    ------
+    NoCompiler
+        There is no compiler, or it fails.
+    """
+    text, symbol = LOOP
+    return load(text, symbol, lambda: [text])
+
+
 def _shipped(content: str) -> Path:
     """Where a library would be that came with this package."""
     return SHIPPED / f"{key_of(content, _our_text(), _OPTIONS, _processor())}.so"
