@@ -65,7 +65,7 @@ experiment: {{until: 1}}
     return bound
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(EXPRESSIONS, EXPRESSIONS, POINTS)
 def test_floats_agree_with_forty_digits(flow, guard, point):
     quick, exact = kernels(flow, guard)
@@ -79,7 +79,7 @@ def test_floats_agree_with_forty_digits(flow, guard, point):
     assert quick.resets[0](*point)[1] == point[1]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(EXPRESSIONS, EXPRESSIONS, POINTS)
 def test_gradients_are_the_slopes_of_surfaces_and_rates_follow_the_flow(flow, guard, point):
     _, exact = kernels(flow, guard)

@@ -140,7 +140,7 @@ LATER = {
         "a: 1, b: 0, c: 0",
         "1e4",
     ),
-    "a decay that grows with time": ("{x: -1e3*t*(x - cos(t))}", "x: 1", "100"),
+    "a decay that grows with time": ("{x: -2e3*t*(x - cos(t))}", "x: 1", "30"),
     "kinked, and a decay that grows": ("{x: -1e3*y*(x - abs(cos(y))), y: 1}", "x: 1, y: 0", "100"),
 }
 FAST = """
