@@ -12,8 +12,6 @@ import pytest
 
 from hsdsl.cli import main
 
-MODELS = Path(__file__).parents[2] / "models"
-
 
 @dataclass(frozen=True)
 class Answer:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import pytest
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.store import load
 
-MODELS = Path(__file__).parents[2] / "models"
 THERMOSTAT, QUADRANTS = MODELS / "thermostat.yaml", MODELS / "digital-control.yaml"
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from engines import needs_compiler
+from shipped import MODELS
 
-MODELS = Path(__file__).parents[2] / "models"
 BALL = MODELS / "thermostat.yaml"
 ODD = """hsdsl: 1
 title: Schwingung \u00fc

@@ -12,9 +12,9 @@ import time
 from pathlib import Path
 
 import pytest
+from shipped import MODELS
 from signals import interruptible
 
-MODELS = Path(__file__).parents[2] / "models"
 BALL = str(MODELS / "bouncing-ball.yaml")
 START = """
 import os

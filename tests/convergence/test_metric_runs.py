@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.model.distances import distance_of_runs as distance
 
-MODELS = Path(__file__).parents[2] / "models"
 EPS = 1e-9
 SIZES = [1e-1, 1e-3, 1e-6]
 

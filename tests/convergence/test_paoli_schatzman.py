@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from references.impact_oscillator import Motion, exact_example_1, exact_example_2
+from shipped import MODELS
 
 import hsdsl
-
-MODELS = Path(__file__).parents[2] / "models"
 
 
 def error(example: int, step: float) -> float:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 from export.c_builds import COMPILERS, OF_PACKAGES, USING, built, exported, output
-from shipped import assert_golden
+from shipped import MODELS, assert_golden
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -20,7 +20,6 @@ from hsdsl.export.c.readme import MEASURED, SMALL, SMALL_MEASURED
 from hsdsl.export.c.sources import COMPILED, c_sources
 from hsdsl.report import as_json
 
-MODELS = Path(__file__).parents[2] / "models"
 FAST = {"bouncing-ball", "thermostat", "digital-control"}
 # the fast ones by every compiler, of the others one in turn; all in a campaign
 EACH = [

@@ -10,6 +10,7 @@ from pathlib import Path
 from zipfile import ZipFile, is_zipfile
 
 import pytest
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.cli.export import only_text
@@ -18,7 +19,6 @@ from hsdsl.errors import UsageError
 from hsdsl.export import TARGETS, files_of, source_of, write
 from hsdsl.export.identifiers import identifiers
 
-MODELS = Path(__file__).parents[2] / "models"
 BALL = str(MODELS / "bouncing-ball.yaml")
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from export.c_builds import COMPILERS, USING, WARNINGS
-from shipped import assert_golden
+from shipped import MODELS, assert_golden
 
 import hsdsl
 from hsdsl.execution.run import Execution
@@ -30,7 +30,6 @@ from fmpy.validation import validate_fmu  # noqa: E402
 pytestmark = pytest.mark.exports
 
 STANDARD = Path(fmpy.__file__).parent / "c-code"  # the headers of both versions
-MODELS = Path(__file__).parents[2] / "models"
 NAMES = [path.stem for path in sorted(MODELS.glob("*.yaml"))]
 VERSIONS = (2, 3)
 BALL = """

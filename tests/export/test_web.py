@@ -21,7 +21,7 @@ from export.web_pages import (
     parts,
     typed,
 )
-from shipped import assert_golden
+from shipped import MODELS, assert_golden
 
 import hsdsl
 from hsdsl.cli.verbs import obey
@@ -34,7 +34,6 @@ from hsdsl.model import Model
 from hsdsl.names import without_memory
 from hsdsl.report import as_json
 
-MODELS = Path(__file__).parents[2] / "models"
 CONFORMANCE = Path(__file__).parents[1] / "conformance" / "cases"
 # inputs of each kind, linear switches of time, derived parameters, and settings that follow parameters
 FOLLOWING = """

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.lint import Selection, lint
 
-MODELS = Path(__file__).parents[2] / "models"
 METHODS = ["taylor", "dopri5", "radau"]
 ENGINES = ["python", "c"]
 

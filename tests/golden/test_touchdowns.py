@@ -3,13 +3,11 @@
 Tools that look for events one at a time, or wait a moment behind each, lose the second foot here.
 """
 
-from pathlib import Path
-
 import pytest
+from shipped import MODELS
 
 import hsdsl
 
-MODELS = Path(__file__).parents[2] / "models"
 FALLING = 2.3893694922225  # how fast the feet touch down
 GAPS = (1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-6, 1e-4, 1e-3)  # seconds between them
 TIE = 1e-12

@@ -5,17 +5,16 @@ from __future__ import annotations
 import pickle
 import threading
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from engines import ENGINES, alike, needs_compiler
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.model.call_cache import CallCache, call_key
 
-MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 FAST = {"scheme": "relaxed", "method": "dopri5", "tolerance": 1e-6, "until": 10}
 

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from shipped import MODELS
 
 from hsdsl import ahead
 from hsdsl.elaborate import elaborate_files
@@ -16,7 +17,6 @@ from hsdsl.errors import ModelError
 from hsdsl.files import ModelFiles
 from hsdsl.lower import lower
 
-MODELS = Path(__file__).parents[2] / "models"
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="there is no other process elsewhere")
 
 

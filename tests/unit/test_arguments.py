@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.errors import UsageError
@@ -19,7 +20,6 @@ from hsdsl.names import INVISIBLE
 from hsdsl.plot import plot
 from hsdsl.store import save
 
-MODELS = Path(__file__).parents[2] / "models"
 BALL = MODELS / "bouncing-ball.yaml"
 NUMBERS = [float("nan"), float("inf"), 1.5, "2", True, 0, -1, None, [1]]
 

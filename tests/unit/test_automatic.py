@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.model import automatic
 from hsdsl.report.summary import summary
 from hsdsl.store import load
 
-MODELS = Path(__file__).parents[2] / "models"
 ROOT = """
 hsdsl: 1
 modes: {{m: {{flow: {flow}}}}}

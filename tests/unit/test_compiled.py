@@ -9,10 +9,10 @@ import signal
 import subprocess
 import threading
 import time
-from pathlib import Path
 
 import pytest
 from engines import assert_engines_agree, needs_compiler
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.elaborate import elaborate
@@ -22,7 +22,6 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.compiler import FLAGS, find_compiler
 from hsdsl.simulate import output_buffers
 
-MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 
 

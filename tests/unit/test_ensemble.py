@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from pathlib import Path
 
 import numpy as np
 import pytest
 from engines import ENGINES, needs_compiler
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.elaborate import elaborate
@@ -18,7 +18,6 @@ from hsdsl.execution.records import same
 from hsdsl.model import Model
 from hsdsl.simulate import output_buffers
 
-MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 FAST = {"method": "dopri5", "tolerance": 1e-6, "until": 12}
 

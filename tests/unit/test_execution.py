@@ -7,18 +7,17 @@ import math
 import pickle
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import hand_made
 import numpy as np
 import pytest
+from shipped import MODELS
 
 import hsdsl
 from hsdsl import decimals
 from hsdsl.errors import UsageError
 from hsdsl.execution import Stop
 
-MODELS = Path(__file__).parents[2] / "models"
 FIFTY = decimals.context_of(50)
 
 # t, side, mode, j, kind, state

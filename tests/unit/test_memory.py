@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from engines import ENGINES, needs_compiler
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.limits import Limits
 from hsdsl.simulate import output_buffers
 
-MODELS = Path(__file__).parents[2] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 LONG = {
     "located": {"step": 1e-12, "method": "dopri5"},

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.errors import UsageError
@@ -15,7 +14,6 @@ from hsdsl.metrics.points import SpacePoint, distance, distances
 from hsdsl.metrics.socp import solve
 from hsdsl.metrics.space import make_space
 
-MODELS = Path(__file__).parents[2] / "models"
 QUADRANTS = {"D0": (-1, -1), "D1": (-1, 1), "D2": (1, -1), "D3": (1, 1)}
 OSCILLATOR = "oscillator-with-stop-1"
 

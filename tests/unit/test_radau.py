@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import mpmath as mp
@@ -21,7 +20,6 @@ from hsdsl.integrators.newton import NoConvergence
 from hsdsl.integrators.radau import radau_stepper
 
 MANY = multiprecision(50)
-MODELS = Path(__file__).parents[2] / "models"
 
 
 def model(flow: str, initial: str, until: Any = 1, transitions: str = "") -> Any:

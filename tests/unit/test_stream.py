@@ -13,12 +13,12 @@ from pathlib import Path
 
 import pytest
 from engines import needs_compiler
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.simulate import output_buffers
 
-MODELS = Path(__file__).parents[2] / "models"
 CASES = Path(__file__).parents[1] / "conformance" / "cases"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 LONG = {"scheme": "relaxed", "method": "midpoint", "max_transitions": 10**9}

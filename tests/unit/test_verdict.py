@@ -3,14 +3,13 @@
 import math
 import textwrap
 import warnings
-from pathlib import Path
 
 import pytest
 from engines import needs_compiler
+from shipped import MODELS
 
 import hsdsl
 
-MODELS = Path(__file__).parents[2] / "models"
 # A mass thrown up from 0 at speed v turns at v**2/2 after v seconds; a clock s beside it.
 THROW = """
 hsdsl: 1
