@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from conftest import MODELS
+from shipped import MODELS
 
 import hsdsl
 

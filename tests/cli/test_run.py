@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
-from cli.conftest import MODELS
+from shipped import MODELS
 from signals import interruptible
 
 BALL = """

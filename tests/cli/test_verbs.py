@@ -9,8 +9,8 @@ import sys
 import tomllib
 
 import pytest
-from cli.conftest import MODELS
 from engines import COMPILER
+from shipped import MODELS
 
 import hsdsl
 from hsdsl.cli.verbs import VERBS

@@ -90,10 +90,9 @@ CASES = [
 
 @pytest.mark.parametrize("scheme", ["relaxed", "located"])
 @pytest.mark.parametrize(("text", "values", "theorem", "says"), [c[1:] for c in CASES], ids=[c[0] for c in CASES])
-def test_verdict(tmp_path, scheme, text, values, theorem, says):
-    file = tmp_path / "model.yaml"
-    file.write_text(textwrap.dedent(text).format(scheme=scheme, **values))
-    verdict = hsdsl.load(file).simulate(relaxation=1e-12 if text is not BALL else None).verdict
+def test_verdict(scheme, text, values, theorem, says):
+    model = hsdsl.loads(textwrap.dedent(text).format(scheme=scheme, **values))
+    verdict = model.simulate(relaxation=1e-12 if text is not BALL else None).verdict
     assert verdict.theorem in theorem
     assert any(says in reason for reason in verdict.reasons), verdict
     assert verdict.theorem in ("holds", "unknown", "left")
@@ -160,11 +159,10 @@ NOT_TO_RELY_ON = {
 
 @pytest.mark.parametrize("method", ["dopri5", "taylor"])
 @pytest.mark.parametrize(("modes", "start", "until", "says"), NOT_TO_RELY_ON.values(), ids=NOT_TO_RELY_ON)
-def test_a_run_not_to_rely_on_is_unknown(tmp_path, modes, start, until, says, method):
-    file = tmp_path / "model.yaml"
-    file.write_text(f"hsdsl: 1\nmodes: {{{modes}}}\ninitial: {{mode: m, {start}}}\nexperiment: {{until: {until}}}\n")
+def test_a_run_not_to_rely_on_is_unknown(modes, start, until, says, method):
+    text = f"hsdsl: 1\nmodes: {{{modes}}}\ninitial: {{mode: m, {start}}}\nexperiment: {{until: {until}}}\n"
     try:
-        run = hsdsl.load(file).simulate(method=method)
+        run = hsdsl.loads(text).simulate(method=method)
     except hsdsl.UsageError:  # a kinked flow has no Taylor series
         return
     if not run.stop.complete:  # as where there is no series at the start
@@ -176,13 +174,12 @@ def test_a_run_not_to_rely_on_is_unknown(tmp_path, modes, start, until, says, me
 @pytest.mark.parametrize("method", ["dopri5", "taylor", "radau", "dop853"])
 @pytest.mark.parametrize("clock", ["t", "s"])
 @pytest.mark.parametrize(("middle", "width"), [(57.3, 0.3), (33.3, 0.03), (4.44, 0.003)])
-def test_a_pulse_is_integrated_or_named(tmp_path, middle, width, clock, method):
-    file = tmp_path / "model.yaml"
-    file.write_text(
+def test_a_pulse_is_integrated_or_named(middle, width, clock, method):
+    text = (
         f"hsdsl: 1\nmodes: {{m: {{flow: {{s: 1, x: exp(-(({clock} - {middle})/{width})**2)}}}}}}\n"
         f"initial: {{mode: m, s: 0, x: 0}}\nexperiment: {{until: 100, method: {method}}}\n"
     )
-    run = hsdsl.load(file).simulate()
+    run = hsdsl.loads(text).simulate()
     right = abs(run.final["x"] - width * math.sqrt(math.pi)) < 1e-6 * width
     assert right or run.verdict.theorem == "unknown"
 
@@ -212,36 +209,33 @@ NARROW = [("cos(s - 3.76)**400 >= 0.41", 12), ("exp(-((s - 7.7)/0.02)**2) >= 1/2
 @pytest.mark.parametrize("method", ["dopri5", "taylor", "radau"])
 @pytest.mark.parametrize("scheme", ["located", "relaxed"])
 @pytest.mark.parametrize(("when", "until"), NARROW)
-def test_a_narrow_visit_is_found_or_named(tmp_path, when, until, scheme, method):
-    file = tmp_path / "model.yaml"
-    file.write_text(
+def test_a_narrow_visit_is_found_or_named(when, until, scheme, method):
+    text = (
         f"hsdsl: 1\nmodes: {{m: {{flow: {{s: 1}}, transitions: [{{when: '{when}', to: n}}]}}, n: {{flow: {{s: 1}}}}}}\n"
         f"initial: {{mode: m, s: 0}}\nexperiment: {{until: {until}, scheme: {scheme}, method: {method}}}\n"
     )
-    run = hsdsl.load(file).simulate()
+    run = hsdsl.loads(text).simulate()
     assert run.transitions or run.verdict.theorem == "unknown", run.verdict
 
 
-def test_a_surface_passed_while_its_condition_is_false_is_named(tmp_path):
-    file = tmp_path / "model.yaml"
-    file.write_text(
+def test_a_surface_passed_while_its_condition_is_false_is_named():
+    text = (
         "hsdsl: 1\nmodes: {m: {flow: {x: 1}, transitions: [{when: x >= 1, if: x >= 5, to: n}]}, n: {flow: {x: 1}}}\n"
         "initial: {mode: m, x: 0}\nexperiment: {until: 3}\n"
     )
-    run = hsdsl.load(file).simulate()
+    run = hsdsl.loads(text).simulate()
     assert run.verdict.theorem == "holds"
     assert any("was passed at t = 1 while its `if` was false" in reason for reason in run.verdict.reasons)
 
 
 @pytest.mark.parametrize("scale", [1e-12, 1e-6, 1e6, 1e12])
-def test_verdicts_do_not_depend_on_units(tmp_path, scale):
-    file = tmp_path / "model.yaml"
-    file.write_text(
+def test_verdicts_do_not_depend_on_units(scale):
+    text = (
         f"hsdsl: 1\nmodes: {{m: {{flow: {{x: v, v: -x}}, transitions: [{{when: x >= {scale}/2, to: m, "
         "reset: {v: -v/2}}]}}\n"
         f"initial: {{mode: m, x: 0, v: {scale}}}\nexperiment: {{until: 3}}\n"
     )
-    run = hsdsl.load(file).simulate()
+    run = hsdsl.loads(text).simulate()
     assert len(run.transitions) == 1
     assert run.verdict.theorem == "holds", run.verdict
 
