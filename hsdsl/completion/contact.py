@@ -89,12 +89,12 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived or edge.of_event:
         return None
     near = Nearby(mode, edge, mode_of_part(edge, numbers))
+    if any(mode.states[i] in numbers for i in near.changed):
+        return None
     near = branched(near) if near.changed and near.is_small() else near
     if near is None:
         return None
     near = near.without(counts) if (counts := counts_of(near)) else near
-    if any(mode.states[i] in numbers for i in near.changed):
-        return None
     constrained = _constrained(near) if near.changed and near.is_small() else None
     if constrained is None:
         return None
