@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import copysign
@@ -44,6 +44,11 @@ def number_text(value: float, nan: str, infinity: str, finite: Callable[[float],
         return nan
     text = infinity if abs(value) == float("inf") else finite(abs(value))
     return f"(-{text})" if copysign(1, value) < 0 else text
+
+
+def stored(values: Iterable[str]) -> list[str]:
+    """Statements that hand values back in an array ``out``."""
+    return [f"out[{i}] = {value};" for i, value in enumerate(values)]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@
 `surface_polynomials`   surfaces along a step; `root_isolation` finds where polynomials change sign
 `interpolation`         how functions are interpolated, and how finely
 `touching`              guards that are only reached, and have no flow beyond
-`sticking`, `zeno`      rest on a guard, and Zeno tails that end in it (M11)
+`contact`, `zeno`       rest on a guard, and Zeno tails that end in it (M11)
 `entry`, `cascade`      entering a mode, where transitions may fire at once; transitions at one instant
 `surfaces`              round-off, depth, and where a step crossed a surface
 `control`, `scales`     the step size, and what errors are held against

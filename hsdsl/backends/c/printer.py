@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from hsdsl.backends.printer import C_OPERATORS, Language, number_text
+from hsdsl.backends.printer import C_OPERATORS, Language, number_text, stored
 
 
 def literal(value: float) -> str:
@@ -19,14 +19,10 @@ def constant(value: float) -> str:
     return text if text.endswith(("NAN", "INFINITY", "INFINITY)")) else f"((hs_real){text.strip('()')})"
 
 
-def _results(values: Sequence[str]) -> list[str]:
-    return [f"out[{i}] = {value};" for i, value in enumerate(values)]
-
-
 C = Language(
     literal=constant,
     assign="const hs_real {name} = {value};",
-    results=_results,
+    results=stored,
     divide="hs_div({left}, {right}, &bad)",
     choose="({test} ? {body} : {other})",
     call="hs_{name}({arguments}, &bad)",
@@ -45,25 +41,3 @@ def function_body(definition: ast.FunctionDef, names: Mapping[str, str]) -> str:
         The text is not of the language of routines.
     """
     return "\n".join(f"  {line}" for line in C.body(definition, names))
-
-
-def expression_of(node: ast.expr, names: Mapping[str, str]) -> str:
-    """Print the tree of one expression of the language of routines.
-
-    Raises
-    ------
-    ValueError
-        It is none.
-    """
-    return C.expression_of(node, names)
-
-
-def expression(text: str, names: Mapping[str, str]) -> str:
-    """Print one expression of the language of routines.
-
-    Raises
-    ------
-    ValueError
-        It is none.
-    """
-    return C.expression(text, names)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from textwrap import dedent
 
 from hsdsl.backends.c.pieces import LARGE, Assignment, pieces
-from hsdsl.backends.c.printer import expression_of, function_body
+from hsdsl.backends.c.printer import C, function_body
 
 _FUNCTION = """\
 static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
@@ -107,7 +107,7 @@ def _assignments(definition: ast.FunctionDef, names: dict[str, str]) -> tuple[li
 
     def add(target: str, value: ast.expr) -> None:
         used = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
-        found.append(Assignment(target, expression_of(value, names), [own[name] for name in used & own.keys()]))
+        found.append(Assignment(target, C.expression_of(value, names), [own[name] for name in used & own.keys()]))
 
     *statements, last = definition.body
     for i, statement in enumerate(statements):

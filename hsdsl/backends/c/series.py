@@ -11,7 +11,7 @@ from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from itertools import chain
 
 from hsdsl.backends.c.pieces import LARGE, Assignment, pieces
-from hsdsl.backends.c.printer import expression
+from hsdsl.backends.c.printer import C
 from hsdsl.backends.c.shared import arrays, shared, statements
 from hsdsl.backends.tape import Language, coefficient_of, value_of
 from hsdsl.program import Tape
@@ -174,7 +174,7 @@ def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], 
         operation = tape.operations[i - first]
         names = {f"n{line}": name(line) for line in operation.lines}
         names[f"c{operation.constant}"] = f"c[{operation.constant}]"
-        found.append((i, expression(value_of(operation, language), names)))
+        found.append((i, C.expression(value_of(operation, language), names)))
     return found
 
 

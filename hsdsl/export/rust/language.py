@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
-from hsdsl.backends.printer import C_OPERATORS, Language, number_text
+from hsdsl.backends.printer import C_OPERATORS, Language, number_text, stored
 
 
 def literal(value: float) -> str:
@@ -32,19 +32,11 @@ def numbers(values: Iterable[float]) -> str:
     return array(literal(float(value)) for value in values)
 
 
-def _results(values: Sequence[str]) -> list[str]:
-    return [f"out[{i}] = {value};" for i, value in enumerate(values)]
-
-
-def _conditions(values: Sequence[str]) -> list[str]:
-    return [f"out[{i}] = truth({value});" for i, value in enumerate(values)]
-
-
 def _language(condition: bool) -> Language:
     return Language(
         literal=literal,
         assign="let {name} = {value};",
-        results=_conditions if condition else _results,
+        results=(lambda values: stored(f"truth({value})" for value in values)) if condition else stored,
         divide="div({left}, {right}, &mut bad)",
         choose="(if {test} {{ {body} }} else {{ {other} }})",
         call="f_{name}({arguments}, &mut bad)",
