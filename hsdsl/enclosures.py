@@ -234,10 +234,7 @@ def _below(number: Any, bound: Any, one: Any, other: Any) -> Range:
     never: Any = s.low >= c.high
     surely: Any = s.high < c.low
     least, most = np.minimum(a.low, b.low), np.maximum(a.high, b.high)
-    return Range(
-        np.select([never, surely], [b.low, a.low], least),
-        np.select([never, surely], [b.high, a.high], most),
-    )
+    return Range(np.select([never, surely], [b.low, a.low], least), np.select([never, surely], [b.high, a.high], most))
 
 
 def _step(function: Callable[[Any], Any]) -> Callable[[Any], Range]:

@@ -36,12 +36,7 @@ def rule_index() -> str:
     parts = [LINT_RULES]
     for name in FAMILIES:
         rows = [
-            (
-                f"[`{code}`](rules/{name}.md#{code.lower()}-{rule.name})",
-                rule.name,
-                titles()[code],
-                rule.severity,
-            )
+            (f"[`{code}`](rules/{name}.md#{code.lower()}-{rule.name})", rule.name, titles()[code], rule.severity)
             for code, rule in RULES.items()
             if family(code) == name
         ]

@@ -47,8 +47,7 @@ def compile_tape(tape: Tape, dimension: int, arithmetic: Arithmetic, name: str) 
     def bind(data: Sequence[Number]) -> Taylor:
         of_flow, of_surfaces = constants(*data)
         return Taylor(
-            _bound(namespace["flow_of"], (of_flow,)),
-            _bound(namespace["surfaces_of"], (of_flow, of_surfaces)),
+            _bound(namespace["flow_of"], (of_flow,)), _bound(namespace["surfaces_of"], (of_flow, of_surfaces))
         )
 
     return bind

@@ -11,12 +11,7 @@ from hsdsl.names import counted
 from hsdsl.written import written_edges, written_modes
 
 
-def validate(
-    models: Models,
-    *,
-    format: Formatted = "text",
-    answer: Answer,
-) -> None:
+def validate(models: Models, *, format: Formatted = "text", answer: Answer) -> None:
     """Check model files and report every error in them."""
     report = DiagnosticReport("json" if answer.json else format, answer.quiet, "valid")
     with answer.reporting():

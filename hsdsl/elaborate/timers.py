@@ -26,10 +26,7 @@ def with_timers(system: HybridSystem) -> HybridSystem:
         start = replace(start, written=(*start.written, (SINCE, ZERO)) if start.written else ())
     unit = {SINCE: system.units["t"]} if "t" in system.units else {}
     return replace(
-        system,
-        modes=tuple(_mode(mode, timed, own) for mode in system.modes),
-        initial=start,
-        units=system.units | unit,
+        system, modes=tuple(_mode(mode, timed, own) for mode in system.modes), initial=start, units=system.units | unit
     )
 
 

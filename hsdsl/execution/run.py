@@ -317,10 +317,7 @@ class Execution(Deferred):
         return self.rows().only(self.shown).to_pandas()
 
     def save(
-        self,
-        path: str | os.PathLike[str],
-        samples: Any | None = None,
-        columns: Sequence[str] | None = None,
+        self, path: str | os.PathLike[str], samples: Any | None = None, columns: Sequence[str] | None = None
     ) -> tuple[Path, ...]:
         """Save to ``.npz`` (everything, without loss), or to ``.csv`` or ``.parquet`` (a table, with a JSON
         sidecar).

@@ -119,9 +119,5 @@ def _equals(text: str, at: int, expected: Expected) -> ExpressionError:
     for wrong, right in (("=>", ">="), ("=<", "<=")):
         if text.startswith(wrong, at):
             return ExpressionError("HS107", f"`{wrong}` is not an inequality", at, at + 2, f"write `{right}`")
-    hint = {
-        "number": "write the right-hand side alone",
-        "condition": "write `==`",
-        "inequality": "write `>=` or `<=`",
-    }[expected]
-    return ExpressionError("HS107", "`=` has no meaning in an expression", at, at + 1, hint)
+    hints = {"number": "write the right-hand side alone", "condition": "write `==`", "inequality": "write `>=` or `<=`"}
+    return ExpressionError("HS107", "`=` has no meaning in an expression", at, at + 1, hints[expected])

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.optimize import (  # pyright: ignore[reportMissingTypeStubs]
-    least_squares,  # pyright: ignore[reportUnknownVariableType]
-)
+from scipy.optimize import least_squares  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array

@@ -133,12 +133,7 @@ def no_distance(cells: Cells, metric: str, status: str = CERTIFIED) -> CurveDist
 
 
 def curve_distance(
-    found: Supremum,
-    cells: Cells,
-    metric: str,
-    gap: float,
-    budget: Budget,
-    status: str = CERTIFIED,
+    found: Supremum, cells: Cells, metric: str, gap: float, budget: Budget, status: str = CERTIFIED
 ) -> CurveDistance:
     """Say what a supremum means."""
     notes = [cells.note]

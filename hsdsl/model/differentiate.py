@@ -62,11 +62,7 @@ class Differentiator:
             ready, run = self._run(self._with_entries(ready))
         self._prepared.keep(key, ready)
         return Sensitivity(
-            ready.labels,
-            run,
-            ready.setting,
-            firsts,
-            lambda first: self.sensitivity(wrt, arguments, first),
+            ready.labels, run, ready.setting, firsts, lambda first: self.sensitivity(wrt, arguments, first)
         )
 
     def of_run(self, arguments: Mapping[str, Any], wrt: str | Sequence[str]) -> Sensitivity:

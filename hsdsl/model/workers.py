@@ -60,9 +60,7 @@ def run_compiled(
 
 
 def run_in_turn(
-    runs: Sequence[Callable[[], Execution]],
-    record: Callable[[int, Execution], None],
-    progress: Progress | None,
+    runs: Sequence[Callable[[], Execution]], record: Callable[[int, Execution], None], progress: Progress | None
 ) -> None:
     """Run all instances one after the other and record each; at Ctrl-C those that are done are kept."""
     try:

@@ -91,8 +91,7 @@ class InputFile(Document):
     """An input given by samples in a CSV file."""
 
     file: Label = required(
-        "A CSV file with a column `time`, by its path from the model's own folder, inside it.",
-        "u.csv",
+        "A CSV file with a column `time`, by its path from the model's own folder, inside it.", "u.csv"
     )
     column: Label | None = optional("The name of its column with the values. Left out, the name of the input.", "u (V)")
     hold: Hold = optional(_HOLD, "linear", default="zero")
@@ -160,9 +159,7 @@ class TransitionDocument(Document):
         default="trigger",
     )
     persistent: Flag = optional(
-        "With `event`: whether the transition is made even if its condition turns false before.",
-        False,
-        default=True,
+        "With `event`: whether the transition is made even if its condition turns false before.", False, default=True
     )
     waiting: Whole = optional(
         "With `delay`: how many executions can wait at a time, at most 100. One more ends the run.", 8, default=4

@@ -122,12 +122,7 @@ class ThreadWorkspace:
     """One thread's memory."""
 
     def __init__(
-        self,
-        plan: CompiledPlan,
-        names: tuple[str, ...],
-        layouts: StateLayouts,
-        samples: int,
-        log_room: int,
+        self, plan: CompiledPlan, names: tuple[str, ...], layouts: StateLayouts, samples: int, log_room: int
     ) -> None:
         self.table = structures.Ensemble()
         self.workspace = plan.workspaces.new(self.table.task)

@@ -28,10 +28,7 @@ _TABLES = {".csv": write_csv, ".parquet": write_parquet}
 
 @checks_arguments
 def save(
-    execution: Execution,
-    path: str | os.PathLike[str],
-    samples: Any | None = None,
-    columns: Sequence[str] | None = None,
+    execution: Execution, path: str | os.PathLike[str], samples: Any | None = None, columns: Sequence[str] | None = None
 ) -> tuple[Path, ...]:
     """Save an execution; see :meth:`hsdsl.execution.Execution.save`."""
     target = Path(path)

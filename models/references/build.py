@@ -36,11 +36,7 @@ DIGITS = 9  # that a solution by series and the relaxed scheme must agree to
 REFERENCES: dict[str, tuple[Callable[[], Execution], ...]] = {
     "bouncing-ball": (bouncing_ball,),
     "constrained-pendulum": (constrained_pendulum,),
-    "digital-control": (
-        digital_control,
-        lambda: digital_control("-1.1", -1),
-        lambda: digital_control(-1, "-1.1"),
-    ),
+    "digital-control": (digital_control, lambda: digital_control("-1.1", -1), lambda: digital_control(-1, "-1.1")),
     "oscillator-with-stop-1": (lambda: oscillator(1),),
     "oscillator-with-stop-2": (lambda: oscillator(2),),
     "pronking-runner": (pronking_runner, lambda: pronking_runner("-0.4")),

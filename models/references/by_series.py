@@ -21,13 +21,7 @@ ORDERED = mp.mpf(10) ** -25  # ends as near as this are one, whichever order sim
 
 
 def by_series(
-    name: str,
-    title: str,
-    modes: Mapping[str, Mode],
-    mode: str,
-    start: Sequence[Any],
-    until: Any,
-    step: str,
+    name: str, title: str, modes: Mapping[str, Mode], mode: str, start: Sequence[Any], until: Any, step: str
 ) -> Execution:
     """Solve a system twice, with a step and with half of it, and cut the finer solution into pieces.
 

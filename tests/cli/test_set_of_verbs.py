@@ -20,10 +20,7 @@ def shown(answer):
     return {key: value for key, value in answer.json.items() if key not in ("seconds", "overrides", "call")}
 
 
-@pytest.mark.parametrize(
-    ("verb", "words"),
-    [("run", ()), ("sensitivity", ("--wrt", "e"))],
-)
+@pytest.mark.parametrize(("verb", "words"), [("run", ()), ("sensitivity", ("--wrt", "e"))])
 @pytest.mark.parametrize(
     ("setting", "option"), [("tolerance=1e-5", "--tolerance"), ("method=dopri5", "--method"), ("until=0.9", "--until")]
 )

@@ -50,10 +50,7 @@ def test_a_sweep_that_has_no_picture_is_summarised(command, model, tmp_path):
         ([], "expected a model, or --show DIR"),
         (["MODEL"], "expected --vary"),
         (["MODEL", "--vary", "rate=1"], "expected --out DIR"),
-        (
-            ["MODEL", "--vary", "rat=1", "--out", "OUT"],
-            "initial value 'rat'\n  hint: did you mean 'rate'",
-        ),
+        (["MODEL", "--vary", "rat=1", "--out", "OUT"], "initial value 'rat'\n  hint: did you mean 'rate'"),
         (["MODEL", "--vary", "rate=1:x:3", "--out", "OUT"], "--vary rate"),
         (["MODEL", "--vary", "rate=1", "--out", "OUT", "--record", "all"], "--record"),
         (["MODEL", "--vary", "rate=1", "--out", "OUT", "--plot", "p.pdf"], "the name must end in .png or .svg"),

@@ -104,10 +104,7 @@ def test_corollary_28_bounds_the_error_by_the_sum(name, method):
             assert found <= 1.25 * (delayed * eps + alone * h**order), (h, eps, found)
 
 
-ZENO = {
-    "past the first point": (5.5, np.logspace(-4, -6, 3)),
-    "past both": (12.5, np.logspace(-4, -8, 5)),
-}
+ZENO = {"past the first point": (5.5, np.logspace(-4, -6, 3)), "past both": (12.5, np.logspace(-4, -8, 5))}
 
 
 @pytest.mark.parametrize("case", also_slow(["past the first point"], ["past both"]))

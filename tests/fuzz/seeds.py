@@ -8,11 +8,7 @@ from pathlib import Path
 from shipped import bad_models
 
 TESTS = Path(__file__).resolve().parents[1]
-FOLDERS = (
-    TESTS.parent / "models",
-    TESTS / "conformance" / "cases",
-    TESTS / "fuzz" / "crashes",
-)
+FOLDERS = (TESTS.parent / "models", TESTS / "conformance" / "cases", TESTS / "fuzz" / "crashes")
 CANARY = "hsdsl_canary"
 
 # each would leave a file or an attribute called CANARY behind if anything evaluated it

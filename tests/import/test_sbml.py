@@ -114,11 +114,7 @@ CASES = {
         {"A": 2 * exp(-1), "B": 2 - 2 * exp(-1)},
     ),
     "a compartment that grows dilutes": (
-        model(
-            Compartments=COMPARTMENT.format("false"),
-            Species=SPECIES.format("A", 4),
-            Rules=rate("C", "1"),
-        ),
+        model(Compartments=COMPARTMENT.format("false"), Species=SPECIES.format("A", 4), Rules=rate("C", "1")),
         {"A": "value", "C": "value"},
         {"A": 1, "C": 4},
     ),

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import re
 
-MISSING = (
-    ("hsdsl", "hsdsl: 1"),
-    ("modes", "modes: {m: {flow: {x: 1}}}"),
-    ("experiment", "experiment: {until: 1}"),
-)
+MISSING = (("hsdsl", "hsdsl: 1"), ("modes", "modes: {m: {flow: {x: 1}}}"), ("experiment", "experiment: {until: 1}"))
 FIRST_MODE = re.compile(r"^modes:\s*\{?\s*(?P<name>[\w.]+):", re.MULTILINE)
 FLOW = re.compile(r"flow:\s*(?:\{(?P<braces>.*)\}|(?P<lines>(?:\n +\w+:.*)+))")
 STATE = re.compile(r"(?:^|[,{\n])\s*(\w+):")

@@ -13,11 +13,7 @@ from hsdsl.expression.scope import Scope, state, symbol
 
 VALUES = {"x": Fraction(3, 7), "beta": Fraction(-2), "E": Fraction(5, 2)}
 SCOPE = Scope({name: state(name) for name in VALUES})
-LEAVES = st.one_of(
-    st.integers(0, 99).map(str),
-    st.decimals(0, 10, places=2).map(str),
-    st.sampled_from(sorted(VALUES)),
-)
+LEAVES = st.one_of(st.integers(0, 99).map(str), st.decimals(0, 10, places=2).map(str), st.sampled_from(sorted(VALUES)))
 
 
 def grown(inner):
@@ -99,9 +95,7 @@ def test_any_bytes_are_a_model_error(data):
 
 @settings(max_examples=300, deadline=None)
 @given(
-    st.integers(0, len(MODEL)),
-    st.integers(0, 12),
-    st.text(alphabet="{}[]:,-?#&*!|>'\"%@` \n\tax1>=()+", max_size=8),
+    st.integers(0, len(MODEL)), st.integers(0, 12), st.text(alphabet="{}[]:,-?#&*!|>'\"%@` \n\tax1>=()+", max_size=8)
 )
 def test_any_damage_to_a_model_is_a_model_error(at, length, inserted):
     damaged = MODEL[:at] + inserted + MODEL[at + length :]

@@ -96,8 +96,7 @@ ALL = [path.stem for path in sorted(Path("models/gallery").glob("*.yaml"))]
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.slow if name in GALLERY else pytest.mark.campaign) for name in ALL],
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in GALLERY else pytest.mark.campaign) for name in ALL]
 )
 def test_gallery(name: str) -> None:
     """Scenes whose derivatives exist, by all parameters; each number relative to the largest of its kind."""
@@ -281,12 +280,7 @@ def test_feet_whose_order_matters() -> None:
     assert found.exists is False
     assert "lead to different states" in found.reasons[0]
     assert np.isnan(found.final.state["z"]["initial.z"])
-    left = [
-        [-0.5, -0.25, 0, 0],
-        [0.5, -0.25, 0, 0],
-        [7.3575, 6.13125, -0.5, -0.25],
-        [-2.4525, 11.03625, 0.5, -0.25],
-    ]
+    left = [[-0.5, -0.25, 0, 0], [0.5, -0.25, 0, 0], [7.3575, 6.13125, -0.5, -0.25], [-2.4525, 11.03625, 0.5, -0.25]]
     turn = np.diag([1, -1, 1, -1])
     assert np.allclose(saltation(model, "left"), left, atol=1e-9)
     assert np.allclose(saltation(model, "right"), turn @ left @ turn, atol=1e-9)

@@ -197,11 +197,7 @@ experiment: {{until: 20}}
         ("models/bouncing-ball.yaml", {"section": "bounce"}, "ever shorter"),
         (BALL.format(floor="A*sin(w*t) + A*sin(w**2*t)"), {"section": "hit"}, "without a common multiple"),
         (BALL.format(floor="A*t"), {"section": "hit"}, "outside of sines"),
-        (
-            BELT,
-            {"section": "catches_up", "settings": {"completion": "none"}},
-            "one instant only.*stops at t = 0.25",
-        ),
+        (BELT, {"section": "catches_up", "settings": {"completion": "none"}}, "one instant only.*stops at t = 0.25"),
         ("models/gallery/dry-friction.yaml", {"section": "turns_right"}, "no periodic orbit"),
         ("models/gallery/lorenz-section.yaml", {"section": "up"}, "no periodic orbit"),
     ],

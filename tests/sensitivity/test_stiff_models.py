@@ -133,13 +133,7 @@ CASES: dict[str, tuple[Any, Any, dict[str, str], str, str]] = {
         "4.9",
         "1e-9",
     ),
-    "followers": (
-        FOLLOWERS,
-        followers,
-        {"k": "3e5", "a": "1.5", "top": "0.9", "initial.x": "0.1"},
-        "0.6",
-        "1e-9",
-    ),
+    "followers": (FOLLOWERS, followers, {"k": "3e5", "a": "1.5", "top": "0.9", "initial.x": "0.1"}, "0.6", "1e-9"),
 }
 
 

@@ -121,10 +121,7 @@ def test_sizes_of_unknown_states_are_refused(model):
     ],
 )
 def test_derivatives_and_fits_are_by_one_instance(model, name, hint):
-    for call in (
-        lambda: model.sensitivity(name),
-        lambda: model.fit({"time": [0.1, 0.2], "clock.x": [1.0, 2.0]}, name),
-    ):
+    for call in (lambda: model.sensitivity(name), lambda: model.fit({"time": [0.1, 0.2], "clock.x": [1.0, 2.0]}, name)):
         with pytest.raises(UsageError, match="no parameter or initial state") as caught:
             call()
         assert caught.value.hint == hint

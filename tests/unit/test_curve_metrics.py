@@ -61,12 +61,7 @@ def strip(wait, depth, until=2.0):
 # two runs, exact rho in the plane, where it is attained
 PAIRS = {
     "straight lines": (ramp((0, 0), (2, 2)), ramp((0, 0), (2, 1)), 1.0, 2.0),
-    "other breakpoints": (
-        ramp((0, 0), (2, 2), cuts=(0.3, 1.1)),
-        ramp((0, 0.5), (1, 0), (2, 2), cuts=(0.7,)),
-        1.0,
-        1.0,
-    ),
+    "other breakpoints": (ramp((0, 0), (2, 2), cuts=(0.3, 1.1)), ramp((0, 0.5), (1, 0), (2, 2), cuts=(0.7,)), 1.0, 1.0),
     "other degrees": (ramp((0, 0), (2, 2), degree=4), ramp((0, 3), (2, 2)), 3.0, 0.0),
     "other lengths": (ramp((0, 0), (4, 4)), ramp((0, 0), (2, 1)), 1.0, 2.0),
     "a strip and none": (strip(0.25, 0.25), ramp((0, 0), (2, 2)), 0.25, None),

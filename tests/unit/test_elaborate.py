@@ -31,12 +31,7 @@ def codes(text: str) -> list[str]:
     return [d.code for d in raised.value.diagnostics]
 
 
-SIDES = [
-    ("x >= a", X - A, A - X),
-    ("x > a", X - A, A - X),
-    ("x <= a", A - X, X - A),
-    ("x < a", A - X, X - A),
-]
+SIDES = [("x >= a", X - A, A - X), ("x > a", X - A, A - X), ("x <= a", A - X, X - A), ("x < a", A - X, X - A)]
 
 
 @pytest.mark.parametrize(("text", "guard", "wall"), SIDES)

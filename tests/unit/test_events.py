@@ -86,9 +86,7 @@ def test_the_order_of_events_reached_together():
 
 def test_a_second_trigger_while_it_waits_ends_the_run():
     run = model(
-        "x: y, y: -x, n: 0",
-        "{name: e, event: x >= 1/2, delay: 9, waiting: 1, reset: {n: 1}}",
-        "x: 0, y: 1, n: 0",
+        "x: y, y: -x, n: 0", "{name: e, event: x >= 1/2, delay: 9, waiting: 1, reset: {n: 1}}", "x: 0, y: 1, n: 0"
     )
     end = run.simulate()
     assert end.stop.reason == "final" and end.final.mode == "e-waits-already"
@@ -192,12 +190,7 @@ MADE = {  # flow, transitions, initial values, and the transitions that are made
     "rests": ("x: 1, n: 0", "{name: e, event: x >= 1 and n > 0, reset: {n: 1}}", "x: 0, n: 0", []),
     "rests on": ("x: 1, n: 0", "{name: e, event: x >= 1 and n <= 0, reset: {x: x}}", "x: 0, n: 0", [("e", 1.0)]),
     "ends": ("x: 1, n: -1", "{name: e, event: x >= 1 and n >= 0, reset: {x: x}}", "x: 0, n: 1", []),
-    "changes over": (
-        "x: 1, n: -1, k: 0",
-        "{name: e, event: x < 1 or n < 0, reset: {k: 1}}",
-        "x: 0, n: 1, k: 0",
-        [],
-    ),
+    "changes over": ("x: 1, n: -1, k: 0", "{name: e, event: x < 1 or n < 0, reset: {k: 1}}", "x: 0, n: 1, k: 0", []),
     # what makes an event due may be gone when it goes: then it is armed
     "due": (
         "x: 1, n: 0",

@@ -57,9 +57,7 @@ def test_runs_that_switch_at_other_times_are_as_near_as_their_times():
 
     From there to the guard and back is 2e-3 in t, and 1e-3 in x.
     """
-    model = loaded(
-        "modes:\n  a:\n    flow: {x: 1}\n    transitions: [{when: t >= 1, to: b}]\n  b: {flow: {x: -1}}\n",
-    )
+    model = loaded("modes:\n  a:\n    flow: {x: 1}\n    transitions: [{when: t >= 1, to: b}]\n  b: {flow: {x: -1}}\n")
     runs = [model.simulate(scheme="relaxed", relaxation=eps) for eps in (1e-8, 1e-3)]
     found = between_runs(*runs, model=model)
     assert found.lower == pytest.approx(np.hypot(1e-3, 2e-3), rel=1e-4)
@@ -70,7 +68,7 @@ def test_a_sampled_input_of_too_many_samples_is_refused():
     times = ", ".join(str(k) for k in range(300))
     model = loaded(
         f"inputs: {{u: {{times: [{times}], values: [{times}], hold: zero}}}}\n"
-        "modes:\n  a:\n    flow: {x: 3}\n    transitions: [{when: x >= u, to: b}]\n  b: {flow: {x: 1}}\n",
+        "modes:\n  a:\n    flow: {x: 3}\n    transitions: [{when: x >= u, to: b}]\n  b: {flow: {x: 1}}\n"
     )
     with pytest.raises(hsdsl.UsageError, match="more than 200 samples"):
         model.distance("a x=0 t=1", "b x=400 t=1")

@@ -106,7 +106,7 @@ ONE_POINT = {
 def test_a_point_and_its_image_are_one_in_any_units(name):
     when, reset, guard, image = ONE_POINT[name]
     space = space_of(
-        f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n    transitions: [{{when: {when}, to: a, reset: {{{reset}}}}}]\n{TAIL}",
+        f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n    transitions: [{{when: {when}, to: a, reset: {{{reset}}}}}]\n{TAIL}"
     )
     found = distance(space, SpacePoint("a", guard), SpacePoint("a", image)).interval
     assert found.lower == 0
@@ -119,7 +119,7 @@ def test_a_domain_and_its_guard_may_be_tiny_or_huge(unit):
     size = float(unit)
     space = space_of(
         f"{HEAD}  a:\n    flow: {{x: u, y: u}}\n    domain: [x >= -{unit}, y >= -{unit}, y <= {unit}]\n"
-        f"    transitions: [{{when: x >= {unit}, to: a, reset: {{x: -{unit}, y: y}}}}]\n{TAIL}",
+        f"    transitions: [{{when: x >= {unit}, to: a, reset: {{x: -{unit}, y: y}}}}]\n{TAIL}"
     )
     found = distance(space, SpacePoint("a", (0.75 * size, 0)), SpacePoint("a", (-0.5 * size, 0)))
     assert found.status == "certified"
@@ -243,7 +243,7 @@ def test_runs_back_and_forth_through_one_gate_are_bounded_at_once():
         f"{HEAD}  a:\n    flow: {{x: u, y: u, z: u}}\n    domain: [y <= 1, y >= -1, z <= 1, z >= -1]\n"
         "    transitions: [{when: x >= 0, to: b, reset: {x: 0, y: 2*y, z: z/2}}]\n"
         "  b: {flow: {x: u, y: u, z: u}, domain: [y <= 2, y >= -2, z <= 2, z >= -2]}\n"
-        "initial: {mode: a, x: -1, y: 0, z: 0}\nexperiment: {until: 1}\n",
+        "initial: {mode: a, x: -1, y: 0, z: 0}\nexperiment: {until: 1}\n"
     )
     assert list(followers(space, (0,))) == [1, ~1]
     assert list(followers(space, (0, ~1))) == [0]

@@ -163,10 +163,7 @@ def test_the_centipede_walks_as_one_written_by_hand():
             return jump
 
         return [
-            (
-                (lambda t, y, i=i: y[0] - y[4 + i] - reach) if modes[i] else (lambda t, y, i=i: y[4 + i] - reach),
-                step(i),
-            )
+            ((lambda t, y, i=i: y[0] - y[4 + i] - reach) if modes[i] else (lambda t, y, i=i: y[4 + i] - reach), step(i))
             for i in range(n)
         ]
 

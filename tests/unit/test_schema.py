@@ -15,12 +15,7 @@ from hsdsl.schema import json_schema
 ROOT = Path(__file__).parent.parent.parent
 MODELS = [*ROOT.glob("models/*.yaml")]
 MODELS += [p for p in ROOT.glob("tests/conformance/cases/*.yaml") if not p.name.endswith(".expect.yaml")]
-BASE = {
-    "hsdsl": 1,
-    "modes": {"A": {"flow": {"x": 1}}},
-    "initial": {"mode": "A", "x": 0},
-    "experiment": {"until": 1},
-}
+BASE = {"hsdsl": 1, "modes": {"A": {"flow": {"x": 1}}}, "initial": {"mode": "A", "x": 0}, "experiment": {"until": 1}}
 
 
 def parts(schema):
@@ -135,11 +130,7 @@ def test_schema_and_reader_agree(change, fits):
     assert read is fits
 
 
-ONE_FAULT = {
-    "events: x > 3": "HS201",
-    "trigger: x > 3": "HS201",
-    "event: {x: 3}": "HS203",
-}
+ONE_FAULT = {"events: x > 3": "HS201", "trigger: x > 3": "HS201", "event: {x: 3}": "HS203"}
 
 
 @pytest.mark.parametrize("event", ONE_FAULT)

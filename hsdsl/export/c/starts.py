@@ -70,8 +70,5 @@ def _starts(problem: Problem) -> str:
     text += array("static int (*const", "following", pointers, ")(const hs_real *, hs_real *)")
     text += array("const char", "problem_given", (str(int(name in chosen)) for name in problem.states))
     return text + _START.format(
-        width=len(known) + 1,
-        states=len(known),
-        starts=len(problem.states),
-        followers=len(program.initial_order),
+        width=len(known) + 1, states=len(known), starts=len(problem.states), followers=len(program.initial_order)
     )

@@ -35,8 +35,7 @@ def advance(model, config, p, lane, record):
     crosses = verdict.crosses & ~lane.clear
     counts = here & ~verdict.wrong & ~verdict.failed & ~crosses
     lane = lane._replace(
-        failed_at=jnp.where(here, learnt.failed_at, lane.failed_at),
-        closer=jnp.where(here, learnt.closer, lane.closer),
+        failed_at=jnp.where(here, learnt.failed_at, lane.failed_at), closer=jnp.where(here, learnt.closer, lane.closer)
     )
     lane = lane._replace(phase=jnp.where(here & crosses, CROSS, lane.phase))
     lane = shortened(config, lane, verdict, trial, here & (verdict.wrong | verdict.failed))
