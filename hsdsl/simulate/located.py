@@ -129,9 +129,7 @@ def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing
     if before is not None:
         found = tuple(map(max, found, before.sizes(before.h * 0 + 1)))
     if stands(here, crossing):  # it is off that surface by as much as the state was that it came from
-        most = here.arc.jump + 1  # resets that lose energy add round-off up, they do not magnify it
-        carried = zip(found, here.surfaces.scale, here.arc.scales, strict=True)
-        found = tuple(max(size, min(scale, most * ever)) for size, scale, ever in carried)
+        found = tuple(map(max, found, here.surfaces.scale))
     if here.surfaces.touched:  # it is off the guards that hold it by as much as it has ever been computed from
         found = tuple(map(max, found, here.arc.scales))
     return found

@@ -180,5 +180,11 @@ def reset(here: ModeState, crossing: Crossing, scale: State, run: Run) -> tuple[
         spread = here.kernel.spreads[k](t, *q, *scale)
     except DOMAIN_ERRORS:
         spread = ()
-    sizes = tuple(abs(v) for v in after)  # where a reset is infinitely steep, no more is known
-    return after, spread if spread and all(map(isfinite, spread)) else sizes
+    if not spread or not all(map(isfinite, spread)):  # where a reset is infinitely steep, no more is known
+        return after, tuple(map(abs, after))
+    sizes = list(spread)
+    if edge.target == here.index and edge.target_states == here.arc.states:
+        most = here.arc.jump + 1  # resets that lose energy add round-off up, they do not magnify it
+        for i in edge.changes:
+            sizes[i] = min(sizes[i], most * max(abs(after[i]), here.arc.scales[i]))
+    return after, tuple(sizes)

@@ -3,7 +3,8 @@
 Flights T_n of one edge that leads back to its own mode shrink by the ratio q at least; what is left is then at most
 T_n q/(1 - q). Once that is below the relaxation the state is taken to the limit, where it rests. Edges may take turns,
 as those of a body that bounces on one that bounces. The state is taken to the limit of all of them once as many
-transitions as cost no time have fallen within the relaxation, if the flow moves it further within that.
+transitions as cost no time have fallen within the relaxation, if pushes take back within that what is left. Where the
+state would meet another guard until a tail ends, it is taken to the limit at once.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from itertools import pairwise
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop, Transition
-from hsdsl.integrators.linear import Vector
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.contact import (
     after_contact,
@@ -31,7 +31,6 @@ from hsdsl.simulate.contact import (
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
-from hsdsl.simulate.scales import flow_sizes
 
 LEAST_FLIGHTS = 3
 MOST_CORRECTIONS_TO_GUARD = 4  # of a point towards a guard
@@ -112,6 +111,8 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
         if all(j in touched for j in edges):
             return here
         q = limit_of(run, here, touched, edges, end)
+        if q is not None and meets_another(here, here.moved(end, q), edges):
+            end, q = here.t, limit_of(run, here, touched, edges, here.t)
         if q is None or not all(keeps(run, there := here.moved(end, q), j) for j in edges):
             return here
         if edge.contact is None or run.settings.completion == "none":
@@ -138,15 +139,14 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
 def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], end: Number) -> State | None:
     """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
     kept = partial(fixed_point, run, here)
-    most = reach(run, here) if len(edges) > 1 else ()
-    if most and not all(is_near(here.x, kept(k, here.t, here.x), most) for k in edges):
-        return None  # the limit is no nearer than what each of them keeps
-    q = in_turn(kept, edges, here.t, here.x)
-    if most and not is_near(here.x, q, most):
+    if len(edges) > 1 and not is_near(run, here, edges):
         return None
+    q = in_turn(kept, edges, here.t, here.x)
     if here.mode.edges[edges[0]].contact is not None:
-        slope = in_contact(run, here, sorted({*touched, *edges})).kernel.flow(here.t, *q)
-        q = tuple(a + (end - here.t) * f for a, f in zip(q, slope, strict=True))
+        flow, h = in_contact(run, here, sorted({*touched, *edges})).kernel.flow, end - here.t
+        slope = flow(here.t, *q)
+        turned = flow(end, *(a + h * f for a, f in zip(q, slope, strict=True)))
+        q = tuple(a + h * (f + g) / 2 for a, f, g in zip(q, slope, turned, strict=True))
         q = in_turn(partial(onto_guard, here), edges, end, q)
     q = in_turn(kept, edges, end, q)
     bound = here.surfaces.roundoff_bound
@@ -154,14 +154,15 @@ def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], en
     return q if on else None
 
 
-def reach(run: Run, here: ModeState) -> Vector:
-    """How far the flow moves each state within the relaxation."""
-    return [run.settings.relaxation * size for size in flow_sizes(run, here, here.kernel.flow(here.t, *here.x))]
+def is_near(run: Run, here: ModeState, edges: list[int]) -> bool:
+    """Whether what edges take back, each of its guard or of the rate of that, is no more than pushes make in a while.
 
-
-def is_near(x: State, q: State, most: Sequence[Number]) -> bool:
-    """Whether a point is no further than that from a state."""
-    return all(abs(a - b) <= far for a, b, far in zip(q, x, most, strict=True))
+    The while is the relaxation: so near is the limit.
+    """
+    t, x = here.t, here.x
+    values, sizes = here.kernel.surfaces(t, *x), in_contact(run, here, (), edges).kernel.magnitudes(t, *x)
+    last = {k: values[k] if here.mode.edges[k].push_order == 1 else here.kernel.rates[k](t, *x)[0] for k in edges}
+    return all(abs(last[k]) <= run.settings.relaxation * sizes[k] for k in edges)
 
 
 def held_exactly(

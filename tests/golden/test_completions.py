@@ -325,7 +325,7 @@ def test_nothing_to_complete_is_said(tmp_path: Any, capsys: Any) -> None:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize(("height", "count"), [("2", 46), ("1", 50), ("1.1", 46)])
+@pytest.mark.parametrize(("height", "count"), [("2", 46), ("1", 46), ("1.1", 46)])
 def test_two_balls_come_to_rest_one_after_the_other_or_together(height: str, count: int, engine: str) -> None:
     text = f"""
 hsdsl: 1

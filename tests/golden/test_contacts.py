@@ -370,6 +370,8 @@ WEDGES = (
     {"a": 0.55, "b": 0.4, "e": 0.45, "g": 6.5, "x": -0.1},
     {"a": 0.7, "b": 0.3, "e": 0.5, "g": 4, "x": 0.15},
     {"a": 0.35, "b": 0.8, "e": 0.4, "g": 9.81, "x": 0.05},
+    {"a": 0.39, "b": 0.28, "e": 0.42, "g": 4.1, "x": -0.17},  # impacts at the vertex change what no flow changes
+    {"a": 0.62, "b": 0.85, "e": 0.59, "g": 5, "x": 0.11},  # a tail along one wall ends beyond the other one
 )
 
 
@@ -382,3 +384,21 @@ def test_a_ball_in_a_wedge_loses_energy_until_it_rests_at_the_bottom(numbers: di
     assert np.all(np.diff(energy) < 1e-9)
     assert run.stop.reason == "until" and run.verdict.theorem == "left"
     assert max(map(abs, run.final.state.values())) < 1e-9
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_body_that_never_left_its_floor_by_a_row_bounces_on_it(engine: str) -> None:
+    """Its hops are inside steps: how far off the floor round-off may leave it is the size of them, not of its rows."""
+    text = """
+hsdsl: 1
+parameters: {m: 0.9, g: 8.4, k: 34.2, e: 1/5, l: 0.9}
+modes:
+  a:
+    flow: {x: u, y: w, u: k*(y - x - l)/m - g, w: -k*(y - x - l) - g}
+    transitions: [{name: floor, when: x <= 0, to: a, reset: {u: -e*u}}]
+initial: {mode: a, x: 0, u: 0, y: 1.2, w: -2.7}
+experiment: {until: 4}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.stop.reason == "until"
+    assert not any(made.entry for made in run.transitions)

@@ -102,7 +102,7 @@ static int largest(hs_run *run) {
     hs_real *const found = &run->landed[s];
     *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
     if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));
-    if (stood) *found = hs_max(*found, hs_min(run->scale[s], (hs_real)(run->jump + 1) * run->scales[s]));
+    if (stood) *found = hs_max(*found, run->scale[s]);
     if (run->here.p == run->held_p) *found = hs_max(*found, run->scales[s]); /* off guards that hold it by as much */
   }
   return 0;

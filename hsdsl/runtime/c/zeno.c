@@ -114,22 +114,20 @@ static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached) {
   if (held) copy(x, run->z, here->dimension);
 }
 
-/* Whether run->z is no further than the flow, whose sizes are known, moves run->x within the relaxation. */
-static int is_near(const hs_run *run) {
-  for (int s = 0; s < run->here.dimension; s++)
-    if (!(fabs(run->z[s] - run->x[s]) <= run->epsilon * run->flow_sizes[s])) return 0;
-  return 1;
-}
-
-/* Whether what each edge of the tail keeps is that near: 1, 0 or RAISED. The limit is no nearer. */
-static int may_be_near(hs_run *run) {
-  const hs_mode_state *here = &run->here;
-  if (here->table->flow(here->p, here->t, run->x, run->end) || flow_sizes(run, here->t, run->x, run->end)) return RAISED;
-  for (int k = 0; k < here->table->edges; k++) {
+/* Whether what each edge of the tail takes back, of its guard or of the rate of that, is no more than pushes make within
+   the relaxation: 1, 0 or RAISED. So near is the limit. */
+static int is_near(hs_run *run) {
+  const hs_mode *const own = run->here.table;
+  const hs_time t = run->here.t;
+  bind_contacts(run, 0, run->tail);
+  const int raised = magnitudes_at(run, t, run->x, run->magnitudes);
+  bind_mode(run);
+  if (raised || own->values(run->here.p, t, run->x, run->values)) return RAISED;
+  for (int k = 0; k < own->edges; k++) {
     if (!run->tail[k]) continue;
-    copy(run->z, run->x, here->dimension);
-    if (fixed_point(run, k, here->t)) return RAISED;
-    if (!is_near(run)) return 0;
+    hs_real last = run->values[k];
+    if (own->edge[k].push_order == 2 && own->rates[k](run->here.p, t, run->x, &last)) return RAISED;
+    if (!(fabs(last) <= run->epsilon * run->magnitudes[k])) return 0;
   }
   return 1;
 }
@@ -141,17 +139,19 @@ static int limit_of(hs_run *run, int count, hs_time end) {
   const int n = here->dimension;
   int along = 0;
   hs_real r, noise, *const q = run->z;
-  if (count > 1 && may_be_near(run) != 1) return 0;
+  if (count > 1 && is_near(run) != 1) return 0;
   copy(q, run->x, n);
   if (in_turn(run, fixed_point, count, here->t)) return RAISED;
-  if (count > 1 && !is_near(run)) return 0;
   for (int k = 0; k < here->table->edges; k++) along |= run->tail[k] && here->table->edge[k].contact >= 0;
   if (along) {
     bind_contacts(run, run->held, run->held);
-    const int raised = here->table->flow(here->p, here->t, q, run->end);
+    const hs_time h = end - here->t;
+    int raised = here->table->flow(here->p, here->t, q, run->end);
+    for (int s = 0; s < n; s++) run->after[s] = q[s] + h * run->end[s];
+    raised = raised || here->table->flow(here->p, end, run->after, run->at);
     bind_mode(run);
     if (raised) return RAISED;
-    for (int s = 0; s < n; s++) q[s] = q[s] + (end - here->t) * run->end[s];
+    for (int s = 0; s < n; s++) q[s] = q[s] + h * (run->end[s] + run->at[s]) / 2;
     if (in_turn(run, onto_guard, count, end)) return RAISED;
   }
   if (in_turn(run, fixed_point, count, end)) return RAISED;
@@ -244,7 +244,8 @@ static int close_tail(hs_run *run, int k) {
   if (here->dimension != here->table->dimension || !here->dimension) return GOES_ON;
   const int count = nearly_over(run, k, &left);
   if (!count) return GOES_ON;
-  const hs_time whole = here->t + left, end = earlier(whole, segment_end(run));
+  const hs_time whole = here->t + left;
+  hs_time end = earlier(whole, segment_end(run));
   const int instant = count > 1 && end == here->t;
   if (whole > run->pause || !(end > here->t || instant)) return GOES_ON;
   const hs_mode *const own = here->table;
@@ -256,6 +257,12 @@ static int close_tail(hs_run *run, int k) {
   if (here->table != own) after_contact(run);
   hs_real *const q = run->z;
   if (touches || limit_of(run, count, end) != 1) return GOES_ON;
+  const int meets = meets_another(run, here->t, run->x, end, q);
+  if (meets == RAISED) return GOES_ON;
+  if (meets) {
+    end = here->t;
+    if (limit_of(run, count, end) != 1) return GOES_ON;
+  }
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j] && keeps(run, end, q, j) != 1) return GOES_ON;
   if (own->edge[k].contact < 0 || !run->task->settings.contacts) {
@@ -266,7 +273,7 @@ static int close_tail(hs_run *run, int k) {
   if (!is_held(run, end, q, count, instant) || meets_another(run, here->t, run->x, end, q)) return GOES_ON;
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j]) note(run, HS_REPLACED, j, run->jump - 1, end, left);
-  if (!instant) {
+  if (end > here->t) {
     secant(run, &run->cubic);
     append(run, end, q, &run->cubic);
   }
