@@ -30,25 +30,7 @@ from hsdsl.execution.samples import HYBRID_TIME, Array, Samples
 from hsdsl.execution.sampling import Evaluated, Sampler, Side
 
 __all__ = [
-    "COMPLETE",
-    "HYBRID_TIME",
-    "INCOMPLETE",
-    "LEFT",
-    "REASONS",
-    "Arc",
-    "Array",
-    "Ensemble",
-    "Evaluated",
-    "Execution",
-    "Failure",
-    "Kind",
-    "OutputFunction",
-    "Point",
-    "Sampler",
-    "Samples",
-    "Side",
-    "Stop",
-    "Transition",
-    "TransitionTable",
+    "COMPLETE", "HYBRID_TIME", "INCOMPLETE", "LEFT", "REASONS", "Arc", "Array", "Ensemble", "Evaluated", "Execution",
+    "Failure", "Kind", "OutputFunction", "Point", "Sampler", "Samples", "Side", "Stop", "Transition", "TransitionTable",
     "Verdict",
-]
+]  # fmt: skip

@@ -24,24 +24,8 @@ from hsdsl.schema.jsonschema import json_schema
 from hsdsl.schema.read import read
 
 __all__ = [
-    "AutomatonDocument",
-    "AutomatonFile",
-    "ExperimentDocument",
-    "FunctionDocument",
-    "InputFile",
-    "InputSamples",
-    "InstanceDocument",
-    "ModeDocument",
-    "ModelDocument",
-    "ParameterEntry",
-    "PartModeDocument",
-    "PartTransitionDocument",
-    "ReferenceDocument",
-    "ReferenceStateDocument",
-    "ReferenceTransitionDocument",
-    "SolveDocument",
-    "SystemDocument",
-    "TransitionDocument",
-    "json_schema",
-    "read",
-]
+    "AutomatonDocument", "AutomatonFile", "ExperimentDocument", "FunctionDocument", "InputFile", "InputSamples",
+    "InstanceDocument", "ModeDocument", "ModelDocument", "ParameterEntry", "PartModeDocument", "PartTransitionDocument",
+    "ReferenceDocument", "ReferenceStateDocument", "ReferenceTransitionDocument", "SolveDocument", "SystemDocument",
+    "TransitionDocument", "json_schema", "read",
+]  # fmt: skip

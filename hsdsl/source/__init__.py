@@ -20,21 +20,6 @@ from hsdsl.source.nodes import (
 from hsdsl.source.text import Text, decode
 
 __all__ = [
-    "ABSENT",
-    "Key",
-    "Mapping",
-    "Node",
-    "NodePath",
-    "Scalar",
-    "Sequence",
-    "SourceRange",
-    "Text",
-    "absent",
-    "child",
-    "children",
-    "compose",
-    "decode",
-    "descend",
-    "is_empty",
-    "keys",
-]
+    "ABSENT", "Key", "Mapping", "Node", "NodePath", "Scalar", "Sequence", "SourceRange", "Text", "absent", "child",
+    "children", "compose", "decode", "descend", "is_empty", "keys",
+]  # fmt: skip

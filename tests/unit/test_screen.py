@@ -21,19 +21,12 @@ from hsdsl.simulate.verdict.screen import Screen, screened
 
 ROOT = Path(__file__).parents[2]
 MODELS = (
-    "models/bouncing-ball",
-    "models/oscillator-with-stop-1",
-    "models/oscillator-with-stop-2",
-    "models/pronking-runner",
-    "models/constrained-pendulum",
-    "tests/conformance/cases/m10-flow-ends-at-guard",
-    "tests/conformance/cases/m3-if-of-another-edge",
-    "tests/conformance/cases/m5-jump-onto-surface",
-    "tests/conformance/cases/m4-past-sizes",
-    "tests/conformance/cases/m6-tie-file-order",
-    "tests/conformance/cases/m6-tie-priority",
-    "tests/conformance/cases/m6-guard-and-wall",
-)
+    "models/bouncing-ball", "models/oscillator-with-stop-1", "models/oscillator-with-stop-2", "models/pronking-runner",
+    "models/constrained-pendulum", "tests/conformance/cases/m10-flow-ends-at-guard",
+    "tests/conformance/cases/m3-if-of-another-edge", "tests/conformance/cases/m5-jump-onto-surface",
+    "tests/conformance/cases/m4-past-sizes", "tests/conformance/cases/m6-tie-file-order",
+    "tests/conformance/cases/m6-tie-priority", "tests/conformance/cases/m6-guard-and-wall",
+)  # fmt: skip
 
 
 def model(x: str, y: str, when: str = "x >= 100", until: float = 3) -> Any:

@@ -14,14 +14,6 @@ from hsdsl.backends.c.source import (
 )
 
 __all__ = [
-    "constant_bodies",
-    "derivatives",
-    "factors",
-    "initial_bodies",
-    "lines",
-    "model_parts",
-    "model_source",
-    "routine_functions",
-    "switching_bodies",
-    "width",
-]
+    "constant_bodies", "derivatives", "factors", "initial_bodies", "lines", "model_parts", "model_source",
+    "routine_functions", "switching_bodies", "width",
+]  # fmt: skip
