@@ -44,10 +44,7 @@ def private(path: Path) -> str | None:
 def distrusted(path: Path) -> str | None:
     """Say why a file or folder of the cache is not trusted: itself, or a folder on the way, could be another's work.
 
-    Raises
-    ------
-    OSError
-        It is not there.
+    Raises OSError: it is not there.
     """
     if not hasattr(os, "getuid"):
         return None  # on Windows a profile is its user's alone
@@ -105,10 +102,7 @@ def find(kind: str, key: str) -> Path | None:
 def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Path:
     """Make an entry in place of what it was: ``write`` is given a path to write to. Returns the file.
 
-    Raises
-    ------
-    OSError
-        The folder is refused or cannot be written.
+    Raises OSError: the folder is refused or cannot be written.
     """
     from hsdsl.unfinished import part_in
 

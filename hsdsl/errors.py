@@ -127,10 +127,7 @@ class Findings:
     def add(self, diagnostic: Diagnostic) -> None:
         """Keep a diagnostic, once.
 
-        Raises
-        ------
-        ModelError
-            When there are :data:`MOST_DIAGNOSTICS`: nobody reads on.
+        Raises ModelError: when there are :data:`MOST_DIAGNOSTICS`: nobody reads on.
         """
         self.diagnostics[diagnostic] = None
         if len(self.diagnostics) >= MOST_DIAGNOSTICS:
@@ -139,10 +136,7 @@ class Findings:
     def raise_if_any(self) -> None:
         """Raise all diagnostics so far, in source order, other files last.
 
-        Raises
-        ------
-        ModelError
-            When there is at least one diagnostic.
+        Raises ModelError: when there is at least one diagnostic.
         """
         if self.diagnostics:
             raise ModelError(sorted(self.diagnostics, key=self._source_order))

@@ -55,10 +55,7 @@ def product_name(parts: Sequence[Part], state: Mapping[str, Any]) -> str:
 def numbers_of(parts: Sequence[Part], name: str) -> dict[str, int]:
     """The numbers of the product mode of this name.
 
-    Raises
-    ------
-    ValueError
-        It is none; the message says why.
+    Raises ValueError: it is none; the message says why.
     """
     given: dict[str, str] = {}
     for item in name.split():

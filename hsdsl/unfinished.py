@@ -25,10 +25,7 @@ def part_in(folder: Path) -> Generator[tuple[Path, int]]:
 
     What processes that were killed have left in the folder goes first.
 
-    Raises
-    ------
-    OSError
-        It cannot be made.
+    Raises OSError: it cannot be made.
     """
     _remove_left(folder)
     path, descriptor = _claimed(folder)

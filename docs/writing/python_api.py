@@ -84,7 +84,8 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
 }
 MADE = ("hsdsl.Limits", "hsdsl.metrics.paths.SpacePoint")  # classes that readers make themselves
 _ROLE = re.compile(r":(?:attr|class|data|func|meth|mod):`~?\.?([^`]+)`")
-_ERROR = re.compile(r"^Raises (\w+): (.+?)\s*(?=\n\n|\Z)", re.MULTILINE | re.DOTALL)
+_ERROR = re.compile(r"^Raises (\w+): ", re.MULTILINE)
+_ERRORS = re.compile(r"^Raises \w+: .+?(?=\n\n|\Z)", re.MULTILINE | re.DOTALL)
 _SECTION = re.compile(r"^([A-Z][a-z]+)\n-+\n", re.MULTILINE)
 _WIDE = 100
 
@@ -160,7 +161,7 @@ def _annotation(kind: Any) -> str:
 
 def _described(thing: Any) -> str:
     """A docstring: its text, and a table for each of its sections."""
-    text = _ERROR.sub(_raises, _ROLE.sub(r"`\1`", inspect.getdoc(thing) or ""))
+    text = _ERRORS.sub(_raises, _ROLE.sub(r"`\1`", inspect.getdoc(thing) or ""))
     body, *sections = _SECTION.split(text)
     parts = [_prose(body)]
     for heading, content in zip(sections[::2], sections[1::2], strict=True):
@@ -172,8 +173,10 @@ def _described(thing: Any) -> str:
 
 
 def _raises(found: re.Match[str]) -> str:
-    """The sentence of an error as a section of it."""
-    return f"Raises\n------\n{found[1]}\n    {' '.join(found[2].split())}\n"
+    """The sentences of errors as a section of them."""
+    _, *parts = _ERROR.split(found[0])
+    entries = (f"{name}\n    {' '.join(when.split())}\n" for name, when in zip(parts[::2], parts[1::2], strict=True))
+    return "Raises\n------\n" + "".join(entries)
 
 
 def _section(heading: str, content: str) -> str:

@@ -77,10 +77,7 @@ class Desk:
     def model(self, name: str) -> Model:
         """Load one of the paper's models.
 
-        Raises
-        ------
-        UsageError
-            It is not there.
+        Raises UsageError: it is not there.
         """
         path = self.models / name
         if not path.is_file():

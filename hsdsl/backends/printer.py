@@ -87,10 +87,7 @@ class Language:
     def body(self, definition: ast.FunctionDef, names: Mapping[str, str]) -> list[str]:
         """Print the statements of a routine; ``names`` says what its arguments and data are called.
 
-        Raises
-        ------
-        ValueError
-            The text is not of the language of routines.
+        Raises ValueError: the text is not of the language of routines.
         """
         printer = _Printer(self, names)
         lines: list[str] = []
@@ -108,10 +105,7 @@ class Language:
     def expression(self, text: str, names: Mapping[str, str]) -> str:
         """Print one expression of the language of routines.
 
-        Raises
-        ------
-        ValueError
-            It is none.
+        Raises ValueError: it is none.
         """
         return self.expression_of(ast.parse(text, "<hsdsl tape>", mode="eval").body, names)
 

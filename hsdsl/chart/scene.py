@@ -82,10 +82,7 @@ class Scene:
         until : float, optional
             The end of the samples, where it is not the exact execution's own: one may end before a run is to end.
 
-        Raises
-        ------
-        UsageError
-            An unknown state, fewer than two samples, or no reference.
+        Raises UsageError: an unknown state, fewer than two samples, or no reference.
         """
         if samples < 2:
             raise UsageError(f"a chart takes at least 2 samples, not {samples}")

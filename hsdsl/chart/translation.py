@@ -69,10 +69,7 @@ T = sp.Symbol("t", real=True)
 def translate(scene: Scene) -> PlainModel:
     """Put numbers in for parameters and numbered symbols for states.
 
-    Raises
-    ------
-    Refused
-        The model has sampled inputs.
+    Raises Refused: the model has sampled inputs.
     """
     system = scene.model.system
     if any(hasattr(signal, "times") for signal in system.inputs):
@@ -139,9 +136,6 @@ def as_function(
 ) -> Callable[..., Any]:
     """Return ``f(t, x0, x1, ...) -> tuple``; the symbols are ours, so nothing of the file is ever evaluated.
 
-    Raises
-    ------
-    Refused
-        The tool lacks a function of the model.
+    Raises Refused: the tool lacks a function of the model.
     """
     return sp.lambdify((T, *mode.symbols), expressions, [dict(functions)], printer=_Printer(functions), cse=True)

@@ -16,10 +16,7 @@ STATE = "state or output "
 def limit_options(folders: Sequence[Path], pairs: Sequence[str]) -> Limits:
     """Read ``--allow-path`` and ``--limit``.
 
-    Raises
-    ------
-    UsageError
-        No such limit, no positive number, or no such folder.
+    Raises UsageError: no such limit, no positive number, or no such folder.
     """
     numbers: dict[str, Any] = {}
     for pair in pairs:
@@ -44,10 +41,7 @@ def names_of(text: str | None) -> list[str]:
 def known_names(text: str | None, known: Sequence[str], name: str, kind: str = "") -> tuple[str, ...]:
     """The names in a text with commas between them; ``kind`` says in an error what they name.
 
-    Raises
-    ------
-    UsageError
-        One of them is not known.
+    Raises UsageError: one of them is not known.
     """
     names = names_of(text)
     for each in names:
@@ -59,10 +53,7 @@ def known_names(text: str | None, known: Sequence[str], name: str, kind: str = "
 def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, str]] | None:
     """Read ``--phase``; None where it is left out.
 
-    Raises
-    ------
-    UsageError
-        No pair, or no such state or output.
+    Raises UsageError: no pair, or no such state or output.
     """
     pairs: list[tuple[str, str]] = []
     for text in texts or ():

@@ -57,12 +57,8 @@ class Elaboration:
 def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> HybridSystem:
     """The hybrid system of a model file; ``text`` is its content, where it is not to be read.
 
-    Raises
-    ------
-    ModelError
-        The model has errors; all of them are carried, in source order.
-    UsageError
-        The file cannot be read.
+    Raises ModelError: the model has errors; all of them are carried, in source order.
+    Raises UsageError: the file cannot be read.
     """
     return elaborate_files(ModelFiles.read(path, text=text)).system
 
@@ -73,10 +69,7 @@ def drivable(files: ModelFiles) -> HybridSystem:
     Where the parameter ``u given`` is 1 and the sampled input u is 0, which are their values, it is the same system;
     where the parameter is 0, u can be driven from outside.
 
-    Raises
-    ------
-    ModelError
-        The model has errors; all of them are carried, in source order.
+    Raises ModelError: the model has errors; all of them are carried, in source order.
     """
     system = elaborate_files(files, drivable=True).system
     switches = (switch_parameter(switch_name(i.name)) for i in system.inputs if i.given is not None)
@@ -86,10 +79,7 @@ def drivable(files: ModelFiles) -> HybridSystem:
 def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration:
     """The hybrid system of a model's bytes: (J, Gamma, D, U, F, G, R) of Burden et al. 2013, Definition 7.
 
-    Raises
-    ------
-    ModelError
-        The model has errors; all of them are carried, in source order.
+    Raises ModelError: the model has errors; all of them are carried, in source order.
     """
     with limits.applied(files.limits):
         findings = Findings(files.path)

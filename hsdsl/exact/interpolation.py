@@ -33,10 +33,7 @@ UNIT = 2.0**-53
 def number(value: Any, name: str = "the number") -> Number:
     """Turn an int, a float (its binary value), decimal text, a fraction or an mpmath number into a finite number.
 
-    Raises
-    ------
-    UsageError
-        It is none of these.
+    Raises UsageError: it is none of these.
     """
     try:
         exact = Fraction(value) if isinstance(value, (int, float, str, Fraction)) else None

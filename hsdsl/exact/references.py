@@ -51,10 +51,7 @@ def reference(model: Referenced, block: int = 0) -> Execution:
     Execution
         ``settings["error"]`` bounds its error at any time, ``settings["source"]`` names its origin.
 
-    Raises
-    ------
-    UsageError
-        No stored execution solves the model.
+    Raises UsageError: no stored execution solves the model.
     """
     program = model.program
     defects: dict[str, str] = {}

@@ -54,10 +54,7 @@ def precise(model: Simulated, digits: int = 10, **options: Any) -> Execution:
         In float64 and without strips: transition times less the delays before them. ``settings["error"]`` is the
         largest change by halved steps, ``settings["digits"]`` the digits that this leaves.
 
-    Raises
-    ------
-    UsageError
-        The runs do not agree to so many digits, make other transitions, or do not get to their end.
+    Raises UsageError: the runs do not agree to so many digits, make other transitions, or do not get to their end.
     """
     if not FEWEST <= digits <= MOST:
         raise UsageError(f"a reference in float64 has {FEWEST} to {MOST} digits, not {digits}")

@@ -23,10 +23,7 @@ def residual(program: Program, run: Execution) -> float:
     A defect counts relative to 1 plus the size of the compared values. A slope's defect counts beyond its round-off and
     the effect of the state's round-off on a stiff flow. A state at rest must lie on a guard.
 
-    Raises
-    ------
-    ValueError
-        The model has no such mode, states or transition, or has inputs that jump or bend.
+    Raises ValueError: the model has no such mode, states or transition, or has inputs that jump or bend.
     """
     if program.inputs or program.switches:
         raise ValueError("models with inputs that jump or bend are not compared")

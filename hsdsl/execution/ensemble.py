@@ -171,10 +171,7 @@ class Ensemble:
     def run(self, *index: int) -> Execution:
         """Run one instance by itself: the whole execution.
 
-        Raises
-        ------
-        IndexError
-            There is no such instance.
+        Raises IndexError: there is no such instance.
         """
         if len(index) != len(self.shape) or any(not -n <= i < n for i, n in zip(index, self.shape, strict=True)):
             raise IndexError(f"expected an index of an ensemble of shape {self.shape}, got {index}")

@@ -122,10 +122,7 @@ class Execution(Deferred):
     def check(self) -> None:
         """Check that columns and arcs belong together.
 
-        Raises
-        ------
-        ValueError
-            They do not.
+        Raises ValueError: they do not.
         """
         n = len(self.times)
         if not (len(self.values) == len(self.outputs) == len(self.depth) == len(self.coefficients) == n):
@@ -244,10 +241,7 @@ class Execution(Deferred):
     def sensitivity(self, wrt: str | Sequence[str]) -> Any:
         """Return the derivatives of this run by parameters and initial states (see `Model.sensitivity`).
 
-        Raises
-        ------
-        UsageError
-            The run was read from a file, or a name is unknown.
+        Raises UsageError: the run was read from a file, or a name is unknown.
         """
         if self.differentiation is None:
             raise UsageError("an execution that was read from a file has no model to differentiate")
@@ -263,10 +257,7 @@ class Execution(Deferred):
         side : {"right", "left"}
             At a jump: the value after the last transition at that instant, or before the first.
 
-        Raises
-        ------
-        ValueError
-            For a time outside the run.
+        Raises ValueError: for a time outside the run.
         """
         one = self.sample(t, side)
         if len(one) != 1:
@@ -292,12 +283,8 @@ class Execution(Deferred):
         columns : names, optional
             Which states and outputs; left out, all of them.
 
-        Raises
-        ------
-        ValueError
-            For a time outside the run; the message names the first such time.
-        UsageError
-            For a name that is neither a state nor an output.
+        Raises ValueError: for a time outside the run; the message names the first such time.
+        Raises UsageError: for a name that is neither a state nor an output.
         """
         return sample(self, times, side, columns)
 
@@ -309,10 +296,7 @@ class Execution(Deferred):
     def to_pandas(self) -> Any:
         """Make a pandas DataFrame of :meth:`rows`: ``time``, ``mode``, ``j``, and :attr:`shown`.
 
-        Raises
-        ------
-        UsageError
-            When pandas is not installed.
+        Raises UsageError: when pandas is not installed.
         """
         return self.rows().only(self.shown).to_pandas()
 
@@ -340,10 +324,7 @@ class Execution(Deferred):
         tuple of Path
             The files written.
 
-        Raises
-        ------
-        UsageError
-            For an unknown suffix or column, a file that cannot be written, or a missing library.
+        Raises UsageError: for an unknown suffix or column, a file that cannot be written, or a missing library.
         """
         from hsdsl.store import save
 

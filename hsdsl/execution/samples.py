@@ -68,10 +68,7 @@ class Samples(Deferred):
     def only(self, columns: Sequence[str] | None) -> Samples:
         """Keep only the states and outputs named, in the order named (states before outputs).
 
-        Raises
-        ------
-        UsageError
-            For a name that is neither a state nor an output; the closest one is suggested.
+        Raises UsageError: for a name that is neither a state nor an output; the closest one is suggested.
         """
         if columns is None:
             return self
@@ -104,10 +101,7 @@ class Samples(Deferred):
     def to_pandas(self) -> Any:
         """Make a pandas DataFrame of the table's columns.
 
-        Raises
-        ------
-        UsageError
-            When pandas is not installed.
+        Raises UsageError: when pandas is not installed.
         """
         pandas = optional("pandas", "a DataFrame")
         return pandas.DataFrame({label: values for label, values, _ in self.columns()})
@@ -118,10 +112,7 @@ def split(
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Sort names of columns into those of states and those of outputs, each once.
 
-    Raises
-    ------
-    UsageError
-        For a name that is neither; the closest one is suggested.
+    Raises UsageError: for a name that is neither; the closest one is suggested.
     """
     return _split(tuple(map(str, columns)), states, outputs)
 

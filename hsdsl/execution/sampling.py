@@ -97,10 +97,7 @@ def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     -------
     rows, times : array, shape (n,)
 
-    Raises
-    ------
-    ValueError
-        For a time that is not :func:`within` the run, or a ``side`` that is neither.
+    Raises ValueError: for a time that is not :func:`within` the run, or a ``side`` that is neither.
     """
     _check(side)
     asked, inside = within(execution, times)

@@ -63,12 +63,8 @@ class ModelFiles:
     def content(self, name: str) -> bytes:
         """The bytes of a data file.
 
-        Raises
-        ------
-        DataRefused
-            It lies elsewhere, is no regular file, is too large, or cannot be read.
-        KeyError
-            The data files are known, and it is none of them.
+        Raises DataRefused: it lies elsewhere, is no regular file, is too large, or cannot be read.
+        Raises KeyError: the data files are known, and it is none of them.
         """
         if self.data is not None:
             return self.data[name]

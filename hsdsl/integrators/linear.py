@@ -49,10 +49,7 @@ def factored(matrix: Matrix, scales: Sequence[Number] | None = None, groups: Seq
 
     Only rows of one of the ``groups`` exchange places; left out, all rows do.
 
-    Raises
-    ------
-    Singular
-        A pivot is zero or not a number.
+    Raises Singular: a pivot is zero or not a number.
     """
     rows, order = [list(row) for row in matrix], list(range(len(matrix)))
     scales = scales or [1] * len(rows)
@@ -122,10 +119,7 @@ def factored_complex(
 ) -> ComplexFactors:
     """Factor a square matrix of complex numbers; the size of a pivot is the sum of its parts' sizes.
 
-    Raises
-    ------
-    Singular
-        A pivot is zero or not a number.
+    Raises Singular: a pivot is zero or not a number.
     """
     re, im, order = [list(row) for row in real], [list(row) for row in imaginary], list(range(len(real)))
     n = len(order)

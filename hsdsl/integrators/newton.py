@@ -53,10 +53,7 @@ class Convergence:
     def to_tolerance(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
         """Iterate until what is left is a small share of the tolerance.
 
-        Raises
-        ------
-        NoConvergence
-            It will not be, within the iterations that a step may take.
+        Raises NoConvergence: it will not be, within the iterations that a step may take.
         """
         unit, tolerance, one = self._arithmetic.unit, self._tolerance, self._arithmetic.zero + 1
         assert tolerance is not None
@@ -89,10 +86,7 @@ class Convergence:
     def to_roundoff(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
         """Iterate until the next correction would be below the last digit, or they are all noise.
 
-        Raises
-        ------
-        NoConvergence
-            They become no smaller before that.
+        Raises NoConvergence: they become no smaller before that.
         """
         unit, before, z = self._arithmetic.unit, None, None
         allowed = max(NEWTON_NOISE * unit, NEWTON_SHARE * (self._tolerance or 0))

@@ -39,10 +39,7 @@ class SparseFactors:
 def sparse_factored(of: Elimination, entries: Vector) -> SparseFactors:
     """Factor a matrix, given by all entries of the pattern.
 
-    Raises
-    ------
-    Singular
-        A pivot is zero or not a number.
+    Raises Singular: a pivot is zero or not a number.
     """
     values = list(entries)
     row = [entries[0] * 0] * len(of.order)
@@ -93,10 +90,7 @@ class ComplexSparseFactors:
 def sparse_factored_complex(of: Elimination, real: Vector, imaginary: Vector) -> ComplexSparseFactors:
     """Factor a complex matrix, likewise.
 
-    Raises
-    ------
-    Singular
-        A pivot is zero or not a number.
+    Raises Singular: a pivot is zero or not a number.
     """
     re, im = list(real), list(imaginary)
     zero: Number = real[0] * 0

@@ -61,10 +61,7 @@ class ButcherTableau:
     source : str
         Where the table comes from.
 
-    Raises
-    ------
-    ValueError
-        The shapes disagree or an order condition fails.
+    Raises ValueError: the shapes disagree or an order condition fails.
     """
 
     name: str

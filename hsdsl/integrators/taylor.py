@@ -108,10 +108,7 @@ def taylor_stepper(method: TaylorMethod, series: Taylor, arithmetic: Arithmetic)
 def terms(series: Taylor, order: int, t: Number, x: State) -> Stages:
     """Return the coefficients 1 to order + 1 of all states, by coefficient.
 
-    Raises
-    ------
-    NoSeries
-        There is none at this point.
+    Raises NoSeries: there is none at this point.
     """
     try:
         lines = series.flow(order, t, x)

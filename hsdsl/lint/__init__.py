@@ -52,12 +52,8 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     text : bytes, optional
         The file's content, where it is not to be read from ``path``.
 
-    Raises
-    ------
-    ModelError
-        The model has errors; rules look only at models without.
-    UsageError
-        The file cannot be read.
+    Raises ModelError: the model has errors; rules look only at models without.
+    Raises UsageError: the file cannot be read.
     """
     subject = Subject(elaborate_files(ModelFiles.read(path, text=text)))
     codes = (selection or Selection.of()).codes

@@ -30,12 +30,8 @@ def fix(path: str | os.PathLike[str], selection: Selection | None = None) -> tup
     int
         How many findings were remedied.
 
-    Raises
-    ------
-    ModelError
-        The model has errors.
-    UsageError
-        The file cannot be read or written.
+    Raises ModelError: the model has errors.
+    Raises UsageError: the file cannot be read or written.
     """
     original = data = read_bytes(path)
     report, remedied = lint(path, selection, text=data), 0

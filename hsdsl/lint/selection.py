@@ -27,10 +27,7 @@ class Selection:
     def of(cls, select: Iterable[str] | None = None, ignore: Iterable[str] | None = None) -> Selection:
         """The rules that ``select`` names, all when it is None, without those that ``ignore`` names.
 
-        Raises
-        ------
-        UsageError
-            For a name that no rule has, and for a selection of nothing.
+        Raises UsageError: for a name that no rule has, and for a selection of nothing.
         """
         chosen = set(RULES) if select is None else codes_of(select, "select")
         if not chosen:
@@ -42,10 +39,7 @@ class Selection:
 def codes_of(names: Iterable[str], where: str) -> set[str]:
     """The codes that begin with one of some texts, or belong to the family or the rule of that name.
 
-    Raises
-    ------
-    UsageError
-        For one that nothing answers to.
+    Raises UsageError: for one that nothing answers to.
     """
     found: set[str] = set()
     for name in filter(None, (part.strip() for part in names)):
@@ -68,10 +62,7 @@ def configured(path: str | os.PathLike[str]) -> dict[str, list[str]]:
     It is the first ``hsdsl.toml`` (table ``lint``) or ``pyproject.toml`` with a table ``tool.hsdsl.lint``, from the
     model's folder upwards.
 
-    Raises
-    ------
-    UsageError
-        The file cannot be read, or has something else in that table.
+    Raises UsageError: the file cannot be read, or has something else in that table.
     """
     folder = Path(os.path.abspath(path)).parent
     for place in (folder, *folder.parents):

@@ -50,12 +50,8 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: by
     ``text`` is the file's content, where it is not to be read from ``path``; ``limits`` are caps on the file and
     folders for its data, in place of the defaults.
 
-    Raises
-    ------
-    ModelError
-        The model has errors; all of them are carried.
-    UsageError
-        The file cannot be read.
+    Raises ModelError: the model has errors; all of them are carried.
+    Raises UsageError: the file cannot be read.
     """
     return Model(pipeline_of(path, limits, text))
 

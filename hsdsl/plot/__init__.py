@@ -30,10 +30,7 @@ def plot(runs: Execution | Sequence[Execution], path: str | os.PathLike[str], **
     **options
         What is shown, by the names of :class:`View`.
 
-    Raises
-    ------
-    UsageError
-        For an unknown suffix or name, or a file that cannot be written.
+    Raises UsageError: for an unknown suffix or name, or a file that cannot be written.
     """
     (target,) = check_suffixes(path, formats=(*FORMATS, ".html"))
     suffix, view = target.suffix.lower(), View(**options)

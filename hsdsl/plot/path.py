@@ -26,10 +26,8 @@ MARGIN = 0.25  # of a path's extent, around it
 def plot_path(space: Space, pieces: Sequence[PathPiece], title: str) -> Figure:
     """Draw domains, guards, their images and the pieces of a path.
 
-    Raises
-    ------
-    UsageError
-        No path, a mode on it that has not two coordinates, an unknown suffix, or a file that cannot be written.
+    Raises UsageError: no path, a mode on it that has not two coordinates, an unknown suffix, or a file that cannot be
+    written.
     """
     modes = _visited(space, pieces)
     from matplotlib.figure import Figure

@@ -56,10 +56,7 @@ _drawing = RLock()  # matplotlib's settings are the whole process's
 def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:
     """Draw a figure once and write it to every path, in the format of its suffix.
 
-    Raises
-    ------
-    UsageError
-        For an unknown suffix, or a file that cannot be written.
+    Raises UsageError: for an unknown suffix, or a file that cannot be written.
     """
     targets = check_suffixes(*paths)
     with styled():

@@ -50,10 +50,7 @@ class View:
     def names(self, runs: Sequence[Execution]) -> list[str]:
         """Return the columns over time.
 
-        Raises
-        ------
-        UsageError
-            A run has none of the name; the closest one is suggested.
+        Raises UsageError: a run has none of the name; the closest one is suggested.
         """
         known = names_of(runs)
         if self.columns is None:
@@ -63,10 +60,7 @@ class View:
     def pairs(self, runs: Sequence[Execution]) -> list[Pair]:
         """Return the pairs of phase plots.
 
-        Raises
-        ------
-        UsageError
-            As :meth:`names`.
+        Raises UsageError: as :meth:`names`.
         """
         known = names_of(runs)
         if self.phases is not None:
@@ -105,10 +99,7 @@ class View:
     def called(self, runs: Sequence[Execution]) -> list[str]:
         """Return a label for each run.
 
-        Raises
-        ------
-        UsageError
-            There are labels, but not one for each.
+        Raises UsageError: there are labels, but not one for each.
         """
         if self.labels and len(self.labels) != len(runs):
             raise UsageError(f"expected {len(runs)} labels, one for each run, got {len(self.labels)}")

@@ -78,10 +78,7 @@ _keys: Callable[[Any], Any] = tuple
 def plain(value: Any) -> Any:
     """Make a value one that JSON has; a number that is not finite is None, a multiprecision one stays.
 
-    Raises
-    ------
-    TypeError
-        For a value of any other kind.
+    Raises TypeError: for a value of any other kind.
     """
     kind = _kind(value)
     if kind in _AS_THEY_ARE:

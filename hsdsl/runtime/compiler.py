@@ -60,10 +60,7 @@ class Compiler:
         :data:`FLAGS` make a shared library of them. Several are compiled at the same time; objects among them are
         only linked.
 
-        Raises
-        ------
-        NoCompiler
-            It fails, does not end, or makes no file; the message holds the first error that it prints.
+        Raises NoCompiler: it fails, does not end, or makes no file; the message holds the first error that it prints.
         """
         if _responding.get(self) is False:
             raise NoCompiler(self._endless())
@@ -128,10 +125,7 @@ def _complaint(done: Done, folder: Path) -> str:
 def find_compiler() -> Compiler:
     """Return the compiler that is used here.
 
-    Raises
-    ------
-    NoCompiler
-        None was found, or ``CC`` names none.
+    Raises NoCompiler: none was found, or ``CC`` names none.
     """
     if given := _words(os.environ.get("CC", "")):
         path = shutil.which(given[0])

@@ -24,10 +24,7 @@ _loading = Lock()
 def runtime() -> ctypes.CDLL:
     """The hand-written runtime; a run in it leaves the interpreter free.
 
-    Raises
-    ------
-    NoCompiler
-        There is no compiler, or it fails.
+    Raises NoCompiler: there is no compiler, or it fails.
     """
     with _loading:  # another thread may compile it: see `begin`
         return _runtime()
@@ -60,10 +57,7 @@ def begin() -> None:
 class CompiledModel:
     """A program compiled to a library: ``table`` is its ``hs_model``.
 
-    Raises
-    ------
-    NoCompiler
-        There is no compiler, or it fails.
+    Raises NoCompiler: there is no compiler, or it fails.
     """
 
     def __init__(self, program: Program) -> None:

@@ -35,10 +35,7 @@ _OPTIONS = " ".join((EFFORT, *FLAGS))
 def loop_object(folder: Path) -> Path:
     """The loop as an object in a folder, to be linked into another library: compiled at first use, and kept.
 
-    Raises
-    ------
-    NoCompiler
-        There is no compiler, or it fails.
+    Raises NoCompiler: there is no compiler, or it fails.
     """
     compiler, made = find_compiler(), folder / "hs.o"
     key = _key("object", compiler)
@@ -55,10 +52,7 @@ def loop_object(folder: Path) -> Path:
 def ship(folder: Path) -> Path:
     """Compile the loop into a folder, for a wheel.
 
-    Raises
-    ------
-    NoCompiler
-        There is no compiler, or it fails.
+    Raises NoCompiler: there is no compiler, or it fails.
     """
     text, symbol = LOOP
     library = folder / _shipped(text).name
@@ -70,10 +64,7 @@ def ship(folder: Path) -> Path:
 def loop() -> ctypes.CDLL:
     """Load the loop: that of this package, or what is compiled at first use.
 
-    Raises
-    ------
-    NoCompiler
-        There is no compiler, or it fails.
+    Raises NoCompiler: there is no compiler, or it fails.
     """
     text, symbol = LOOP
     return load(text, symbol, lambda: [text])
@@ -90,10 +81,7 @@ def load(content: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctyp
     ``content`` is the source's name in the cache; the source, one text or several that are compiled at the same time,
     is written only where it must be compiled.
 
-    Raises
-    ------
-    NoCompiler
-        There is no compiler, or it fails.
+    Raises NoCompiler: there is no compiler, or it fails.
     """
     shipped = _shipped(content)
     loaded = _loaded(shipped) if shipped.exists() else None
@@ -123,10 +111,7 @@ def _loaded(path: Path) -> ctypes.CDLL | None:
 def is_kept(content: str) -> bool:
     """Whether the library of ``content`` was compiled before, or came with this package.
 
-    Raises
-    ------
-    NoCompiler
-        There is no compiler.
+    Raises NoCompiler: there is no compiler.
     """
     return _shipped(content).exists() or find(KIND, _key(content, find_compiler())) is not None
 

@@ -44,10 +44,7 @@ def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, respond
     After :data:`PATIENCE` they go on only if ``responds``. All that they started is ended with them where they are
     ended.
 
-    Raises
-    ------
-    OSError
-        One cannot be started.
+    Raises OSError: one cannot be started.
     """
     began = monotonic()
     begun: list[_Begun] = []

@@ -45,12 +45,8 @@ def imported(root: Element, until: str | None = None) -> str:
     until : str
         The end of the run, which SBML does not say.
 
-    Raises
-    ------
-    ModelError
-        What a model cannot keep, with its place.
-    UsageError
-        No end of the run.
+    Raises ModelError: what a model cannot keep, with its place.
+    Raises UsageError: no end of the run.
     """
     if not until:
         raise UsageError("the end of the run is not given", "SBML does not say it: give --until")

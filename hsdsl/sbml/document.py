@@ -99,12 +99,8 @@ def is_sbml(root: Element) -> bool:
 def model_of(root: Element) -> SbmlModel:
     """The model in a file.
 
-    Raises
-    ------
-    ModelError
-        It is of Level 1, or has no model.
-    NotExpressible
-        A package or a part of SBML that a model cannot keep.
+    Raises ModelError: it is of Level 1, or has no model.
+    Raises NotExpressible: a package or a part of SBML that a model cannot keep.
     """
     _without_prefixes(root)
     level = root.attributes.get("level", "")

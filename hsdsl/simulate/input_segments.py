@@ -57,10 +57,7 @@ class Timeline:
 def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number], until: Number) -> Timeline:
     """Cut time at every sample of every sampled input, and where a switch changes.
 
-    Raises
-    ------
-    UsageError
-        An input's sample times do not increase, a sample is not finite, or a switch changes too often.
+    Raises UsageError: an input's sample times do not increase, a sample is not finite, or a switch changes too often.
     """
     samples = [_samples(i, given, kernel, parameters) for i, given in enumerate(program.inputs)]
     zero = kernel.arithmetic.zero

@@ -143,10 +143,7 @@ def interpolated(
     """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
     their largest value, or ``allowed(k)`` more. Without ``far`` pieces end where the first function is positive.
 
-    Raises
-    ------
-    TooFast
-        It ``may_refuse``, and the first piece would be too short, or there are too many.
+    Raises TooFast: it ``may_refuse``, and the first piece would be too short, or there are too many.
     """
     by, zero = interpolation(degree, arithmetic), arithmetic.zero
     nodes, tests, matrix, share = by.nodes, by.tests, by.matrix, share + by.rounding
@@ -189,12 +186,8 @@ def residual(c: Coefficients, tests: Sequence[Number], values: Sequence[Number])
 def curves_along(run: Run, here: ModeState, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> Curves:
     """Give the pieces of each surface along ``piece``, a step's interpolant from (t, x) to (t + h, z).
 
-    Raises
-    ------
-    TooFast
-        A surface varies too fast for one step.
-    ValueError
-        One has no value.
+    Raises TooFast: a surface varies too fast for one step.
+    Raises ValueError: one has no value.
     """
     degree, share = along_steps(run.settings)
     if here.mode.affine:

@@ -39,10 +39,7 @@ class Changes(Argument):
     def pieces(self, parts: Sequence[Part]) -> list[SwitchPiece]:
         """Cut parts of time where the switch changes, and give its numbers.
 
-        Raises
-        ------
-        UsageError
-            There are more changes than the limit allows.
+        Raises UsageError: there are more changes than the limit allows.
         """
         linear = f"line_{self.index}" in self.kernel.switching(parts[0].data)
         cuts = self._of_lines(parts) if linear else self._of_curves(parts)

@@ -40,12 +40,8 @@ def imported(path: Path, cfg: Path | None = None, until: str | None = None, urge
     urgent : bool
         Whether a transition whose guard holds off the end of the invariant is made as soon as it does, not refused.
 
-    Raises
-    ------
-    ModelError
-        A file that is none of SpaceEx, or what a model cannot keep.
-    UsageError
-        A file that cannot be read, or no end of the run.
+    Raises ModelError: a file that is none of SpaceEx, or what a model cannot keep.
+    Raises UsageError: a file that cannot be read, or no end of the run.
     """
     cfg = cfg or (path.with_suffix(".cfg") if path.with_suffix(".cfg").is_file() else None)
     known = components(str(path), read_bytes(path))

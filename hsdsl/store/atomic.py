@@ -39,10 +39,8 @@ class New:
 def unplaced(path: str | os.PathLike[str]) -> Generator[New]:
     """Open a new file in the folder of ``path``; it vanishes unless it is finished and placed. A link is followed.
 
-    Raises
-    ------
-    UsageError
-        When the file cannot be written (no such folder, no permission, full disk); what was there is untouched.
+    Raises UsageError: when the file cannot be written (no such folder, no permission, full disk); what was there is
+    untouched.
     """
     target = Path(os.path.realpath(path))
     try:
@@ -57,10 +55,7 @@ def unplaced(path: str | os.PathLike[str]) -> Generator[New]:
 def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO]:
     """Open a new file that takes the place of ``path`` when the block ends well, and vanishes otherwise.
 
-    Raises
-    ------
-    UsageError
-        As for :func:`unplaced`.
+    Raises UsageError: as for :func:`unplaced`.
     """
     with unplaced(path) as new:
         yield new.file

@@ -37,10 +37,7 @@ class Lossless:
     def pack(self, value: Any) -> Any:
         """Make a value one that JSON has.
 
-        Raises
-        ------
-        TypeError
-            For a value of a kind that executions do not record.
+        Raises TypeError: for a value of a kind that executions do not record.
         """
         match value:
             case np.generic():

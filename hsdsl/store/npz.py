@@ -66,10 +66,7 @@ def save_npz(execution: Execution, file: BinaryIO) -> None:
 def load(path: str | os.PathLike[str]) -> Execution:
     """Read an execution from an ``.npz`` file that :meth:`hsdsl.execution.Execution.save` wrote.
 
-    Raises
-    ------
-    UsageError
-        When the file cannot be read, is damaged, is of a later version, or holds something else.
+    Raises UsageError: when the file cannot be read, is damaged, is of a later version, or holds something else.
     """
     name = os.fspath(path)
     if Path(path).suffix.lower() != ".npz":

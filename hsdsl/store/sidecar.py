@@ -38,10 +38,7 @@ def sidecar_of(table: Path) -> Path:
 def read_sidecar(table: str | os.PathLike[str]) -> dict[str, Any]:
     """Read what the sidecar of a table says, if it is that table's.
 
-    Raises
-    ------
-    UsageError
-        There is none, it is damaged, or the table was changed or replaced since.
+    Raises UsageError: there is none, it is damaged, or the table was changed or replaced since.
     """
     path = sidecar_of(Path(table))
     try:

@@ -76,10 +76,7 @@ def write_parquet(samples: Samples, file: BinaryIO) -> None:
 
     Multiprecision numbers are decimal text, since Parquet has no type that holds them.
 
-    Raises
-    ------
-    UsageError
-        When pyarrow is not installed.
+    Raises UsageError: when pyarrow is not installed.
     """
     arrow = optional("pyarrow", "a Parquet file")
     parquet = optional("pyarrow.parquet", "a Parquet file")

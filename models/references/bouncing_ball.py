@@ -29,10 +29,7 @@ def bouncing_ball(height: Any = 10, *, g: Any = "9.81", e: Any = "0.8", until: A
     Execution
         In mode ``fly`` with states ``h``, ``v``; ``settings["error"]`` bounds its error at any time.
 
-    Raises
-    ------
-    UsageError
-        A number is out of range.
+    Raises UsageError: a number is out of range.
     """
     h, g, e, end = (number(x, name) for x, name in ((height, "height"), (g, "g"), (e, "e"), (until, "until")))
     if not (h > 0 and g > 0 and 0 < e < 1 and end >= 0):

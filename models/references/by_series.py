@@ -25,10 +25,7 @@ def by_series(
 ) -> Execution:
     """Solve a system twice, with a step and with half of it, and cut the finer solution into pieces.
 
-    Raises
-    ------
-    UsageError
-        The solutions make other transitions, or the order of simultaneous ones matters.
+    Raises UsageError: the solutions make other transitions, or the order of simultaneous ones matters.
     """
     x, end = [mp.convert(a) for a in start], mp.convert(until)
     coarse, fine = (solve(modes, mode, x, end, mp.mpf(step) / n) for n in (1, 2))

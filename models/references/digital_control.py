@@ -33,10 +33,7 @@ def digital_control(x: Any = -1, y: Any = -1, *, until: Any = 2) -> Execution:
     Execution
         In modes ``D0`` to ``D3`` with states ``x``, ``y``; ``settings["error"]`` bounds its error at any time.
 
-    Raises
-    ------
-    UsageError
-        The start is not in the first quadrant.
+    Raises UsageError: the start is not in the first quadrant.
     """
     start, end = (number(x, "x"), number(y, "y")), number(until, "until")
     if max(start) > 0 or end < 0:

@@ -34,10 +34,7 @@ def oscillator(example: int) -> Execution:
     Execution
         In mode ``free`` with states ``x``, ``v``; ``settings["error"]`` bounds its error at any time.
 
-    Raises
-    ------
-    UsageError
-        There is no such example.
+    Raises UsageError: there is no such example.
     """
     if example not in EXAMPLES:
         raise UsageError(f"Table I has examples 1 and 2, not {example!r}")

@@ -36,10 +36,7 @@ def pronking_runner(w: Any = 0) -> Execution:
         In the model's modes, with six states and a foot's position for each leg in stance; ``settings["error"]`` is its
         error at any time.
 
-    Raises
-    ------
-    UsageError
-        ``w`` is no number.
+    Raises UsageError: ``w`` is no number.
     """
     start = [0, mp.mpf("1.1"), 0, mp.mpf("3.4"), 0, number(w, "w")]
     return by_series("pronking-runner", "Pronking runner", MODES, "aerial", start, 2, "0.02")

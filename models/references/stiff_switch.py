@@ -126,10 +126,7 @@ def stiff_switch(
         In modes ``rising`` and ``falling`` with states ``y1`` and ``y2``; ``settings["error"]`` bounds its error at any
         time. In the fast decay behind a switch that is mostly what half a unit in the last place of its time makes.
 
-    Raises
-    ------
-    UsageError
-        A number is out of range.
+    Raises UsageError: a number is out of range.
     """
     named = {"y1": y1, "y2": y2, "fast": fast, "slow": slow, "high": high, "low": low, "until": until}
     given = {name: number(value, name) for name, value in named.items()}

@@ -110,10 +110,7 @@ def solve(
 
     Of transitions at one time the first in the model's order is made, with ``order`` -1 the last.
 
-    Raises
-    ------
-    UsageError
-        More than 1000 transitions.
+    Raises UsageError: more than 1000 transitions.
     """
     solved, t, x = Solved(), mp.zero, tuple(start)
     for _ in range(MOST):
@@ -190,10 +187,7 @@ def _after(modes: Mapping[str, Mode], mode: str, edge: Edge, x: Vector) -> Vecto
 def digits(a: Solved, b: Solved) -> int:
     """Return in how many digits behind the point two solutions agree, in times and states of transitions and ends.
 
-    Raises
-    ------
-    UsageError
-        They make other transitions.
+    Raises UsageError: they make other transitions.
     """
     if [s.edge for s in a.stretches] != [s.edge for s in b.stretches]:
         raise UsageError("half the step makes other transitions")

@@ -52,10 +52,7 @@ def thermostat(
     Execution
         In modes ``heating`` and ``idle`` with state ``T``; ``settings["error"]`` bounds its error at any time.
 
-    Raises
-    ------
-    UsageError
-        A number is out of range.
+    Raises UsageError: a number is out of range.
     """
     named = {"rate": rate, "outside": outside, "heater": heater, "low": low, "high": high}
     room = Room(**{name: number(value, name) for name, value in named.items()})

@@ -26,10 +26,7 @@ FUNCTIONS |= {"asin": mp.asin, "atan": mp.atan}
 def evaluate(text: Any, names: Mapping[str, Any] | None = None) -> mp.mpf:
     """Evaluate arithmetic over numbers, ``pi``, ``nan``, a few functions and ``names``; decimals are taken exactly.
 
-    Raises
-    ------
-    KeyError
-        A name or function that is not known.
+    Raises KeyError: a name or function that is not known.
     """
     known = {"pi": mp.pi, "nan": mp.nan, **(names or {})}
     source = str(text)

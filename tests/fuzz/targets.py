@@ -142,10 +142,7 @@ def prepared(folder: Path) -> Path:
 def feed(kind: str, data: str | bytes, rng: Random, folder: Path, share: float = 0.15) -> str:
     """One input through what reads it; the answer is how far it got.
 
-    Raises
-    ------
-    Exception
-        Anything but the refusals of the house: a defect.
+    Raises Exception: anything but the refusals of the house: a defect.
     """
     if kind == "expressions":
         return feed_expression(str(data), rng, share)

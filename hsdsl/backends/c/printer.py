@@ -35,9 +35,6 @@ C = Language(
 def function_body(definition: ast.FunctionDef, names: Mapping[str, str]) -> str:
     """Print the body of a routine; ``names`` says what its arguments and data are called in C.
 
-    Raises
-    ------
-    ValueError
-        The text is not of the language of routines.
+    Raises ValueError: the text is not of the language of routines.
     """
     return "\n".join(f"  {line}" for line in C.body(definition, names))

@@ -25,10 +25,7 @@ PEERS = {
 def prepare(name: str, scene: Scene) -> Callable[[float], Result]:
     """Translate a scene for a peer.
 
-    Raises
-    ------
-    Refused
-        The peer is not installed, or cannot run this model.
+    Raises Refused: the peer is not installed, or cannot run this model.
     """
     try:
         peer = import_module(f"hsdsl.chart.peers.{PEERS[name]}")

@@ -88,10 +88,7 @@ def stability_map(
     watch : callable
         Called with how many runs are done, and how many there are.
 
-    Raises
-    ------
-    UsageError
-        A name that cannot be varied, an empty range, or settings that no run can have.
+    Raises UsageError: a name that cannot be varied, an empty range, or settings that no run can have.
     """
     base = {"parameters": dict(parameters or {}), "initial": dict(initial or {}), "settings": dict(settings or {})}
     until = float(model.pipeline.prepare({k: v for k, v in base.items() if v}).settings.until)

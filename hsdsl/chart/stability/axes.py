@@ -42,10 +42,7 @@ class Axis:
 def read_axes(model: Model, text: str, until: float) -> tuple[Axis, Axis]:
     """Read ``NAME[=FROM:TO[:COUNT[:lin]]],NAME[=...]``; values are spaced logarithmically, or evenly with ``lin``.
 
-    Raises
-    ------
-    UsageError
-        Not two different names, a name that cannot vary, or a range that is empty or no range.
+    Raises UsageError: not two different names, a name that cannot vary, or a range that is empty or no range.
     """
     parts = [part.strip() for part in text.split(",") if part.strip()]
     if len(parts) != 2:
@@ -79,10 +76,7 @@ def _axis(model: Model, part: str, until: float) -> Axis:
 def _kind(model: Model, name: str) -> str:
     """Which group a name belongs to.
 
-    Raises
-    ------
-    UsageError
-        The model does not let it vary.
+    Raises UsageError: the model does not let it vary.
     """
     parameters, states = list(model.program.parameters), list(model.program.all_states)
     if name in parameters:
