@@ -63,7 +63,7 @@ def test_there_are_enough_and_no_two_are_called_the_same():
 def test_write(told):
     answers = {name: told(case)[1] for name, case in CASES.items()}
     records = (f"{MARK}{name}\n{answer.removesuffix(ending(answer))}" for name, answer in answers.items())
-    ANSWERS.write_text("\n".join(records), encoding="utf-8")
+    ANSWERS.write_text("".join(records), encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", CASES)
