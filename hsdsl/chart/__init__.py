@@ -19,6 +19,7 @@ warm and in turns, and compares each result with the model's exact execution.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import nan
 
 from hsdsl.chart.judge import Judgement, judge, rho
 from hsdsl.chart.peers import PEERS
@@ -60,7 +61,8 @@ def work_precision(
     rounds : int
         Timed turns; one before them warms everything and is judged.
     patience : float
-        Seconds; a run that takes longer is timed once, and the same tool at tighter settings is left out.
+        Seconds; a run that takes longer is ended, and the same tool at tighter settings is left out. A search for rho
+        may take as long.
     with_rho : bool
         Also compute rho (of our own runs; a peer's samples are no execution).
     watch : callable
@@ -76,11 +78,13 @@ def work_precision(
     for name in against:
         attempts += peer_runs(scene, name, tolerances, remarks)
 
-    def judged(attempt: Attempt, result: Result) -> Judgement:
+    def judged(attempt: Attempt, result: Result | None) -> Judgement:
+        if result is None or result.interrupted:
+            return Judgement("failed", nan, None, f"no end within {patience:g} s")
         judgement = judge(scene, result)
         if with_rho and result.execution is not None:
             watch(f"rho of {attempt.tool.label} {attempt.setting}")
-            judgement = judgement.with_rho(rho(scene, result.execution))
+            judgement = judgement.with_rho(rho(scene, result.execution, patience))
         return judgement
 
     done = race(attempts, judged, rounds, patience, watch)

@@ -60,8 +60,8 @@ def _wrong(scene: Scene, result: Result, error: float, others: int) -> str:
     return ""
 
 
-def rho(scene: Scene, execution: Execution) -> Interval | None:
-    """Return the distance to the exact execution."""
+def rho(scene: Scene, execution: Execution, seconds: float) -> Interval | None:
+    """Return the distance to the exact execution; None where the run does not get to its end."""
     if not execution.stop.complete:
-        return Interval(nan, inf)
-    return distance(execution, scene.exact, model=scene.model)
+        return None
+    return distance(execution, scene.exact, model=scene.model, seconds=seconds)

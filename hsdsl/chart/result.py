@@ -40,6 +40,11 @@ class Result:
     problem: str | None = None
     execution: Execution | None = None
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether the run was ended from outside; ours keep what they have computed."""
+        return self.execution is not None and self.execution.stop.reason == "interrupted"
+
     @cached_property
     def modes(self) -> Array:
         """The mode at each sample, shape (samples,), empty after the end of the run."""

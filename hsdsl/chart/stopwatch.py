@@ -1,12 +1,19 @@
-"""Warm times, in turns: a disturbance of the machine affects everything that is compared."""
+"""Warm times, in turns: a disturbance of the machine affects everything that is compared.
+
+A run that takes too long is ended as by Ctrl-C. A tool that does not look for that is waited for.
+"""
 
 from __future__ import annotations
 
+import _thread
+import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
 from statistics import median
+from threading import Lock, Timer, main_thread
+from types import TracebackType
 from typing import TypeVar
 
 from hsdsl.chart.result import Attempt, Result
@@ -33,38 +40,73 @@ class Timed:
         return (min(self.turns), max(self.turns)) if self.turns else (nan, nan)
 
 
+class Deadline:
+    """Interrupt what the block does after some seconds; ``passed`` says whether that was done."""
+
+    def __init__(self, seconds: float) -> None:
+        self.passed, self._over, self._lock = False, False, Lock()
+        self._timer = Timer(seconds, self._pass)
+        self._timer.daemon = True
+
+    def _pass(self) -> None:
+        with self._lock:
+            if not self._over:
+                self.passed = True
+                if hasattr(signal, "pthread_kill"):  # else not where the main thread sleeps
+                    signal.pthread_kill(main_thread().ident or 0, signal.SIGINT)
+                else:
+                    _thread.interrupt_main()
+
+    def __enter__(self) -> Deadline:
+        self._timer.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: BaseException | TracebackType | None) -> bool:
+        try:
+            with self._lock:
+                self._over = True
+        except KeyboardInterrupt:  # it came in between
+            self._over = True
+        self._timer.cancel()
+        return self.passed and kind is KeyboardInterrupt
+
+
 def race(
     attempts: Sequence[Attempt],
-    judge: Callable[[Attempt, Result], Judged],
+    judge: Callable[[Attempt, Result | None], Judged],
     rounds: int,
     patience: float,
     watch: Callable[[str], None],
 ) -> Iterator[tuple[Attempt, Judged, Timed]]:
     """Warm every attempt and judge its result, then time all of them in turns.
 
-    An attempt that took longer than ``patience`` is not run again, and the tool's attempts after it are left out:
-    attempts come in the order of rising effort.
+    An attempt that takes longer than ``patience`` is ended, and the tool's attempts after it are left out: attempts
+    come in the order of rising effort. One that leaves nothing then has the result None.
     """
-    warmed: list[tuple[Attempt, Judged, float]] = []
+    warmed: list[tuple[Attempt, Judged, float, bool]] = []
     exhausted: set[str] = set()
     for attempt in attempts:
         if attempt.tool.label in exhausted:
             continue
         watch(f"{attempt.tool.label} {attempt.setting}")
         began = time.perf_counter()
-        result = attempt.run()
+        result: Result | None = None
+        with Deadline(patience) as deadline:
+            result = attempt.run()
         seconds = time.perf_counter() - began
-        warmed.append((attempt, judge(attempt, result), seconds))
+        if result and result.interrupted and not deadline.passed:
+            raise KeyboardInterrupt
+        warmed.append((attempt, judge(attempt, result), seconds, deadline.passed))
         del result
-        if seconds > patience:
+        if deadline.passed:
             exhausted.add(attempt.tool.label)
     turns: list[list[float]] = [[] for _ in warmed]
     for turn in range(rounds):
-        for times, (attempt, _, seconds) in zip(turns, warmed, strict=True):
-            if seconds <= patience:
+        for times, (attempt, _, _, ended) in zip(turns, warmed, strict=True):
+            if not ended:
                 watch(f"turn {turn + 1} of {rounds}: {attempt.tool.label} {attempt.setting}")
                 times.append(_turn(attempt))
-    for times, (attempt, judged, seconds) in zip(turns, warmed, strict=True):
+    for times, (attempt, judged, seconds, _) in zip(turns, warmed, strict=True):
         yield attempt, judged, Timed(tuple(times or [seconds]), seconds)
 
 

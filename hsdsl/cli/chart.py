@@ -35,7 +35,12 @@ def chart(
     clearance: Annotated[float, option("DT", "Samples nearer than this to an exact jump do not count.")] = 1e-4,
     digits: Annotated[int, option("N", "Digits of the reference where no exact execution is known.")] = 8,
     rounds: Annotated[int, option("N", "Timed turns, after one that warms up.")] = 5,
-    patience: Annotated[float, option("S", "Slower tools get no tighter setting.")] = 10.0,
+    patience: Annotated[
+        float,
+        option(
+            "S", "Seconds of a run or of a search for rho; a longer run is ended, its tool gets no tighter setting."
+        ),
+    ] = 10.0,
     rho: Annotated[bool, Option(help="Also compute rho of our runs.")] = True,
     out: Annotated[Path | None, option("FILE", "Write the table: .csv.")] = None,
     plot: Annotated[Path | None, option("FILE", "Draw the chart: .png or .svg.")] = None,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
-from functools import partial
+import time
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from math import isnan
 from pathlib import Path
@@ -138,30 +139,53 @@ def test_what_cannot_run_is_remarked(ball):
     assert all(remark.startswith("relaxed taylor c: ") for remark in remarks)
 
 
-def test_turns_alternate_and_the_slow_are_run_once():
-    calls: list[str] = []
+@dataclass
+class Calls:
+    """Attempts that sleep, and the result of a run that is left to its end."""
 
-    def run(name):
-        calls.append(name)
-        return name
+    made: list[str] = field(default_factory=list)
+    interrupted: bool = False
 
-    clock = {"slow": 1.0}
+    def attempt(self, tool, name, seconds=0.0):
+        def run():
+            self.made.append(name)
+            time.sleep(seconds)
+            return self
 
-    def slow(name):
-        import time
+        return Attempt(Tool(tool), "step", 1.0, run)
 
-        time.sleep(clock["slow"] * 0.05)
-        return run(name)
 
-    attempts = [
-        Attempt(Tool("a"), "step", 1.0, partial(slow, "a1")),
-        Attempt(Tool("a"), "step", 0.1, partial(slow, "a2")),
-        Attempt(Tool("b"), "step", 1.0, partial(run, "b1")),
-    ]
-    done = list(race(attempts, lambda _, result: result, 2, 0.04, lambda _: None))
-    assert [attempt.tool.name for attempt, _, _ in done] == ["a", "b"]  # a2 left out: a1 was beyond patience
-    assert calls.count("a1") == 1
-    assert calls.count("b1") >= 3
+def test_turns_alternate_and_the_slow_are_ended():
+    calls = Calls()
+    attempts = [calls.attempt("a", "a1", 60), calls.attempt("a", "a2"), calls.attempt("b", "b1")]
+    began = time.perf_counter()
+    done = list(race(attempts, lambda _, result: result, 2, 0.2, lambda _: None))
+    assert time.perf_counter() - began < 30
+    assert [(attempt.tool.name, result) for attempt, result, _ in done] == [("a", None), ("b", calls)]
+    assert calls.made.count("a1") == 1
+    assert "a2" not in calls.made
+    assert calls.made.count("b1") >= 3
+
+
+def test_ctrl_c_ends_a_race():
+    with pytest.raises(KeyboardInterrupt):
+        list(race([Calls(interrupted=True).attempt("a", "a1")], lambda *_: None, 1, 10, lambda _: None))
+
+
+@pytest.mark.parametrize("engine", ["c", "python"])
+def test_runs_that_are_ended_or_stop_have_rows(engine):
+    model = hsdsl.loads(
+        "hsdsl: 1\nmodes: {m: {flow: {x: v, v: -1e12*x}}}\ninitial: {mode: m, x: 1, v: 0}\nexperiment: {until: 1}"
+    )
+    scene = Scene.of(model, exact=model.simulate(until=0.001), until=100, samples=10)
+    rows, _ = work_precision(
+        scene, schemes=["located"], methods=["dopri5", "euler"], engines=[engine], tolerances=[1e-6], steps=[1e-3],
+        patience=0.3, rounds=1,
+    )  # fmt: skip
+    ended, grown = rows
+    assert (ended.judgement.verdict, ended.judgement.why) == ("failed", "no end within 0.3 s")
+    assert grown.judgement.verdict == "failed"
+    assert grown.judgement.rho is None
 
 
 def test_the_table_has_one_line_a_run(ball):
