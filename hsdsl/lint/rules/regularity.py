@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hsdsl.completion.printer import text_of
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, positive, zero
@@ -14,6 +15,7 @@ from hsdsl.lint.analysis.wording import at
 from hsdsl.lint.finding import Alike, Finding, Severity
 from hsdsl.lint.source_expressions import SourceExpression
 from hsdsl.lint.subject import Subject
+from hsdsl.names import shown
 from hsdsl.system import Mode
 
 _END = "end the domain before, with a guard or a wall"
@@ -117,7 +119,7 @@ def vanishing_divisor(subject: Subject) -> Iterator[Finding]:
                 answer, severity = place.witness([(zero(divisor),)]), "note"
             if answer.somewhere:
                 domain = f"in the domain of the mode '{place.mode.name}'"
-                message = f"what is divided by here is zero {place.at(answer, divisor)}, {domain}"
+                message = f"the divisor `{shown(text_of(divisor))}` here is zero {place.at(answer, divisor)}, {domain}"
                 alike.add(divisor, place.finding(message, _END, answer, severity))
     yield from alike
 
