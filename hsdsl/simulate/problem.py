@@ -35,8 +35,8 @@ class Problem:
         return Problem(self.program, self.kernel, settings, self.timeline, self.mode, self.states, self.x)
 
     def tie(self, t: Number) -> Number:
-        """Times closer than this are the same instant."""
-        return TIE * max(self.settings.until, abs(t))
+        """Times closer than this to t are the same instant, however long the run goes on."""
+        return TIE * abs(t)
 
     def output_values(self, mode: str, t: Number, x: State) -> State:
         """Outputs at a state of a mode, the input taken on the segment that starts at or holds t."""

@@ -25,7 +25,7 @@ from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.stall_detection import Patience
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import reached, reached_in_strip
-from hsdsl.simulate.surfaces import TIE, Crossing, StepFailure, Trial
+from hsdsl.simulate.surfaces import Crossing, StepFailure, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
 NOT_FINITE, TOO_WRONG, UNSOLVED = StepFailure("not finite"), StepFailure("error"), StepFailure("unsolved")
@@ -224,9 +224,9 @@ def go_on(run: Run, here: ModeState) -> ModeState | Stop:
 
 
 def standing_on(run: Run, here: ModeState) -> list[Crossing]:
-    """Guards that the state is on, to round-off or a tie relative to the time passed."""
+    """Guards that the state is on, to round-off or a tie."""
     t, x, zero = here.t, here.x, run.arithmetic.zero
-    return [Crossing(k, zero, t, x, zero) for k in here.surfaces.standing(t, x, TIE * t)]
+    return [Crossing(k, zero, t, x, zero) for k in here.surfaces.standing(t, x, run.tie(t))]
 
 
 def stuck(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Event | Stop:

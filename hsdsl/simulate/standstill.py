@@ -54,6 +54,10 @@ class Standstill:
         grown = any(a * a * unit > 1 for a in self.x)
         if not grown and (found := self._without_value_later()):
             return Stop("not_finite", t, found)
+        if not grown and not t > 0:  # where time has any number of digits
+            length = show(self.problem.settings.until)
+            sentence = f"no step leads on at t = {show(t)} in mode {name}, however small a part of the run, {length}"
+            return Stop("not_finite", t, f"{sentence}: take a shorter one")
         how = "grows beyond all numbers" if grown else "changes faster than time can tell"
         state = self._largest() if grown else self._fastest()
         return Stop("not_finite", t, f"{state} {how} at t = {show(t)} in mode {name}")
@@ -174,5 +178,6 @@ class Standstill:
 
 
 def standstill(run: Run, here: ModeState) -> Standstill:
-    """The present place of the Python loop."""
-    return Standstill(run, here.index, here.segment, here.t, here.x, here.arc.scales, run.control.h)
+    """The present place of the Python loop, in its own mode where guards hold the state."""
+    segment = here.segment if here.flow == here.index else run.timeline.at(here.t)
+    return Standstill(run, here.index, segment, here.t, here.x, here.arc.scales, run.control.h)

@@ -1,4 +1,4 @@
-"""Jumps of inputs at the end of a run: they are made there, once, by both engines and in all that a run gives."""
+"""How runs end: jumps of inputs there are made once; a run that cannot get to its end stops with the right reason."""
 
 from __future__ import annotations
 
@@ -83,3 +83,42 @@ def test_streamed_rows_end_behind_the_jump(tmp_path: Path) -> None:
     streamed = hsdsl.loads(STEPS).stream(tmp_path / "run.csv", every=10**9)
     last = (tmp_path / "run.csv").read_text().splitlines()[-1].split(",")
     assert streamed.transitions == 1 and "high" in last and float(last[0]) == 3
+
+
+TICKS = """
+hsdsl: 1
+modes: {a: {flow: {x: 1, c: 0}, transitions: [{when: x >= 1, to: a, reset: {x: 0, c: c + 1}}]}}
+initial: {mode: a, x: 0, c: 0}
+experiment: {until: 10}
+"""
+HELD = """
+hsdsl: 1
+modes:
+  a:
+    flow: {h: v, v: -10, w: 1, s: sqrt(1 - w)}
+    transitions: [{when: h <= 0, if: v <= 0, to: a, reset: {v: -v/2}}]
+initial: {mode: a, h: 0, v: 0, w: 0, s: 0}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "radau"])
+@pytest.mark.parametrize("until", [1e4, 1e12, 1e14])
+def test_the_length_of_a_run_makes_no_instants_one(until, method, engine):
+    run = hsdsl.loads(TICKS).simulate(until=until, method=method, max_transitions=50, engine=engine)
+    assert run.stop.reason == "transition_limit"
+    assert [made.time for made in run.transitions] == pytest.approx(range(1, 51), rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_run_too_long_for_its_steps_says_so(engine):
+    stop = hsdsl.loads(TICKS).simulate(until=1e300, engine=engine).stop
+    assert (stop.reason, stop.time) == ("not_finite", 0)
+    assert "take a shorter one" in stop.message
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_flow_without_a_value_along_a_guard_is_named(engine):
+    stop = hsdsl.loads(HELD).simulate(engine=engine).stop
+    assert stop.message.startswith("the flow of s, sqrt(1 - w), has no finite value at t = 1 ")

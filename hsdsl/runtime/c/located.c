@@ -127,7 +127,7 @@ static int guards_at(hs_run *run, const hs_crossing *wall) {
   const hs_time time = wall->time, theta = wall->theta, depth = wall->depth;
   int count = 0;
   copy(run->q, wall->state, run->here.dimension);
-  standing(run, time, run->q, tie(run, time), run->tied);
+  standing(run, time, run->q, tie(time), run->tied);
   for (int k = 0; k < run->here.table->edges; k++) {
     if (!run->tied[k]) continue;
     hs_crossing *const crossing = &run->crossings[count++];
@@ -193,7 +193,7 @@ static int first_event(hs_run *run) {
     else if (!wall || crossing->time < wall->time)
       wall = crossing;
   }
-  for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(run, wall->time);
+  for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(wall->time);
   if (wall && !tied && !(guards = guards_at(run, wall))) return walked_out(run, wall);
   if (!guards) return GOES_ON;
   if ((guards = with_unseen(run, guards)) == RAISED) return WITHOUT_VALUE;
@@ -336,7 +336,7 @@ static int located_flow(hs_run *run) {
 static int same_instant(const hs_run *run, hs_time t) {
   if (!run->jump) return 0;
   const hs_time resumed = made_before(run, 0)->resumed;
-  return resumed == resumed && t - resumed <= tie(run, t);
+  return resumed == resumed && t - resumed <= tie(t);
 }
 
 /* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
@@ -349,7 +349,7 @@ static int crowded(hs_run *run, const hs_crossing *crossing) {
   if (run->jump < FREE || contraction(run, &flight, &ratio) || flown(run, t) > run->epsilon) return 0;
   const hs_time since = t - made_before(run, FREE - 1)->time;
   for (int i = 0; i < FREE; i++) again |= made_before(run, i)->edge == k && made_before(run, i)->mode == run->here.mode;
-  if (!again && since <= tie(run, t)) return 0;
+  if (!again && since <= tie(t)) return 0;
   return !(of_contacts(run) && run->here.table->edge[k].contact >= 0 && !keeps(run, t, crossing->state, k));
 }
 
@@ -370,7 +370,7 @@ static int jump(hs_run *run) {
     if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);
     run->noted_crowded = 1;
     resumed = t + run->epsilon;
-    if (resumed > until + tie(run, until)) {
+    if (resumed > until + tie(until)) {
       hs_time rows[2][2] = {{t, 0.0}, {until, until - t}};
       strip(run, 2, rows, crossing->state);
       record(run, crossing, NAN, without_value ? 0 : run->after, 0);
@@ -383,7 +383,7 @@ static int jump(hs_run *run) {
     hs_time rows[2][2] = {{t, 0.0}, {resumed, run->epsilon}};
     strip(run, 2, rows, crossing->state);
   }
-  const hs_real since = run->alternatives_count || same_instant(run, t) ? tie(run, t) : 0.0;
+  const hs_real since = run->alternatives_count || same_instant(run, t) ? tie(t) : 0.0;
   const int flowed = has_flowed(run, t);
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);

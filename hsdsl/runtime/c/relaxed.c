@@ -42,10 +42,10 @@ static void sizes(hs_run *run, const hs_real *x, const hs_real *z) {
   }
 }
 
-/* Guards on which the state is, to round-off or a tie relative to the time passed, as crossings. */
+/* Guards on which the state is, to round-off or a tie, as crossings. */
 static int standing_on(hs_run *run) {
   int count = 0;
-  standing(run, run->here.t, run->x, HS_TIE * run->here.t, run->tied);
+  standing(run, run->here.t, run->x, tie(run->here.t), run->tied);
   for (int k = 0; k < run->here.table->edges; k++) {
     if (!run->tied[k]) continue;
     hs_crossing *crossing = &run->crossings[count++];
@@ -192,7 +192,7 @@ static int through_strip(hs_run *run) {
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   hs_time resumed = t1 + (run->epsilon - depth);
   const int without_value = reset(run, run->landed);
-  if (resumed > until + tie(run, until)) {
+  if (resumed > until + tie(until)) {
     hs_time rows[3][2] = {{t, depth * 0}, {t1, depth}, {until, depth + (until - t1)}};
     strip(run, 3, rows, crossing->state);
     record(run, crossing, NAN, without_value ? 0 : run->after, 0);

@@ -70,7 +70,7 @@ static void choose(hs_run *run, int count) {
   hs_crossing *first = &run->crossings[0];
   for (int i = 1; i < count; i++)
     if (run->crossings[i].time < first->time) first = &run->crossings[i];
-  const hs_real since = tie(run, first->time);
+  const hs_real since = tie(first->time);
   hs_real depth = first->depth;
   int chosen = first->edge;
   standing(run, first->time, first->state, since, run->tied);

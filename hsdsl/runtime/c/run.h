@@ -281,7 +281,7 @@ HS_EXPORT void hs_go_on(hs_task *task, hs_pause *pause, hs_time until, int chang
 /* The earlier of two instants, the first where they are one. */
 static inline hs_time earlier(hs_time a, hs_time b) { return b < a ? b : a; }
 
-static inline hs_real tie(const hs_run *run, hs_time t) { return HS_TIE * hs_max(run->until, fabs(t)); }
+static inline hs_real tie(hs_time t) { return HS_TIE * fabs(t); }
 
 static inline int all_finite(const hs_real *v, int n) {
   for (int i = 0; i < n; i++)

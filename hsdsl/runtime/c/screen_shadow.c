@@ -50,7 +50,7 @@ static int shadow_jumps(hs_view *v, hs_shadow *c, int64_t j, double *errors) {
   const double *const before = screen->run.before + j * screen->model->width;
   if (made->entry || !shadow_crosses(v, c, made->edge)) return 0;
   for (int i = 0; i < c->table->dimension; i++) grow(&errors[i], fabs(before[i] - c->y[i]));
-  v->time_errors[j] = hs_max(j ? v->time_errors[j - 1] : tie_of(screen, screen->run.times[screen->run.rows - 1]),
+  v->time_errors[j] = hs_max(j ? v->time_errors[j - 1] : tie_of(screen, 0.0),
                       fabs(made->time - c->t));
   return !hs_changed(edge, edge->reset, c->p, c->t, c->y, c->y, c->x);
 }

@@ -142,12 +142,13 @@ static int takes_time(const hs_record *run, int64_t arc) {
   return run->arc[arc].first <= last && run->times[last] > run->times[run->arc[arc].first];
 }
 
-static double tie_of(const hs_screen *s, double t) { return HS_TIE * hs_max(s->until, fabs(t)); }
+/* Times closer than this are not told apart; none is known better than the end of the run. */
+static double tie_of(const hs_screen *s, double t) { return HS_TIE * hs_max(s->run.times[s->run.rows - 1], fabs(t)); }
 
 /* How wrong the time is of what happens at a time. */
 static double time_error_at(const hs_view *v, double t) {
   const hs_screen *s = v->s;
-  const double tie = tie_of(s, s->run.times[s->run.rows - 1]);
+  const double tie = tie_of(s, 0.0);
   int64_t low = 0, high = s->run.transitions;
   while (low < high) {
     const int64_t middle = (low + high) / 2;

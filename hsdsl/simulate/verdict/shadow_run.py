@@ -141,7 +141,7 @@ class ShadowRun:
         kernel = self.problem.kernel.bind(self.modes[arc.mode], self.data)
         found = [k for k, edge in enumerate(mode.edges) if edge.name == made.edge]
         k = min(found, key=lambda k: abs(kernel.surfaces(made.time, *made.before.values())[k]))
-        tie, change, s = float(self.problem.tie(self.t)), np.inf, 0.0
+        tie, change, s = float(self.problem.tie(max(self.t, self.times[-1]))), np.inf, 0.0
         slope = kernel.flow(self.t, *y)
         for _ in range(MOST_CHANGES):
             value, rate = kernel.surfaces(self.t + s, *y)[k], kernel.rates[k](self.t + s, *y)[0]

@@ -124,9 +124,9 @@ def located_crossing(model, config, p, lane):
     here, facts = facts_here_and_at(bound, still, found, *points[1:])
     guards, walls, times = found & model.of(model.is_edge, mode), found & model.of(model.is_wall, mode), points[1]
     wall = jnp.argmin(jnp.where(walls, times, INF))
-    hits = walls.any() & ~(guards & (times <= times[wall] + ties(config, times[wall]))).any()
+    hits = walls.any() & ~(guards & (times <= times[wall] + ties(times[wall]))).any()
     at_wall = jax.tree.map(lambda rows: rows[wall], (facts, times, points[2]))
-    on = standing(model, still, *at_wall, ties(config, times[wall]))
+    on = standing(model, still, *at_wall, ties(times[wall]))
     leaves = mask & hits & ~on.any()
     guards = jnp.where(hits, on, guards)
     rows = jax.tree.map(lambda rows: jnp.where(hits, rows[wall], rows), (*points, facts))

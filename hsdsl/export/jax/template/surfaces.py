@@ -27,9 +27,9 @@ def states_at(x, pieces, shares):
     return jax.vmap(lambda piece, s: at(x, piece, s), (None if pieces.ndim == 2 else 0, 0))(pieces, shares)
 
 
-def ties(config, t):
+def ties(t):
     """Times closer than this are the same instant."""
-    return TIE * jnp.maximum(config.until, jnp.abs(t))
+    return TIE * jnp.abs(t)
 
 
 def standing(model, lane, facts, t, x, since):
@@ -46,7 +46,7 @@ def choose(model, config, lane, found, facts, times, states):
     ``facts`` are those at the times and states (rows).
     """
     first = jnp.argmin(jnp.where(found, times, INF))
-    since = ties(config, times[first])
+    since = ties(times[first])
     tied = found & (times - times[first] <= since)
     here = jax.tree.map(lambda rows: rows[first], facts)
     tied = tied | standing(model, lane, here, times[first], states[first], since)

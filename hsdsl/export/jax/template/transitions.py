@@ -149,7 +149,7 @@ def transit(model, config, p, lane, record, event):
     else:
         resumed = event.t + jnp.where(crowded(config, lane, edge, event.t) & ~entry, config.relaxation, 0.0)
     waits = resumed > event.t
-    late = waits & (resumed > config.until + ties(config, config.until))
+    late = waits & (resumed > config.until + ties(config.until))
     resumed = keeping(jnp.minimum(resumed, jnp.where(waits, config.until, resumed)), event.t)
     bad = ~jnp.isfinite(after).all() & ~late
     record = recorded(
@@ -199,7 +199,7 @@ def crowded(config, lane, edge, t):
     Those of one instant count only where the edge is one of theirs.
     """
     since = t - lane.times[0]
-    counts = (lane.loops == edge).any() | (since > ties(config, t))
+    counts = (lane.loops == edge).any() | (since > ties(t))
     flown = since - lane.waits.sum()
     return (lane.count >= FREE) & ~contraction(lane)[0] & (flown <= config.relaxation) & counts
 
@@ -208,6 +208,6 @@ def since_of(config, lane, event):
     """The time within which a surface that the flow passes is active: of tied transitions that of a tie."""
     if config.scheme == "relaxed":
         return jnp.asarray(0.0)
-    tie = ties(config, event.t)
+    tie = ties(event.t)
     at_this_instant = (lane.count > 0) & (event.t - lane.times[-1] - lane.waits[-1] <= tie)
     return frozen(jnp.where(event.tied | at_this_instant, tie, 0.0))

@@ -36,7 +36,6 @@ end
 function w = begin(m, p, s)
 % Everything that stays for a run, and room for what it writes.
   w = struct('m', m, 'p', p, 's', s, 'tab', m.method, 'stop', '', 'about', '', 'rows', 0, 'count', 0);
-  w.tie = 1e-12 * s.until;
   w.largest = 0.1 * s.until;
   if s.tolerance > 0
     w.h = w.largest / 100;
@@ -230,6 +229,11 @@ function yes = holds(w, q, k, t, x, d)
   end
 end
 
+function since = tie(t)
+% Times closer than this to t are the same instant.
+  since = 1e-12 * abs(t);
+end
+
 function found = on_guard(w, here, t, x, since)
 % Edges on whose guards the state is, with the flow pointing out.
   q = here.q;
@@ -402,7 +406,7 @@ function [w, here, event, done] = boundary(w, here)
   x = here.x;
   q = here.q;
   if t >= w.s.until && here.k >= numel(w.m.ends)
-    found = setdiff(on_guard(w, here, t, x, 1e-12 * t), here.rest);
+    found = setdiff(on_guard(w, here, t, x, tie(t)), here.rest);
     if ~isempty(found)
       [unused, best] = max(w.m.edge_priority{q}(found));
       if ~strcmp(w.s.scheme, 'relaxed')
@@ -487,7 +491,7 @@ function [w, here, event] = flow_located(w, here)
         halvings = halvings + 1;
       end
       if halvings > 120 || ~(t + h > t)
-        found = on_guard(w, here, t, x, w.tie);
+        found = on_guard(w, here, t, x, tie(t));
         if isempty(found)
           w = underflow(w, here, good);
         else
@@ -588,8 +592,8 @@ function event = first_crossing(w, here, t, h, x, k1, z, C, ends_at, d)
   [share, first] = min(found(:, 1));
   time = t + share * h;
   y = states{first};
-  tied = found((found(:, 1) - share) * h <= max(w.tie, 1e-12 * time), 2).';
-  tied = unique([tied, on_guard(w, here, time, y, w.tie)]);
+  tied = found((found(:, 1) - share) * h <= tie(time), 2).';
+  tied = unique([tied, on_guard(w, here, time, y, tie(time))]);
   fires = tied(tied <= edges);
   if isempty(fires)
     k = tied(1);
@@ -763,7 +767,7 @@ function [w, here] = jump(w, here, event)
     resumed = event.t + w.s.relaxation;
   end
   w.cascade{end + 1} = [target; after];
-  if resumed > w.s.until + w.tie
+  if resumed > w.s.until + tie(w.s.until)
     w = record(w, q, k, event.t, NaN, event.x, [], false);
     w = row(w, w.s.until, q, event.x);
     w = ended(w, 'until', sprintf('reached t = %.10g in the strip of %s', w.s.until, w.m.edge_names{q}{k}));
@@ -777,7 +781,7 @@ function [w, here] = jump(w, here, event)
   if relaxed
     [w, here] = enter(w, target, after, resumed, scale, 0, [], event.t);
   else
-    [w, here] = enter(w, target, after, resumed, scale, w.tie, [], []);
+    [w, here] = enter(w, target, after, resumed, scale, tie(event.t), [], []);
     w = flight(w, q, k, target, event.t);
     if isempty(w.stop) && here.q == q
       [w, here] = close_tail(w, here, k);
@@ -1042,7 +1046,7 @@ end
 function [w, event] = stuck(w, here, wall)
 % No step, however short, stays in the relaxed domain: take a guard that the state is on, or stop.
   event = [];
-  found = on_guard(w, here, here.t, here.x, 1e-12 * here.t);
+  found = on_guard(w, here, here.t, here.x, tie(here.t));
   if ~isempty(found)
     [unused, best] = max(w.m.edge_priority{here.q}(found));
     event = struct('k', found(best), 't', here.t, 'x', here.x, 'depth', 0, 't1', here.t, ...
@@ -1069,8 +1073,8 @@ end
 function event = choose(w, here, found, t1, z)
 % Of several crossings the earliest; of tied ones the highest priority, then the file's order.
   [time, first] = min([found.t]);
-  tied = [found([found.t] - time <= w.tie).k];
-  tied = unique([tied, on_guard(w, here, time, found(first).x, w.tie)]);
+  tied = [found([found.t] - time <= tie(time)).k];
+  tied = unique([tied, on_guard(w, here, time, found(first).x, tie(time))]);
   [unused, best] = max(w.m.edge_priority{here.q}(tied));
   k = tied(best);
   depth = found(first).depth;

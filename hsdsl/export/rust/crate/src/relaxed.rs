@@ -5,7 +5,7 @@ use crate::entry::Arrival;
 use crate::kernel::{Sink, State, Stop, StopReason};
 use crate::math::{finite, max, min, size};
 use crate::model::{E, M, SEGMENTS, W};
-use crate::run::{Crossing, Run, Trial, TIE};
+use crate::run::{Crossing, Run, Trial};
 use crate::surfaces::{Failure, Found};
 
 const MOST_HALVINGS: u32 = 122;
@@ -168,9 +168,9 @@ impl<S: Sink> Run<'_, S> {
         found
     }
 
-    /// Guards on which the state is, to round-off or a tie relative to the time passed.
+    /// Guards on which the state is, to round-off or a tie.
     fn standing_on(&self) -> ([Crossing; E], usize) {
-        let found = self.standing(self.t, &self.x, TIE * self.t);
+        let found = self.standing(self.t, &self.x, self.tie(self.t));
         let (mut crossings, mut count) = ([Crossing::NONE; E], 0);
         for k in 0..E {
             if found[k] {

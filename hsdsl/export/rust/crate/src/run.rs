@@ -6,7 +6,7 @@ use crate::model::{D, E, M, MODES, P, SEGMENTS, STAGES, STATES, W};
 use crate::table::Piece;
 
 pub const UNIT: f64 = 1.0 / 9007199254740992.0;
-pub const TIE: f64 = 1e-12;
+const TIE: f64 = 1e-12;
 
 /// Where a step crossed a guard: share of the step, time and state there, and the depth reached.
 #[derive(Clone, Copy)]
@@ -175,7 +175,7 @@ impl<S> Run<'_, S> {
     }
 
     pub(crate) fn tie(&self, t: f64) -> f64 {
-        TIE * max(self.settings.until, size(t))
+        TIE * size(t)
     }
 
     pub(crate) fn stop(&self, reason: StopReason, time: f64) -> Stop {
