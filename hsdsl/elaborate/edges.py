@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -126,64 +127,66 @@ def event_of(
 
     States that are ``still`` do not flow: what a condition chooses by them does not jump by itself.
     """
-    given = transition.event
-    if given is None:
-        for key in of_events(transition):
-            message = f"only a transition with `event` has `{key}`"
-            place = transition.delay if key == "delay" and transition.delay else transition.when
-            symbols.report(place.place, "HS323", message, "use `since`, or `event` instead of `when`")
+    if not _is_event(symbols, transition):
         return None
-    for key, other in (("when", transition.when), ("if", transition.condition)):
-        if other is not None and other.value != ABSENT:
-            message = f"a transition has either `event` or `{key}`"
-            symbols.report(other.place, "HS323", message, "join conditions by `and` under `event`")
-            return None
+    given = transition.event
     trigger = symbols.resolver.trigger(given, scope)
     delay = None if transition.delay is None else symbols.number(transition.delay, scope)
     ranked = transition.priority
     priority = None if isinstance(ranked, int) else symbols.number(ranked, scope)
     if trigger is None or (transition.delay and delay is None) or not (isinstance(ranked, int) or priority):
         return None
-    if not comparisons(trigger):
-        symbols.report(given.place, "HS323", "a condition that never changes is no event", "write an inequality")
+    if (fault := next(_faults(symbols, transition, trigger, still), None)) is not None:
+        symbols.report(given.place, "HS323", *fault)
         return None
-    if not _continuous(symbols, given, trigger, still):
-        return None
-    if not 1 <= transition.waiting <= MOST_WAITING:
-        message = f"`waiting`: expected a number from 1 to {MOST_WAITING}, got {transition.waiting}"
-        symbols.report(given.place, "HS323", message, "so many executions of an event can wait at a time")
-        return None
-    if delay is None and transition.values == "execution":
-        message = "only a transition with `delay` has `values`"
-        hint = "without a delay an event has the values where it is made: leave it out"
-        symbols.report(given.place, "HS323", message, hint)
-        return None
-    after = None if delay is None else delay.expr
-    flags = transition.persistent, transition.initially
-    rank = None if priority is None else priority.expr
     return Event(
         trigger,
         given.value,
-        after,
-        *flags,
+        None if delay is None else delay.expr,
+        transition.persistent,
+        transition.initially,
         waiting=transition.waiting,
-        priority=rank,
+        priority=None if priority is None else priority.expr,
         options=transition.options,
         at_execution=transition.values == "execution",
     )
 
 
-def _continuous(symbols: SymbolTable, given: Scalar, trigger: Trigger, still: frozenset[Any]) -> bool:
-    """Whether no comparison of an event jumps by itself; one that does is reported."""
+def _is_event(symbols: SymbolTable, transition: TransitionDocument) -> bool:
+    """Whether a transition has `event`, and no keys of other ones; what it has of both kinds is reported."""
+    if transition.event is None:
+        for key in of_events(transition):
+            message = f"only a transition with `event` has `{key}`"
+            place = transition.delay if key == "delay" and transition.delay else transition.when
+            symbols.report(place.place, "HS323", message, "use `since`, or `event` instead of `when`")
+        return False
+    for key, other in (("when", transition.when), ("if", transition.condition)):
+        if other is not None and other.value != ABSENT:
+            message = f"a transition has either `event` or `{key}`"
+            symbols.report(other.place, "HS323", message, "join conditions by `and` under `event`")
+            return False
+    return True
+
+
+def _faults(
+    symbols: SymbolTable, transition: TransitionDocument, trigger: Trigger, still: frozenset[Any]
+) -> Iterator[tuple[str, str]]:
+    """What is wrong with an event, and what to do: it never changes, jumps by itself, or has options out of range."""
+    if not comparisons(trigger):
+        yield "a condition that never changes is no event", "write an inequality"
     constants = still | {symbol(str(name)) for name in symbols.document.parameters}
     sampled = {symbol(str(name)) for name in symbols.document.inputs}
     for part in comparisons(trigger):
         residual = by_constants(part.residual, constants)
         if residual.free_symbols & sampled or residual.has(sign, floor):
             message = f"`{shown(part.text, 40)}` may jump, and an event is not looked for at jumps of samples or steps"
-            symbols.report(given.place, "HS323", message, "use `when`, which fires on entry there")
-            return False
-    return True
+            yield message, "use `when`, which fires on entry there"
+    if not 1 <= transition.waiting <= MOST_WAITING:
+        message = f"`waiting`: expected a number from 1 to {MOST_WAITING}, got {transition.waiting}"
+        yield message, "so many executions of an event can wait at a time"
+    if transition.delay is None and transition.values == "execution":
+        hint = "without a delay an event has the values where it is made: leave it out"
+        yield "only a transition with `delay` has `values`", hint
 
 
 def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
