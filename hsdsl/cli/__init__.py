@@ -11,13 +11,15 @@ import gc
 import os
 import sys
 
-from hsdsl import ahead, interrupts
-from hsdsl.cli.console import WRONG_USAGE, prepare
+from hsdsl import interrupts
 
 
 def main() -> None:
     """Run the command line (the ``hsdsl`` script)."""
     interrupts.expect()  # before anything that takes long to import
+    from hsdsl import ahead
+    from hsdsl.cli.console import WRONG_USAGE, prepare
+
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's other threads would only wait, and take time for it
     gc.set_threshold(100_000)  # collections during imports take a tenth of a short run
     atexit.register(gc.freeze)  # the collection at the end of the process takes a sixth of one

@@ -66,6 +66,13 @@ def test_control_c_at_any_moment(verb, times, tmp_path):
     assert len(left) <= 1  # what is left by one is removed by the next
 
 
+def test_next_to_nothing_is_imported_before_control_c_is_expected():
+    code = "import sys; before = {*sys.modules}; import hsdsl.cli; print(*sys.modules.keys() - before)"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert {name for name in loaded if name.startswith("hsdsl")} == {"hsdsl", "hsdsl.cli", "hsdsl.interrupts"}
+    assert not {"dataclasses", "re", "typing"} & {*loaded}  # the first of what takes long
+
+
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_in_the_background_of_a_shell_control_c_is_not_for_us(tmp_path):
     command = [sys.executable, "-c", START, *COMMANDS["run"]]
