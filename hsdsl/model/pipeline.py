@@ -45,7 +45,7 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
         program, files = cached
         return Pipeline(None, time.perf_counter() - began, files, program)
     lowered = ahead.taken(files, _RUNNING)
-    if lowered is not None:
+    if lowered is not None and _method_exists(lowered[0]):
         program, sliding, files = lowered
         made = Pipeline(None, time.perf_counter() - began, files, program)
         made.keep(program)
@@ -54,6 +54,11 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
         return made
     system = _elaborated(files)
     return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
+
+
+def _method_exists(program: Program) -> bool:
+    """Whether its method has a table; else it is refused with its place, which no kept or pickled program has."""
+    return program.method in (None, "auto", *METHODS)
 
 
 def _elaborated(files: ModelFiles) -> HybridSystem:
@@ -161,8 +166,7 @@ class Pipeline:
 
     def keep(self, program: Program, part: program_cache.Part = ()) -> None:
         """Keep a program for later runs."""
-        known = program.method in (None, "auto", *METHODS)  # else it is refused, with its place
-        if known and self._files is not None:
+        if self._files is not None and _method_exists(program):
             program_cache.keep(self._files, program, part)
 
     @property

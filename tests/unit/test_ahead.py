@@ -16,6 +16,7 @@ from hsdsl.elaborate import elaborate_files
 from hsdsl.errors import ModelError
 from hsdsl.files import ModelFiles
 from hsdsl.lower import lower
+from hsdsl.model.pipeline import pipeline_of
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="there is no other process elsewhere")
 
@@ -62,6 +63,15 @@ def test_errors_are_those_found_here():
         elaborate_files(files)
     assert there.value.diagnostics == here.value.diagnostics
     assert len(here.value.diagnostics) > 1
+
+
+def test_a_method_that_does_not_exist_is_refused_with_its_place():
+    system = "modes: {a: {flow: {x: 1}}}\ninitial: {mode: a, x: 0}\n"
+    files = ModelFiles.read("bad.yaml", None, f"hsdsl: 1\n{system}experiment: {{until: 1, method: ode45}}\n".encode())
+    ahead.begin(files)
+    with pytest.raises(ModelError) as error:
+        pipeline_of(files.path, None, files.text).resolve()
+    assert [(each.code, each.span.line, each.span.column) for each in error.value.diagnostics] == [("HS204", 4, 32)]
 
 
 def test_without_an_answer_there_is_none():
