@@ -127,9 +127,9 @@ def event_of(
 
     States that are ``still`` do not flow: what a condition chooses by them does not jump by itself.
     """
-    if not _is_event(symbols, transition):
-        return None
     given = transition.event
+    if not _is_event(symbols, transition) or given is None:
+        return None
     trigger = symbols.resolver.trigger(given, scope)
     delay = None if transition.delay is None else symbols.number(transition.delay, scope)
     ranked = transition.priority
