@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -19,6 +19,7 @@ POINTS = 4000  # that a curve should have at least, where its pieces are not str
 CELLS = 3000  # of the picture's width and height: two points in one cell look like one
 BANDS = 400  # with more changes of mode than this, time is cut into BINS and a bin may be of several modes
 BINS = 1500
+MOVING = 1000  # points of a guard that moves
 SEVERAL = "several modes"
 ROUND_OFF = 1e-12  # of the size of a state
 
@@ -73,6 +74,17 @@ class Curves:
             return np.full(len(self.samples), np.nan)
         values = self.samples[name]
         return np.where(np.isfinite(values), values, np.nan)
+
+
+def moving_levels(runs: Sequence[Curves], guards: Sequence[GuardLine]) -> Iterator[tuple[GuardLine, Array, Array]]:
+    """Each guard that moves, times of each run, and its values there; finite at most while its mode is occupied."""
+    for guard in guards:
+        for run in runs if guard.moving else ():
+            own = [(begin, end) for mode, begin, end in run.bands if mode in (guard.mode, SEVERAL)]
+            times = np.linspace(*run.span, MOVING)
+            inside = np.any([(begin <= times) & (times <= end) for begin, end in own], axis=0) if own else times < 0
+            assert guard.moving is not None
+            yield guard, times, np.where(inside, guard.moving(times), np.nan)
 
 
 def modes_of(runs: Sequence[Curves]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from hsdsl.execution import Execution
 from hsdsl.names import visible
 from hsdsl.parts import short_names
-from hsdsl.plot.curves import Array, Curves, curves
+from hsdsl.plot.curves import Array, Curves, curves, moving_levels
 from hsdsl.plot.parts import filled, inert, scripts, shared
 from hsdsl.plot.style import colours
 from hsdsl.plot.view import Pair, View, names_of
@@ -40,7 +40,7 @@ def page(runs: Sequence[Execution], view: View) -> str:
         "facts": _facts(runs, data, kept),
         "pictures": shared("pictures.html"),
         "summaries": _summaries(runs, labels, view),
-        "model": inert(_model(view, columns, shown, pairs, modes)),
+        "model": inert(_model(view, columns, shown, pairs, modes) | {"moving": list(_moving(view, data))}),
         "runs": inert([_run(*one, columns, modes) for one in zip(runs, data, kept, map(visible, labels), strict=True)]),
         "script": "\n".join([scripts(), shared("runs.js")]),
     }
@@ -82,6 +82,14 @@ def _model(view: View, columns: list[str], shown: list[str], pairs: Sequence[Pai
         "shown": list(map(visible, shown)),
         "phases": [list(map(visible, pair)) for pair in pairs or [columns[:2]] * (len(columns) > 1)],
     }
+
+
+def _moving(view: View, data: Sequence[Curves]) -> Iterator[dict[str, Any]]:
+    """Guards that move, as lines."""
+    for guard, times, values in moving_levels(data, view.guards):
+        if np.isfinite(values).any():
+            names = {"state": visible(guard.state), "label": visible(guard.label)}
+            yield names | {"times": _doubles(times), "values": _doubles(values)}
 
 
 def _run(

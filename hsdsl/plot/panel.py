@@ -3,14 +3,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hsdsl.names import shown
 from hsdsl.parts import parts_in, short_names
-from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, merged, modes_of
+from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, merged, modes_of, moving_levels
 from hsdsl.plot.style import ALARM, FAINT, INK, LETTER, Look, fills, looks
 from hsdsl.plot.view import View
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 MOST_BANDS = 9  # modes whose colours and hatches differ
 MOST_ROWS = 40  # of bars of modes that each have a name
-MOVING = 1000  # points of a guard that moves
 BOTH_SIDES = 60  # transitions up to which the values before and after are marked
 AFTER_ONLY = 400  # and up to which the value after is
 LONGEST = 24  # letters of a run's label
@@ -178,22 +177,11 @@ def with_guards(ends: tuple[float, float], levels: Sequence[float]) -> tuple[flo
     return low, high
 
 
-def moving_levels(runs: Sequence[Curves], guards: Sequence[GuardLine]) -> Iterator[tuple[str, Array, Array]]:
-    """The label of each guard that moves, and its finite values at times at which its mode is occupied."""
-    for guard in guards:
-        for run in runs if guard.moving else ():
-            own = [(begin, end) for mode, begin, end in run.bands if mode in (guard.mode, SEVERAL)]
-            times = np.linspace(*run.span, MOVING)
-            inside = np.any([(begin <= times) & (times <= end) for begin, end in own], axis=0) if own else times < 0
-            assert guard.moving is not None
-            yield guard.label, times, np.where(inside, guard.moving(times), np.nan)
-
-
 def _draw_moving(axis: Axes, runs: Sequence[Curves], guards: Sequence[GuardLine]) -> None:
     """Draw guards that move as dotted lines, each with its label at its last time."""
     named = set[str]()
-    for text, times, values in moving_levels(runs, guards):
-        finite = np.flatnonzero(np.isfinite(values))
+    for guard, times, values in moving_levels(runs, guards):
+        text, finite = guard.label, np.flatnonzero(np.isfinite(values))
         if not len(finite):
             continue
         axis.plot(times, values, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)

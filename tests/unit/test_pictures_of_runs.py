@@ -7,6 +7,7 @@ import json
 import re
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import hand_made
 import numpy as np
@@ -328,3 +329,13 @@ def test_an_orbit_is_closed_by_the_jump_of_its_section(states, jump):
     orbit._draw_run(axis, run, states, 1.0)
     (dotted,) = (line for line in axis.lines if line.get_linestyle() == ":")
     assert np.asarray(dotted.get_xydata()) == pytest.approx(np.array(jump, float), abs=1e-12)
+
+
+def test_pages_have_guards_that_move(tmp_path):
+    model = hsdsl.load(Path(__file__).parents[2] / "models" / "gallery" / "moving-guard.yaml")
+    model.plot(model.simulate(until=2), tmp_path / "run.html")
+    text = re.search(r'id="model"[^>]*>(.*?)</script>', (tmp_path / "run.html").read_text("utf-8"), re.DOTALL)
+    (plate,) = json.loads(text[1])["moving"]
+    times, values = (np.frombuffer(base64.b64decode(plate[key])) for key in ("times", "values"))
+    assert (plate["state"], plate["label"], times[0], times[-1]) == ("h", "bounce", 0, 2)
+    np.testing.assert_allclose(values, 0.05 * np.sin(5 * times), atol=1e-15)

@@ -47,11 +47,13 @@ function counted(run, xs) {
 
 function rangeOfAll(name) {
   const [low, high] = rangeOf(...runs.map((run) => counted(run, name === "t" ? run.times : column(run, name))));
-  const near = levels(name).map(({value}) => value).filter((x) => x > low - (high - low) / 2 && x < high + (high - low) / 2);
+  const ends = moving(name).flatMap(({values}) => rangeOf(values));
+  const near = [...levels(name).map(({value}) => value), ...ends].filter((x) => x > low - (high - low) / 2 && x < high + (high - low) / 2);
   return near.length ? rangeOf([low, high], near) : [low, high];
 }
 
 const levels = (name) => (model.guards ?? []).filter(({state}) => state === name);
+const moving = (name) => (model.moving ?? []).filter(({state}) => state === name);
 
 function bands({context, box, x}, run, strength, top = box.top, bottom = box.bottom) {
   const shown = run.bands ?? run.arcs;
@@ -108,6 +110,7 @@ function drawPanels() {
     const made = frame(canvas, part(), rangeOfAll(name), {title: withUnit(name), bottom: i === shown.length - 1});
     if (runs.length === 1) bands(made, runs[0], 0.16);
     levels(name).forEach((guard) => level(made, guard));
+    moving(name).forEach((guard) => movingLevel(made, guard));
     runs.forEach((run, k) => {
       const [arcOf, times, ys] = clipped(run, run.arcOf, run.times, column(run, name));
       trace(made, arcOf, times, ys, looks()[k]);
@@ -131,6 +134,19 @@ function level({context, box, y}, {value, label}) {
   context.textAlign = "right";
   context.textBaseline = high ? "bottom" : "top";
   context.fillText(fitted(context, label, (box.right - box.left) / 2), box.right - 3, at + (high ? -2 : 2));
+}
+
+// A level that moves, with its name at the last time at which it is known and shown.
+function movingLevel(made, {times, values, label}) {
+  const {context, box, x, y} = made, [, end] = part();
+  trace(made, new Int32Array(times.length), times, values, {colour: palette.faint, dashes: [2, 3]});
+  let k = countOf(times, end, true) - 1;
+  while (k >= 0 && !Number.isFinite(values[k])) k--;
+  if (k < 0 || !(x(times[k]) > box.left)) return;
+  context.fillStyle = palette.faint;
+  context.textAlign = "right";
+  context.textBaseline = "top";
+  context.fillText(fitted(context, label, x(times[k]) - box.left), x(times[k]) - 3, y(values[k]) + 2);
 }
 
 function ending({context, box, x}, t, colour) {

@@ -11,7 +11,12 @@ function decoded(given) {
     columns: given.columns.map((text) => numbersIn(text, Float64Array))};
 }
 
+function decodedLine(given) {
+  return {...given, times: numbersIn(given.times, Float64Array), values: numbersIn(given.values, Float64Array)};
+}
+
 function build() {
+  model.moving = model.moving.map(decodedLine);
   runs = JSON.parse($("runs").textContent).map(decoded);
   $("scene").hidden = true;
   $("phases").hidden = !model.phases.length;
