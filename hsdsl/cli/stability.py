@@ -14,7 +14,7 @@ from hsdsl.errors import UsageError
 
 MAP = (
     "Two of h, tolerance, relaxation, parameters and initial.NAME, each with its range if not the default:"
-    " h=1e-4:1e-1:20,relaxation. Values are spaced logarithmically, with :lin evenly."
+    " h=1e-4:1e-1:20,relaxation. Values are spaced logarithmically, with :lin evenly. Left out, h,relaxation."
 )
 SET = "Override a parameter, an initial value or a setting for every run. May be repeated."
 AGAINST = "Peers, on maps of tolerance: scipy, heyoka, diffrax, sksundae, casadi; or all."
@@ -23,8 +23,8 @@ AGAINST = "Peers, on maps of tolerance: scipy, heyoka, diffrax, sksundae, casadi
 def stability(
     model: Model,
     *,
-    map: Annotated[str, option("X,Y", MAP, "--map")],
-    scheme: Annotated[str | None, option("A,B", "Our schemes; else the file's.")] = None,
+    map: Annotated[str | None, option("X,Y", MAP, "--map")] = None,
+    scheme: Annotated[str | None, option("A,B", "Our schemes; else relaxed on maps of it, and the file's.")] = None,
     method: Annotated[str | None, option("A,B", "Our methods; else rk4 on maps of h, and auto.")] = None,
     against: Annotated[str | None, option("A,B", AGAINST)] = None,
     overrides: Annotated[list[str] | None, overriding(SET)] = None,
@@ -63,7 +63,8 @@ def stability(
                     show(lambda: f"{done} of {count} runs")
 
             given: dict[str, Any] = {"with_rho": rho, "processes": processes, "patience": patience, "watch": watch}
-            found = stability_map(load(model), map, **options, **given)
+            given |= {} if map is None else {"map": map}
+            found = stability_map(load(model), **options, **given)
         _report(found, out, plot, answer)
 
 

@@ -84,3 +84,10 @@ def test_scheme_and_method_of_a_map_may_come_by_set(command, model):
     given = ["--set", "experiment.scheme=relaxed", "--set", "experiment.method=heun"]
     answer = command("stability", model(DECAY), "--map", "h=1e-3:1e-2:2,rate=10:20:2", *given, "--no-rho")
     assert answer.out.startswith("relaxed heun")
+
+
+def test_without_a_map_it_is_the_plane_of_step_and_relaxation(command, model):
+    answer = command("stability", model(DECAY.replace("rate: 100", "rate: 1")), "--no-rho", "--json").json
+    assert len(answer["runs"]) == 144
+    assert {(run["scheme"], run["method"]) for run in answer["runs"]} == {("relaxed", "rk4")}
+    assert (answer["x"], answer["y"]) == ("h", "relaxation")

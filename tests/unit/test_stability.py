@@ -211,7 +211,7 @@ def test_bounds_of_a_parameter_are_refused_before_anything_runs() -> None:
 
 def test_text_counts_and_tables_agree() -> None:
     found = stability_map(hsdsl.loads(DECAY), "h=1e-3:1e-2:2,relaxation=1e-6:1e-4:2", methods=["rk4"])
-    assert as_text(found).startswith("located rk4  4 converged")
+    assert as_text(found).startswith("relaxed rk4  4 converged")
     assert as_csv(found).count("\n") == 5
     assert len(as_plain(found)["runs"]) == 4
 

@@ -28,6 +28,7 @@ from hsdsl.processes import Lost, in_processes
 
 __all__ = ["WORDS", "Axis", "Cell", "Panel", "StabilityMap", "stability_map"]
 Progress = Callable[[int, int], None]
+PLANE = "h,relaxation"  # that of the paper's Fig. 14
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class StabilityMap:
 
 def stability_map(
     model: Model,
-    map: str,
+    map: str = PLANE,
     *,
     schemes: Sequence[str] = (),
     methods: Sequence[str] = (),
@@ -74,7 +75,8 @@ def stability_map(
     map : str
         Two axes as ``"h=1e-4:1e-1:20,relaxation"``, see :func:`hsdsl.chart.stability.axes.read_axes`.
     schemes, methods : sequence of str
-        Ours, a panel for each pair; left out, the file's scheme, and rk4 on maps of h, auto on others.
+        Ours, a panel for each pair; left out, ``relaxed`` on maps of relaxation, the file's scheme on others, and rk4
+        on maps of h, auto on others.
     against : sequence of str
         Names of :data:`hsdsl.chart.PEERS`; they take no step.
     parameters, initial, settings : mapping, optional
@@ -147,7 +149,7 @@ def _tools(
     model: Model, schemes: Sequence[str], methods: Sequence[str], against: Sequence[str], kinds: set[str]
 ) -> list[Tool]:
     """Schemes with methods, and peers."""
-    schemes = list(schemes) or [model.resolve().scheme]
+    schemes = list(schemes) or ["relaxed" if "relaxation" in kinds else model.resolve().scheme]
     named = list(methods) or ["rk4" if "step" in kinds else "auto"]
     if "step" in kinds and against:
         raise UsageError("--against: peers choose their own steps, so a map of h cannot show them", "map tolerance")
