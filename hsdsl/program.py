@@ -274,7 +274,7 @@ class Program:
     ``constants`` has the routines of parameters alone: ``parameter_i(p0..p{i-1})``, ``minimum_i`` and ``maximum_i``
     where the file bounds it, ``initial`` and ``until``. Where samples are not plain numbers it has ``input_i``: times,
     then values. Where the file gives them it has ``step``, ``tolerance``, ``relaxation``, ``max_transitions``,
-    ``scale`` (sizes of ``scaled_states``) and ``sample_count`` or ``sample_times``.
+    ``scale`` (sizes of ``scaled_states``) and ``sample_count``, ``sample_times`` or ``every``.
 
     ``switching`` has, for each of ``switches``, ``argument_i(t)``: what it is the floor or sign of, and the derivative
     of that by time. One that is linear in time also has ``line_i()``: its value at t = 0, and numerator and denominator

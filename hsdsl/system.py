@@ -250,7 +250,8 @@ def started(mode: str, names: Iterable[str], in_order: Sequence[tuple[str, sp.Ex
 class Experiment:
     """The options of the file; None for one that it does not give. Numbers are expressions of parameters.
 
-    ``samples`` is an expression (how many equally spaced samples) or a tuple of expressions (their times).
+    ``samples`` is an expression (how many equally spaced samples) or a tuple of expressions (their times); else
+    ``every`` is the time between them.
     ``scale`` has the states with a given size, each with its expression.
     """
 
@@ -262,6 +263,7 @@ class Experiment:
     tolerance: sp.Expr | None = None
     relaxation: sp.Expr | None = None
     samples: sp.Expr | tuple[sp.Expr, ...] | None = None
+    every: sp.Expr | None = None
     max_transitions: sp.Expr | None = None
     scale: tuple[tuple[str, sp.Expr], ...] = ()
 

@@ -13,10 +13,12 @@ from hsdsl.expression.syntax import Name, walk
 from hsdsl.graphs import cycle
 from hsdsl.names import SINCE, closest, did_you_mean, shown
 from hsdsl.parts import for_all, meant, of_all
+from hsdsl.schema import MultiplesDocument
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import Experiment, Initial, started
 
-_POSITIVE = ("step", "tolerance", "relaxation")
+_OWN = ("step", "tolerance", "relaxation")
+_POSITIVE = (*_OWN, "every")
 
 
 def elaborate_initial(symbols: SymbolTable) -> Initial:
@@ -90,13 +92,16 @@ def elaborate_experiment(symbols: SymbolTable) -> Experiment:
     end = symbols.parameter_scope(sentence, "to end with an event, let a transition lead to a mode with final: true")
     method = document.method  # checked where methods are known, with its place
     until = _setting(symbols, end, "until", document.until)
-    numbers = {key: _setting(symbols, scope, key, getattr(document, key)) for key in (*_POSITIVE, "max_transitions")}
+    given = document.samples
+    every = given.every if isinstance(given, MultiplesDocument) else None
+    numbers = {key: _setting(symbols, scope, key, getattr(document, key)) for key in (*_OWN, "max_transitions")}
     return Experiment(
         until=until,
         scheme=symbols.text(document.scheme),
         completion=symbols.text(document.completion),
         method=Key.at(method.value, method.place) if method and method.value != ABSENT else None,
-        samples=_samples(symbols, scope, document.samples),
+        samples=None if every else _samples(symbols, scope, given),
+        every=_setting(symbols, scope, "every", every),
         scale=_scale(symbols, scope, document.scale),
         **numbers,
     )
@@ -139,7 +144,7 @@ def _scale(symbols: SymbolTable, scope: Scope, given: dict[Key, Scalar]) -> tupl
     return tuple((name, size) for name, size in for_all(sizes, states).items() if size is not None)
 
 
-def _samples(symbols: SymbolTable, scope: Scope, given: Scalar | list[Scalar] | None) -> Any:
+def _samples(symbols: SymbolTable, scope: Scope, given: Any) -> Any:
     if not isinstance(given, list):
         return _setting(symbols, scope, "samples", given)
     values = [symbols.number(scalar, scope, finite_now=True) for scalar in given]

@@ -12,7 +12,7 @@ from hsdsl.schema import ModelDocument
 from hsdsl.system import HybridSystem
 
 _DEFINING = ("parameter", "function", "input", "let")
-_SETTINGS = ("until", "step", "tolerance", "relaxation", "max_transitions")
+_SETTINGS = ("until", "step", "tolerance", "relaxation", "max_transitions", "every")
 
 
 class Definition(NamedTuple):

@@ -18,6 +18,7 @@ from hsdsl.schema import (
     InputSamples,
     ModeDocument,
     ModelDocument,
+    MultiplesDocument,
     ParameterEntry,
     ReferenceDocument,
     SolveDocument,
@@ -130,6 +131,8 @@ def _of_experiment(experiment: ExperimentDocument) -> Iterator[SourceExpression]
     samples = experiment.samples
     if isinstance(samples, list):
         yield from _each("experiment", samples, "samples", TIME)
+    elif isinstance(samples, MultiplesDocument):
+        yield from _each("experiment", (samples.every,), "every", TIME)
     else:
         yield from _each("experiment", (samples,), "samples")
 

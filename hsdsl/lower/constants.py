@@ -73,3 +73,5 @@ def constants(system: HybridSystem, names: Names):
         yield define("sample_times", *experiment.samples)
     elif experiment.samples is not None:
         yield define("sample_count", experiment.samples)
+    if experiment.every is not None:
+        yield define("every", experiment.every)

@@ -183,7 +183,7 @@ class Pipeline:
         in_file["completion"] = program.completion
         in_file |= {key: key for key in KEYS if key in given}  # their values are routines
         in_file["scale"] = dict.fromkeys(program.scaled_states, "scale")
-        if "sample_times" in given or "sample_count" in given:
+        if not {"sample_times", "sample_count", "every"}.isdisjoint(given):
             in_file["samples"] = "samples"
         states = program.all_states if program.parts else ()
         return resolve({FILE: in_file, "--set": settings or {}, "the call": call or {}}, states)

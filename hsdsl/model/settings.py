@@ -121,6 +121,8 @@ def _samples(options: Options, values: Values, until: Number) -> int | tuple[Num
     given: Any = value.tolist() if type(value) is np.ndarray else value  # pyright: ignore[reportUnknownMemberType]
     if option.origin == FILE and values.has("sample_times"):
         return values.constant("sample_times")
+    if option.origin == FILE and values.has("every"):
+        return _multiples(values.constant("every")[0], until, values)
     if isinstance(given, str) and given.startswith(EVERY):
         return _multiples(values.number(given.removeprefix(EVERY), "samples"), until, values)
     given = given.removeprefix(COUNT) if isinstance(given, str) else given

@@ -10,6 +10,7 @@ from hsdsl.schema.documents import (
     InstanceDocument,
     ModeDocument,
     ModelDocument,
+    MultiplesDocument,
     ParameterEntry,
     PartModeDocument,
     PartTransitionDocument,
@@ -25,7 +26,7 @@ from hsdsl.schema.read import read
 
 __all__ = [
     "AutomatonDocument", "AutomatonFile", "ExperimentDocument", "FunctionDocument", "InputFile", "InputSamples",
-    "InstanceDocument", "ModeDocument", "ModelDocument", "ParameterEntry", "PartModeDocument", "PartTransitionDocument",
-    "ReferenceDocument", "ReferenceStateDocument", "ReferenceTransitionDocument", "SolveDocument", "SystemDocument",
-    "TransitionDocument", "json_schema", "read",
+    "InstanceDocument", "ModeDocument", "ModelDocument", "MultiplesDocument", "ParameterEntry", "PartModeDocument",
+    "PartTransitionDocument", "ReferenceDocument", "ReferenceStateDocument", "ReferenceTransitionDocument",
+    "SolveDocument", "SystemDocument", "TransitionDocument", "json_schema", "read",
 ]  # fmt: skip

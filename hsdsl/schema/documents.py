@@ -46,8 +46,8 @@ def _mapping_or_not(value: Any) -> str:
     return "<mapping>" if isinstance(value, dict) else "<expression>"
 
 
-def _list_or_not(value: Any) -> str:
-    return "<list>" if isinstance(value, list) else "<expression>"
+def _kind_of_samples(value: Any) -> str:
+    return "<list>" if isinstance(value, list) else _mapping_or_not(value)
 
 
 NAMES_OF_FILES = ("csv", "data", "path", "filename", "filepath", "source")  # in other tools
@@ -232,7 +232,16 @@ class InitialDocument(Document):
     mode: Label = required("The mode a run starts in.", "free")
 
 
-Samples = Annotated[AsExpression | Annotated[Items[Expression], Tag("<list>")], Discriminator(_list_or_not)]
+class MultiplesDocument(Document):
+    """Times at a fixed distance, from 0 to the end."""
+
+    every: Expression = required("The time between two samples.", "1/50")
+
+
+Samples = Annotated[
+    AsExpression | Annotated[Items[Expression], Tag("<list>")] | Annotated[MultiplesDocument, Tag("<mapping>")],
+    Discriminator(_kind_of_samples),
+]
 
 
 class ExperimentDocument(Document):
@@ -261,7 +270,12 @@ class ExperimentDocument(Document):
         "State: its typical size, positive. The scale of a state is this size until the state has been larger.",
         {"x": "1e-3", "v": 1},
     )
-    samples: Samples | None = optional("How many samples to record, or a list of their times.", 201, [0, "1/2", 1])
+    samples: Samples | None = optional(
+        "How many samples to record, or a list of their times, or the time between them.",
+        201,
+        [0, "1/2", 1],
+        {"every": "1/50"},
+    )
     max_transitions: OptionalExpression = optional("Stop rather than make more transitions.", "1e6")
 
 
@@ -459,6 +473,7 @@ SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
     ("modes", "*", "solve"): (SolveDocument, "`solve`"),
     ("inputs", "*", "<samples>"): (InputSamples, "an input"),
     ("inputs", "*", "<file>"): (InputFile, "an input"),
+    ("experiment", "samples", "<mapping>"): (MultiplesDocument, "`samples`"),
     ("modes", "*"): (ModeDocument, "a mode"),
     ("modes", "*", "transitions", "*"): (TransitionDocument, "a transition"),
     ("automata", "*", "<file>"): (AutomatonFile, "an automaton"),

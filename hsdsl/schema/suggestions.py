@@ -85,6 +85,7 @@ _ADD = {
     "file": "write file: and the name of a CSV file",
     "automaton": "write automaton: and a key of `automata`",
     "time": "write time: and when that is",
+    "every": "write every: and the time between two samples",
     **{size: f"write {size}: and a number or an expression" for size in ("radius", "width", "height")},
 }
 _MODE = ("modes", "*")

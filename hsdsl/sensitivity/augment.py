@@ -95,7 +95,14 @@ class _Writer:
             units={},
             initial=started(base.initial.mode, states, tuple(values.items())),
             experiment=replace(
-                base.experiment, until=symbol(SPAN), scheme=None, method=None, step=None, tolerance=None, samples=None
+                base.experiment,
+                until=symbol(SPAN),
+                scheme=None,
+                method=None,
+                step=None,
+                tolerance=None,
+                samples=None,
+                every=None,
             ),
             reference=(),
             scene=(),

@@ -10,6 +10,7 @@ from typing import Any
 import sympy as sp
 
 from hsdsl.elaborate import parameter_expression
+from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
 from hsdsl.sensitivity.chain import slopes
 from hsdsl.sensitivity.names import Target
@@ -77,7 +78,8 @@ def overridden(
         until = read(until, "until", len(names)) if is_expression(until) else sp.S.Zero
         system = replace(system, experiment=replace(system.experiment, until=until))
     if samples is not None:
-        system = replace(system, experiment=replace(system.experiment, samples=_samples(samples, read, len(names))))
+        own = replace(system.experiment, samples=_samples(samples, read, len(names)), every=None)
+        system = replace(system, experiment=own)
     return Overridden(
         replace(system, parameters=changed, initial=start),
         {name: v for name, v in parameters.items() if name not in texts},
@@ -128,6 +130,9 @@ def time_slopes(given: Overridden, by: Sequence[Target]) -> tuple[list[sp.Expr],
     until = through(experiment.until, known, len(by))
     if isinstance(experiment.samples, tuple):
         return until, [through(sp.sympify(t), known, len(by)) for t in experiment.samples]
+    if experiment.every is not None and any(through(experiment.every, known, len(by))):
+        names = ", ".join(target.name for target in by)
+        raise UsageError(f"the time between the file's samples may not depend on {names}", "give samples as a number")
     if experiment.samples is None or not experiment.samples.is_Integer or not any(until):
         return until, []
     last = max(1, int(experiment.samples) - 1)

@@ -105,3 +105,25 @@ def test_samples_may_be_an_array(tmp_path):
     times = np.linspace(0.25, 1, 4)
     arrays, lists = (hsdsl.loads(text).simulate(samples=given) for given in (times, times.tolist()))
     assert arrays.settings["samples"] == lists.settings["samples"]
+
+
+EVERY = """
+hsdsl: 1
+parameters: {rate: 4}
+modes: {m: {flow: {x: rate}}}
+initial: {mode: m, x: 0}
+experiment: {until: 1, samples: {every: 1/rate}}
+"""
+
+
+def test_samples_of_the_file_may_be_multiples_of_a_time():
+    model = hsdsl.loads(EVERY)
+    assert model.simulate().sample_times.tolist() == [0, 0.25, 0.5, 0.75, 1]
+    assert model.simulate(parameters={"rate": 2.5}).sample_times == pytest.approx([0, 0.4, 0.8])
+    assert model.simulate(samples=3).sample_times.tolist() == [0, 0.5, 1]
+    with pytest.raises(UsageError, match="between samples must be positive"):
+        model.simulate(parameters={"rate": -1})
+    assert model.sensitivity("initial.x").sample().times.tolist() == [0, 0.25, 0.5, 0.75, 1]
+    assert model.sensitivity("rate", samples=2).sample().slopes["x"].tolist() == [[0], [1]]
+    with pytest.raises(UsageError, match="may not depend on rate"):
+        model.sensitivity("rate")

@@ -12,7 +12,7 @@ from hsdsl.lint.analysis.mode_point import ModePoint, Unsure, ranked
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.numbers import BEYOND, ON, Number, evaluate, holds, leaves, side
 from hsdsl.lint.subject import ModePart, Subject
-from hsdsl.schema import ReferenceDocument
+from hsdsl.schema import MultiplesDocument, ReferenceDocument
 from hsdsl.source import Scalar
 from hsdsl.system import TIME, Mode, Surface
 
@@ -159,8 +159,10 @@ def odd_samples(subject: Subject) -> Iterator[Finding]:
     """Find samples that leave the run, do not increase, or are too many."""
     samples, until = subject.document.experiment.samples, subject.setting("until")
     if samples is not None and not isinstance(samples, list):
-        if subject.read(samples) > _MOST_SAMPLES:
-            yield Finding(samples.place.span, "this is more than a million samples", "take fewer")
+        scalar = samples.every if isinstance(samples, MultiplesDocument) else samples
+        given = subject.read(scalar)
+        if (until / given if scalar is not samples else given) > _MOST_SAMPLES:
+            yield Finding(scalar.place.span, "this is more than a million samples", "take fewer")
         return
     last = None
     for scalar in samples or ():
