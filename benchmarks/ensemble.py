@@ -91,21 +91,21 @@ def main() -> None:
     parser.add_argument("--checked", type=int)
     parser.add_argument("--tolerance", type=float, default=1e-10)
     parser.add_argument("--repetitions", type=int, default=5)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     rng = np.random.default_rng(20_260)
-    parameters = {"c": rng.uniform(0.3, 0.95, asked.instances), "A": rng.uniform(8, 30, asked.instances)}
-    settings = {"scheme": "located", "method": "taylor", "tolerance": asked.tolerance, "until": UNTIL}
+    parameters = {"c": rng.uniform(0.3, 0.95, options.instances), "A": rng.uniform(8, 30, options.instances)}
+    settings = {"scheme": "located", "method": "taylor", "tolerance": options.tolerance, "until": UNTIL}
     model = varied()
     model.ensemble(parameters={name: values[:8] for name, values in parameters.items()}, **settings)
     spent: list[float] = []
-    for _ in range(asked.repetitions):
+    for _ in range(options.repetitions):
         began = perf_counter()
         found = model.ensemble(parameters=parameters, **settings)
         spent.append(perf_counter() - began)
-    print(f"{asked.instances:,} runs: {min(spent):.2f} s (of {', '.join(f'{s:.2f}' for s in spent)}), {found}")
+    print(f"{options.instances:,} runs: {min(spent):.2f} s (of {', '.join(f'{s:.2f}' for s in spent)}), {found}")
     found = model.ensemble(parameters=parameters, transition_times=MOST, **settings)
     wrong, total, worst = 0, 0, 0.0
-    for k in range(asked.instances if asked.checked is None else asked.checked):
+    for k in range(options.instances if options.checked is None else options.checked):
         exact = np.array([*impacts(float(parameters["c"][k]), float(parameters["A"][k]))])
         total += len(exact)
         off = np.abs(found.transition_times[k][: len(exact)] - exact)

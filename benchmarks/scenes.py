@@ -93,7 +93,7 @@ def lines(name: str, rows: Sequence[Row], tools: Sequence[str]) -> Iterator[str]
 
 
 def main() -> None:
-    """Run what is asked for and print the tables."""
+    """Run scenes and print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--against", default="scipy,heyoka,sksundae,casadi")
     parser.add_argument("--scenes", default=",".join(SCENES))

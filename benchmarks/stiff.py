@@ -65,11 +65,11 @@ def main() -> None:
         field, slopes = kernel.bind(0, ()).flow, kernel.jacobian(0, ())
         first = model.simulate(tolerance=1e-6)
         start, n, until = first.values[0], len(first.values[0]), first.stop.time
-        wanted = np.array([float(known[name]) for name in first.final.state])
+        exact = np.array([float(known[name]) for name in first.final.state])
         print(f"{path.stem}: {n} states, to t = {until:g}")
         for tolerance in TOLERANCES:
             run = model.simulate(tolerance=tolerance, engine="c")
-            error = np.max(np.abs(run.values[-1] - wanted) / (1 + np.abs(wanted)))
+            error = np.max(np.abs(run.values[-1] - exact) / (1 + np.abs(exact)))
             derived, factored, iterations = counted(model, tolerance)
             spent = fastest(lambda: model.simulate(tolerance=tolerance, engine="c"), repetitions)  # noqa: B023
             print(
@@ -91,7 +91,7 @@ def main() -> None:
             began = perf_counter()
             found = theirs()
             spent = perf_counter() - began
-            error = np.max(np.abs(found.y[:, -1] - wanted) / (1 + np.abs(wanted)))
+            error = np.max(np.abs(found.y[:, -1] - exact) / (1 + np.abs(exact)))
             print(
                 f"         SciPy  error {error:.1e}  steps {len(found.t) - 1:6}  J {found.njev:5}  "
                 f"LU {found.nlu // 2:5}  iterations {found.nfev // 3:6}  {1e6 * spent:9.0f} us"

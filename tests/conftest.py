@@ -25,8 +25,8 @@ def pytest_runtest_setup() -> None:
 
         taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
         _, most = resource.getrlimit(resource.RLIMIT_AS)
-        wanted = taken + ROOM
-        resource.setrlimit(resource.RLIMIT_AS, (wanted if most < 0 else min(wanted, most), most))
+        expected = taken + ROOM
+        resource.setrlimit(resource.RLIMIT_AS, (expected if most < 0 else min(expected, most), most))
 
 
 @pytest.fixture(autouse=True)

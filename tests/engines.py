@@ -60,10 +60,10 @@ def assert_sampled_alike(run: Any) -> None:
     start, end = map(float, run.time_span)
     times = [rng.uniform(start, end) for _ in range(40)] + rng.choices(run.times.tolist(), k=20)
     rising = [start + (end - start) * k / 150 for k in range(150)] + [end * (1 + 5e-13)]
-    for asked in (times, rising):
+    for given in (times, rising):
         for side in ("right", "left"):
             for columns in (None, [*run.output_names[:1], *run.states[-1:]]):
-                fast, slow = (r.sample(asked, side, columns) for r in (run, plain))
+                fast, slow = (r.sample(given, side, columns) for r in (run, plain))
                 for field in fields(fast):
                     assert same(getattr(fast, field.name), getattr(slow, field.name)), (field.name, side, columns)
 

@@ -25,10 +25,10 @@ def mistakes() -> str:
     """Tabulate what is answered to typical mistakes, from the records that the tests compare with."""
     data = yaml.safe_load((GOLDEN / "mistakes.yaml").read_text(encoding="utf-8"))
     records = (GOLDEN / "mistakes.txt").read_text(encoding="utf-8").split("### ")[1:]
-    said = {record.split("\n", 1)[0]: record.split("\n", 1)[1] for record in records}
+    printed = {record.split("\n", 1)[0]: record.split("\n", 1)[1] for record in records}
     parts = [MISTAKES]
     for group, cases in data["groups"].items():
-        rows = [(case["title"], written_as(case), answers(said[f"{group}: {case['title']}"])) for case in cases]
+        rows = [(case["title"], written_as(case), answers(printed[f"{group}: {case['title']}"])) for case in cases]
         parts.append(f"## {group}\n\n" + table(("mistake", "written", "answer"), rows))
     return "".join(parts) + f"## The model\n\n```yaml\n{data['base']}```\n"
 
@@ -43,10 +43,10 @@ def written_as(case: Mapping[str, Any]) -> str:
     return "<br>".join(code(line.replace("\t", "→")) for line in wrong[:6] if line.strip()) or "nothing"
 
 
-def answers(said: str) -> str:
+def answers(printed: str) -> str:
     """Set the messages of a record, each with its hint."""
     found: list[str] = []
-    for line in said.splitlines():
+    for line in printed.splitlines():
         message = re.match(r"[^ ]+:(\d+):(\d+): error (HS\d+): (.*)|(?:hsdsl|Error): (.*)", line)
         if message and message[3]:
             found.append(f"[{message[3]}](errors.md#{message[3].lower()}) {escaped(message[4])}")

@@ -21,13 +21,13 @@ HEADER = ("where", "what", "here", "known")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Compute the parts that are asked for; return the exit code, as the verbs of ``hsdsl`` do."""
-    asked = _parser().parse_args(arguments)
+    """Compute the chosen parts; return the exit code, as the verbs of ``hsdsl`` do."""
+    options = _parser().parse_args(arguments)
     try:
-        asked.out.mkdir(parents=True, exist_ok=True)
-        findings = _run(Desk(asked.out, asked.models, asked.quick), asked.only or list(PARTS))
+        options.out.mkdir(parents=True, exist_ok=True)
+        findings = _run(Desk(options.out, options.models, options.quick), options.only or list(PARTS))
     except OSError as error:
-        say(f"paper: cannot make the folder {asked.out}: {error.strerror}")
+        say(f"paper: cannot make the folder {options.out}: {error.strerror}")
         return 2
     except ModelError as error:
         say("\n\n".join(render(diagnostic) for diagnostic in error.diagnostics))

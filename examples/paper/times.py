@@ -47,9 +47,9 @@ def times(desk: Desk) -> list[Finding]:
     timings: list[Timing] = []
     for example, model in desk.oscillators.items():
         truth = desk.truths[example]
-        for asked in _grid(desk.quick):
+        for sizes in _grid(desk.quick):
             for engine in ENGINES:
-                found = None if engine == "auto" else measure(example, model, truth, engine, asked)
+                found = None if engine == "auto" else measure(example, model, truth, engine, sizes)
                 if found is not None:
                     timings.append(found)
                     size = "" if found.relaxation is None else f", eps = {found.relaxation:.3g}"
@@ -70,12 +70,12 @@ def _grid(quick: bool) -> Iterator[dict[str, Any]]:
         yield {"scheme": "relaxed", "method": "midpoint", "step": 1e-2, "relaxation": 2e-7}
 
 
-def measure(example: int, model: Model, truth: Execution, engine: str, asked: dict[str, Any]) -> Timing | None:
+def measure(example: int, model: Model, truth: Execution, engine: str, sizes: dict[str, Any]) -> Timing | None:
     """Time one run; None where the engine does not serve it, or another one steps in."""
     seconds: list[float] = []
     while True:
         try:
-            run = model.simulate(engine=engine, **asked)
+            run = model.simulate(engine=engine, **sizes)
         except UsageError:
             if engine == ALWAYS:
                 raise
@@ -85,11 +85,11 @@ def measure(example: int, model: Model, truth: Execution, engine: str, asked: di
         seconds.append(run.seconds["simulate"])
         if sum(seconds) > ENOUGH or len(seconds) == REPEATS:
             break
-    relaxation = asked.get("relaxation")
-    ratio = None if relaxation is None else float(f"{relaxation / asked['step']:.6g}")
+    relaxation = sizes.get("relaxation")
+    ratio = None if relaxation is None else float(f"{relaxation / sizes['step']:.6g}")
     error = rho_hat(run, truth, model)
     transitions = len(run.transitions)
-    return Timing(example, run.scheme, run.engine, asked["step"], relaxation, ratio, transitions, min(seconds), error)
+    return Timing(example, run.scheme, run.engine, sizes["step"], relaxation, ratio, transitions, min(seconds), error)
 
 
 def findings(timings: list[Timing]) -> list[Finding]:

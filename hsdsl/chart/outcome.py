@@ -56,17 +56,17 @@ class Outcome:
 def outcome(scene: Scene, result: Result, within: Tolerance, verdict: Verdict | None = None) -> Outcome:
     """Judge a result against the scene's exact execution; ``verdict`` is what the tool itself says about its run."""
     error, others = compared(scene, result, within.time)
-    said = "" if verdict is None else verdict.theorem
+    known = "" if verdict is None else verdict.theorem
     until, last = float(scene.grid[-1]), float(scene.exact.final.time)
     ends = until - last > SAME_END * until  # the exact execution ends before the run is to end
     different = _difference(scene, result, others, error, within)
     if result.problem:
         word = "right" if ends and not different else "stops"
-        return Outcome(word, result.problem, error, result.transitions, said)
+        return Outcome(word, result.problem, error, result.transitions, known)
     if ends:
         different = f"goes on past t = {last:.6g}, where the exact execution ends"
-    word = ("warns" if said in ("left", "unknown") else "wrong") if different else "right"
-    return Outcome(word, different, error, result.transitions, said)
+    word = ("warns" if known in ("left", "unknown") else "wrong") if different else "right"
+    return Outcome(word, different, error, result.transitions, known)
 
 
 def compared(scene: Scene, result: Result, slack: float) -> tuple[float, int]:

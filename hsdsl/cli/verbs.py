@@ -98,10 +98,10 @@ class _Verbs(TyperGroup):
 app = Typer(cls=_Verbs, name="hsdsl", no_args_is_help=True, rich_markup_mode=None, context_settings=SETTINGS)
 
 
-def _version(asked: bool) -> None:
+def _version(given: bool) -> None:
     from hsdsl import __version__
 
-    if asked:
+    if given:
         print(f"hsdsl {__version__}")
         raise Exit
 

@@ -333,11 +333,11 @@ class Execution(Deferred):
     @property
     def sample_times(self) -> Array | None:
         """The times in the run's ``samples`` setting; None for the integrator's rows."""
-        asked = self.settings.get("samples")
-        if isinstance(asked, int):
+        given = self.settings.get("samples")
+        if isinstance(given, int):
             until = self.settings["until"]
-            return np.array([until * k / (asked - 1) for k in range(asked - 1)] + [until])
-        return None if asked is None else np.array(asked)
+            return np.array([until * k / (given - 1) for k in range(given - 1)] + [until])
+        return None if given is None else np.array(given)
 
 
 def _changes(execution: Execution) -> Array:

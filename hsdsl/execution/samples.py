@@ -126,8 +126,8 @@ def _split(
         if name not in known:
             hint = did_you_mean(name, known) or f"there are {', '.join(known) or 'none'}"
             raise UsageError(f"no state or output is called {name}", hint=hint)
-    asked = dict.fromkeys(columns)
-    return tuple(name for name in asked if name in states), tuple(name for name in asked if name not in states)
+    named = dict.fromkeys(columns)
+    return tuple(name for name in named if name in states), tuple(name for name in named if name not in states)
 
 
 def optional(library: str, what: str, extra: str = "table") -> Any:

@@ -69,11 +69,11 @@ def within(execution: Execution, times: Any) -> tuple[Array, Array]:
 
     A time outside the run by no more than the tie tolerance, 1e-12 of the run's length, counts as its end.
     """
-    asked = _as_times(execution, times)
+    instants = _as_times(execution, times)
     start, end = execution.time_span
     slack = 1e-12 * max(abs(float(start)), abs(float(end)))
-    inside = np.asarray((asked >= start - slack) & (asked <= end + slack), dtype=bool)
-    return asked, inside
+    inside = np.asarray((instants >= start - slack) & (instants <= end + slack), dtype=bool)
+    return instants, inside
 
 
 def _as_floats(times: Any) -> Array:
@@ -100,15 +100,15 @@ def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     Raises ValueError: for a time that is not :func:`within` the run, or a ``side`` that is neither.
     """
     _check(side)
-    asked, inside = within(execution, times)
+    instants, inside = within(execution, times)
     start, end = execution.time_span
     if not inside.all():
-        raise _outside(execution, asked[int(np.argmin(inside))])
-    asked = np.minimum(np.maximum(asked, start), end)
-    rows = np.searchsorted(execution.times, asked, side=side)
+        raise _outside(execution, instants[int(np.argmin(inside))])
+    instants = np.minimum(np.maximum(instants, start), end)
+    rows = np.searchsorted(execution.times, instants, side=side)
     if side == "right":
-        return rows - 1, asked
-    return np.where(np.asarray(execution.times[rows] == asked, dtype=bool), rows, rows - 1), asked
+        return rows - 1, instants
+    return np.where(np.asarray(execution.times[rows] == instants, dtype=bool), rows, rows - 1), instants
 
 
 def _check(side: Side) -> None:
@@ -131,10 +131,10 @@ def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] 
     states, outputs, names = execution.states, execution.output_names, execution.output_names
     if columns is not None:
         states, names = split(columns, states, outputs)
-    asked = _as_floats(times)
-    found = execution.sampler(asked, side == "left", states, bool(names))
+    instants = _as_floats(times)
+    found = execution.sampler(instants, side == "left", states, bool(names))
     if found.outside >= 0:
-        raise _outside(execution, asked[found.outside])
+        raise _outside(execution, instants[found.outside])
     later: dict[str, Callable[[Samples], Array]] = {
         "mode": lambda _: execution.arc_table.mode[_arcs(execution, found.rows)],
         "jump": lambda _: execution.arc_table.jump[_arcs(execution, found.rows)],

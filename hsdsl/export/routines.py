@@ -19,7 +19,7 @@ def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:
 
 
 def mode_definitions(mode: ModeProgram, terms: bool = False) -> dict[str, ast.FunctionDef]:
-    """The routines of a mode, ``terms`` included if asked for; gradients, resets, spreads have all states."""
+    """The routines of a mode, ``terms`` on request; gradients, resets, spreads have all states."""
     found, n = definitions(mode.routines), len(mode.states)
     if terms and mode.terms:
         found |= definitions(mode.terms)

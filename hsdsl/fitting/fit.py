@@ -104,5 +104,5 @@ class Fit:
         from hsdsl.plot.analyses import plot_measured
 
         values = ", ".join(f"{name} = {number(value, 6)}" for name, value in self.values.items())
-        said = f"fit to {self.measured.count} measurements: {values}; left over {number(self.deviation, 4)}"
-        plot_measured(path, self.execution, self.measured.times, self.measured.columns, self.units, said)
+        heading = f"fit to {self.measured.count} measurements: {values}; left over {number(self.deviation, 4)}"
+        plot_measured(path, self.execution, self.measured.times, self.measured.columns, self.units, heading)

@@ -67,7 +67,7 @@ def compiled(text: Routines, shape: tuple[int, int], jumps: bool) -> Formula:
     over: list[Callable[..., Sequence[Any]]] = []
 
     def enclosed(k: int, low: Array, high: Array, size: tuple[int, ...]) -> tuple[Array, Array]:
-        if not over:  # compiled when first asked for
+        if not over:  # compiled at the first use
             over.extend(compile_routines(text, ENCLOSED, "geometry over boxes")())
         with np.errstate(all="ignore"):
             found = [as_range(r) for r in over[k](*hull(low, high))]

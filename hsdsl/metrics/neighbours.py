@@ -22,8 +22,8 @@ from hsdsl.metrics.rounding import norm
 from hsdsl.metrics.routes import Route
 from hsdsl.metrics.search import End, Query
 
-CLOSED = 0.005  # relative: a narrower gap is not worth a search when many pairs are asked for
-FIRST = 5  # pairs that are searched from nothing, spread over those asked for
+CLOSED = 0.005  # relative: a narrower gap is not worth a search among many pairs
+FIRST = 5  # pairs that are searched from nothing, spread over all
 FAR = 10  # times the lower bound: a path so long that it may take the wrong way
 AGAIN = 16  # pairs improved before paths are carried over anew
 

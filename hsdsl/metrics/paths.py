@@ -1,4 +1,4 @@
-"""What a distance between points is asked with and answered by: places, and the path that attains the upper end."""
+"""What a distance between points is of, and what it is: places, and the path that attains the upper end."""
 
 from __future__ import annotations
 

@@ -207,10 +207,10 @@ class _Search:
         unknown = chosen[np.isnan(ends[chosen, end])]
         if not len(unknown):
             return
-        asked = cells[unknown]
-        times = (asked.begin, asked.end)[end]
+        undecided = cells[unknown]
+        times = (undecided.begin, undecided.end)[end]
         found, enough = self.found, self.found.accepted(self.gap, self.floor)
-        lower, upper = self.distance.at(*asked.sides(), end, times, enough)
+        lower, upper = self.distance.at(*undecided.sides(), end, times, enough)
         ends[unknown, end] = upper
         found.evaluations += len(unknown)
         best = int(np.argmax(lower))

@@ -20,7 +20,7 @@ SpaceMaker = Callable[[float | None], "SpaceMetric"]  # the model's, relaxed or 
 
 @dataclass(frozen=True)
 class CurvePair:
-    """Two runs and what else a distance may need; ``space`` is asked for only by those that measure on it."""
+    """Two runs and what else a distance may need; only those that measure on it make the ``space``."""
 
     a: Execution
     b: Execution

@@ -50,11 +50,11 @@ def _last_hybrid_time(curve: Trace) -> float:
 
 def one_way(p: Polyline, q: Polyline, tau: float) -> float:
     """Return the largest, over the points (t, j) of p, of the least max(|t - s|, D) over points (s, j) of q."""
-    asked = np.flatnonzero(p.up_to(tau))
-    jumps = p.jump[asked]
+    rows = np.flatnonzero(p.up_to(tau))
+    jumps = p.jump[rows]
     largest = 0.0
     for j in np.unique(jumps).tolist():
-        here = asked[slice(*np.searchsorted(jumps, [j, j + 1]).tolist())]
+        here = rows[slice(*np.searchsorted(jumps, [j, j + 1]).tolist())]
         there = slice(*np.searchsorted(q.jump, [j, j + 1]).tolist())
         if there.start == there.stop:
             return np.inf

@@ -19,16 +19,16 @@ from typing import IO
 from hsdsl import interrupts
 
 PATIENCE = 5.0  # seconds without a question
-MOST_SAID = 1 << 16  # bytes that are kept of what a command says
+MOST_PRINTED = 1 << 16  # bytes that are kept of what a command prints
 _running: dict[subprocess.Popen[bytes], Path] = {}
 
 
 @dataclass(frozen=True)
 class Done:
-    """The end of a command: its exit code, None where it was ended after its time, and what it said on stderr."""
+    """The end of a command: its exit code, None where it was ended after its time, and what it printed on stderr."""
 
     code: int | None
-    said: str
+    printed: str
 
 
 @contextmanager
@@ -60,8 +60,8 @@ def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, respond
             del _running[each.process]
     for each in begun:
         each.listener.join(1.0)  # what it left running may hold the stream open
-    said = [b"".join(each.said).decode(errors="replace") for each in begun]
-    return list(map(Done, codes, said))
+    printed = [b"".join(each.printed).decode(errors="replace") for each in begun]
+    return list(map(Done, codes, printed))
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class _Begun:
 
     process: subprocess.Popen[bytes]
     listener: Thread
-    said: list[bytes]
+    printed: list[bytes]
 
 
 def _begin(command: Sequence[str], folder: Path) -> _Begun:
@@ -83,10 +83,10 @@ def _begin(command: Sequence[str], folder: Path) -> _Begun:
         start_new_session=True,
     )
     _running[process] = folder
-    said: list[bytes] = []
-    listener = Thread(target=_listen, args=(process.stderr, said), daemon=True)
+    printed: list[bytes] = []
+    listener = Thread(target=_listen, args=(process.stderr, printed), daemon=True)
     listener.start()
-    return _Begun(process, listener, said)
+    return _Begun(process, listener, printed)
 
 
 def _wait(
@@ -104,11 +104,11 @@ def _wait(
     return None
 
 
-def _listen(stream: IO[bytes], said: list[bytes]) -> None:
+def _listen(stream: IO[bytes], printed: list[bytes]) -> None:
     """Keep the beginning of a stream, and take the rest, so that nobody waits to write it."""
     with suppress(OSError, ValueError), stream:
-        said.append(stream.read(MOST_SAID))
-        while stream.read(MOST_SAID):
+        printed.append(stream.read(MOST_PRINTED))
+        while stream.read(MOST_PRINTED):
             pass
 
 

@@ -53,11 +53,11 @@ class OutputBuffers:
             self._stop_at_review()
         if max(rows, self._before, self._least) <= self._rows:
             return
-        wanted = min(max(rows, self._before), MOST_ROWS, memory // self._row_bytes)
-        wanted = max(wanted, self._least)
-        if wanted > self._rows:
+        room = min(max(rows, self._before), MOST_ROWS, memory // self._row_bytes)
+        room = max(room, self._least)
+        if room > self._rows:
             try:
-                self._open(int(wanted))
+                self._open(int(room))
             except MemoryError:
                 self._open(self._least)
 

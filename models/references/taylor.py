@@ -180,8 +180,8 @@ def _after(modes: Mapping[str, Mode], mode: str, edge: Edge, x: Vector) -> Vecto
     """The state behind a transition."""
     states: dict[str, Any] = {name: Series.constant(a) for name, a in zip(modes[mode].states, x, strict=True)}
     states |= edge.reset(states)
-    wanted = modes[edge.target].states if modes[edge.target].flow is not None else modes[mode].states
-    return tuple(states[name][0] for name in wanted)
+    names = modes[edge.target].states if modes[edge.target].flow is not None else modes[mode].states
+    return tuple(states[name][0] for name in names)
 
 
 def digits(a: Solved, b: Solved) -> int:

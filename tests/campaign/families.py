@@ -17,7 +17,7 @@ Values = dict[str, float]
 class Family:
     """A model's text, how its parameters are drawn, and the right outcome of a draw.
 
-    ``ordinary`` says whether its runs should be told to hold.
+    ``ordinary`` says whether the verdict on its runs should be `holds`.
     """
 
     text: str

@@ -1,4 +1,4 @@
-"""No run is wrong whose verdict is `holds`, and few ordinary ones are told otherwise."""
+"""No run is wrong whose verdict is `holds`, and few ordinary ones have another."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ NOT_FOR_RELAXED = ("narrow visits", "fast guards", "tangency", "units")
 
 
 class Run(NamedTuple):
-    """One run: what was asked, the right outcome and ours, and the verdict."""
+    """One run: its settings, the right outcome and ours, and the verdict."""
 
     values: dict[str, float]
-    asked: dict[str, str]
+    given: dict[str, str]
     right: Outcome
     found: Outcome
     until: float
@@ -46,12 +46,12 @@ def runs(family: Family, count: int, seed: str, scheme: str) -> Iterator[Run]:
     model, r = hsdsl.loads(family.text), random.Random(seed)
     for _ in range(count):
         values = family.draw(r)
-        asked = {"scheme": scheme, "method": r.choice(METHODS)}
-        run = model.simulate(parameters=values, **asked)
+        given = {"scheme": scheme, "method": r.choice(METHODS)}
+        run = model.simulate(parameters=values, **given)
         times = tuple(corrected_times(run.transitions))
         found = Outcome(tuple(t.edge for t in run.transitions), times, run.stop.reason)
         until = float(run.settings["until"])
-        yield Run(values, asked, family.right(values), found, until, run.verdict.theorem, run.verdict.reasons)
+        yield Run(values, given, family.right(values), found, until, run.verdict.theorem, run.verdict.reasons)
 
 
 def judge(name: str, count: int, scheme: str) -> Counter[str]:

@@ -55,8 +55,8 @@ def test_twice_an_estimate_bounds_the_error(kind):
         for _ in range(MANY):
             values = family.draw(r)
             right = model.simulate(parameters=values, scheme="located", method="dop853", tolerance=1e-13)
-            asked = kind(r, float(right.settings["until"]))
-            run = model.simulate(parameters=values, **{"scheme": "located"} | asked)
+            given = kind(r, float(right.settings["until"]))
+            run = model.simulate(parameters=values, **{"scheme": "located"} | given)
             estimate = model.estimate(run)
             counted[None if estimate.final is None else bounds(run, estimate, right)] += 1
     print(kind.__name__, counted)

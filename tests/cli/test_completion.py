@@ -21,11 +21,11 @@ SHELLS = ("bash", "zsh")
 def answer(shell: str, line: str, cwd: Path = ROOT) -> str:
     """What the program prints when a shell completes a line, the cursor at its end."""
     words = line.split(" ")
-    asked = {"_HSDSL_COMPLETE": f"complete_{shell}", "_TYPER_COMPLETE_ARGS": line}
-    asked |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    given = {"_HSDSL_COMPLETE": f"complete_{shell}", "_TYPER_COMPLETE_ARGS": line}
+    given |= {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
     paths = {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
-        [sys.executable, "-m", "hsdsl"], env={**os.environ, **paths, **asked}, capture_output=True, text=True, cwd=cwd
+        [sys.executable, "-m", "hsdsl"], env={**os.environ, **paths, **given}, capture_output=True, text=True, cwd=cwd
     )
     assert not done.stderr and done.returncode == 0
     return done.stdout

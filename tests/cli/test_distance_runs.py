@@ -31,9 +31,9 @@ def ask(command, folder, monkeypatch):
 
 
 def test_one_object_on_standard_output(ask, folder):
-    asked = ask("coarse.npz", "fine.npz", "--json")
-    found = asked.json
-    assert asked.code == 0
+    arguments = ask("coarse.npz", "fine.npz", "--json")
+    found = arguments.json
+    assert arguments.code == 0
     assert list(found) == ["metric", "lower", "upper", "status", "time", "span", "note"]
     assert found["metric"] == "rho"
     assert 0 < found["lower"] <= found["upper"] <= 1.05 * found["lower"]
@@ -43,20 +43,20 @@ def test_one_object_on_standard_output(ask, folder):
 
 
 def test_a_sentence_for_people(ask):
-    asked = ask("coarse.npz", "fine.npz", "--metric", "rho-hat", "--coordinates", "T")
-    assert asked.code == 0
-    assert asked.out.startswith("rho-hat: 0.")
-    assert "attained at t = " in asked.out
+    arguments = ask("coarse.npz", "fine.npz", "--metric", "rho-hat", "--coordinates", "T")
+    assert arguments.code == 0
+    assert arguments.out.startswith("rho-hat: 0.")
+    assert "attained at t = " in arguments.out
 
 
 def test_a_model_stands_for_its_own_run(ask):
-    asked = ask(THERMOSTAT, "fine.npz", "--json")
-    assert asked.json["upper"] <= 1e-6
+    arguments = ask(THERMOSTAT, "fine.npz", "--json")
+    assert arguments.json["upper"] <= 1e-6
 
 
 def test_a_picture(ask, folder):
-    asked = ask("coarse.npz", "fine.npz", "--plot", "apart.svg")
-    assert asked.code == 0
+    arguments = ask("coarse.npz", "fine.npz", "--plot", "apart.svg")
+    assert arguments.code == 0
     assert (folder / "apart.svg").read_text().startswith("<?xml")
 
 
@@ -77,9 +77,9 @@ WRONG = {
 
 @pytest.mark.parametrize("sentence", WRONG)
 def test_wrong_use_is_refused_with_a_sentence(sentence, ask):
-    asked = ask(*WRONG[sentence])
-    assert asked.code == 2
-    assert sentence in asked.err
+    arguments = ask(*WRONG[sentence])
+    assert arguments.code == 2
+    assert sentence in arguments.err
 
 
 def test_variants_of_a_model_are_compared_as_runs_of_one_file(command, model, tmp_path):

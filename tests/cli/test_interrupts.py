@@ -57,11 +57,11 @@ def test_control_c_at_any_moment(verb, times, tmp_path):
         time.sleep(rng.uniform(0, lasts))
         process.send_signal(signal.SIGINT)
         out, error = process.communicate(timeout=60)
-        said = error.decode()
-        assert process.returncode in (undisturbed.returncode, 130), said
-        assert "Traceback" not in said and "Exception ignored" not in said, said
+        printed = error.decode()
+        assert process.returncode in (undisturbed.returncode, 130), printed
+        assert "Traceback" not in printed and "Exception ignored" not in printed, printed
         if process.returncode == 130:
-            assert "interrupted" in said or json.loads(out)["stop"]["reason"] == "interrupted"
+            assert "interrupted" in printed or json.loads(out)["stop"]["reason"] == "interrupted"
     left = [path.name for path in tmp_path.iterdir() if path.name.endswith(".part")]
     assert len(left) <= 1  # what is left by one is removed by the next
 

@@ -37,9 +37,9 @@ def table(folder, name):
         return list(csv.DictReader(file))
 
 
-def every_part_says_what_it_does_and_writes_its_pictures(out, said):
+def every_part_says_what_it_does_and_writes_its_pictures(out, answer):
     for name, part in PARTS.items():
-        assert f"{name}: {part.summary}" in said
+        assert f"{name}: {part.summary}" in answer
     assert {path.stem for path in out.glob("*.png")} == set(PICTURES)
     for name in PICTURES:
         assert (out / f"{name}.png").read_bytes().startswith(b"\x89PNG")

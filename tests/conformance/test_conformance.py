@@ -199,14 +199,14 @@ class Comparison:
 
     def same(self, actual: Any, expected: str, what: str, within: str = "0") -> None:
         """Assert that a number is the expected one."""
-        wanted, got = self.value(expected), mp.mpf(actual)
-        allowed = self.roundoff * max(1, abs(wanted)) + self.within + self.value(within)
-        if mp.isnan(wanted):
+        right, got = self.value(expected), mp.mpf(actual)
+        allowed = self.roundoff * max(1, abs(right)) + self.within + self.value(within)
+        if mp.isnan(right):
             assert mp.isnan(got), f"{what}: {got} instead of nan"
         else:
-            assert abs(got - wanted) <= allowed, (
-                f"{what}: {mp.nstr(got, 20)} instead of {expected} = {mp.nstr(wanted, 20)} "
-                f"(off by {mp.nstr(abs(got - wanted), 3)}, allowed {mp.nstr(allowed, 3)})"
+            assert abs(got - right) <= allowed, (
+                f"{what}: {mp.nstr(got, 20)} instead of {expected} = {mp.nstr(right, 20)} "
+                f"(off by {mp.nstr(abs(got - right), 3)}, allowed {mp.nstr(allowed, 3)})"
             )
 
     def transition(self, k: int, step: Step, scheme: str) -> None:
@@ -220,8 +220,8 @@ class Comparison:
         else:
             self.same(mp.mpf(actual.time) - sum(self.delays[:k]), str(step.time), f"{what}: corrected time")
         for side in ("before", "after"):
-            for name, wanted in getattr(step, side).items():
-                self.same(getattr(actual, side)[name], wanted, f"{what}: {name} {side}")
+            for name, right in getattr(step, side).items():
+                self.same(getattr(actual, side)[name], right, f"{what}: {name} {side}")
         if step.resumed == "never":
             assert actual.resumed is None and actual.after is None, f"{what}: resumed"
         else:
@@ -251,16 +251,16 @@ class Comparison:
         if run.final is not None:
             assert final.mode == run.final.mode
             assert set(final.state) == set(run.final.state)
-            for name, wanted in run.final.state.items():
-                self.same(final.state[name], wanted, f"final {name}", run.final.within)
-            for name, wanted in run.final.outputs.items():
-                self.same(final.outputs[name], wanted, f"final output {name}", run.final.within)
+            for name, right in run.final.state.items():
+                self.same(final.state[name], right, f"final {name}", run.final.within)
+            for name, right in run.final.outputs.items():
+                self.same(final.outputs[name], right, f"final output {name}", run.final.within)
 
     def rows(self, run: Run, scheme: str) -> None:
         """Assert what the run says of the times of its rows."""
         times = [mp.mpf(t) for t in self.execution.times]
-        for wanted in run.rows:
-            assert min(abs(t - self.value(wanted)) for t in times) <= self.roundoff, f"no row at {wanted}"
+        for right in run.rows:
+            assert min(abs(t - self.value(right)) for t in times) <= self.roundoff, f"no row at {right}"
         if run.grid and scheme == "relaxed":
             steps = [t / self.names["h"] for t in times]
             assert all(abs(s - mp.nint(s)) <= self.roundoff * max(1, s) for s in steps), "a step was shortened"

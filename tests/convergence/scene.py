@@ -51,8 +51,8 @@ class Scene:
         return self._error(run, np.linspace(0, self.until, 1201)[1:-1])
 
     def _error(self, run: Any, times: Any) -> float:
-        sampled, wanted = run.sample(times), self.exact(times)
-        return max(float(np.max(np.abs(sampled[name] - column))) for name, column in wanted.items())
+        sampled, expected = run.sample(times), self.exact(times)
+        return max(float(np.max(np.abs(sampled[name] - column))) for name, column in expected.items())
 
 
 SCENES = {

@@ -13,7 +13,7 @@ def errors(exponents: range) -> list[mp.mpf]:
     """End errors of rk4 on a short run of the switched oscillator, 1/64 before its first switch to 3/64 after."""
     model = SCENES["switched"].model
     s = mp.mpf(3) / 64
-    wanted = {
+    expected = {
         "x": mp.cos(2 * s) / 2 + mp.sqrt(3) / 4 * mp.sin(2 * s),
         "v": mp.sqrt(3) / 2 * mp.cos(2 * s) - mp.sin(2 * s),
     }
@@ -28,7 +28,7 @@ def errors(exponents: range) -> list[mp.mpf]:
             initial={"x": "sin(pi/6 - 1/64)", "v": "cos(pi/6 - 1/64)"},
         )
         assert len(run.transitions) == 1
-        found.append(max(abs(run.final.state[name] - value) for name, value in wanted.items()))
+        found.append(max(abs(run.final.state[name] - value) for name, value in expected.items()))
     return found
 
 

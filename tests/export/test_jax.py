@@ -217,11 +217,11 @@ def test_derivatives_through_impacts_are_differences(name: str, settings: Any, b
 
     plain = jitted(ends)
     by_p, by_x = jitted(jax.jacfwd(ends, (0, 1)))(p, x)
-    for slopes, wanted in (
+    for slopes, expected in (
         (by_p, differences(lambda p: plain(p, x), p, by)),
         (by_x, differences(lambda x: plain(p, x), x, by)),
     ):
-        assert np.abs(slopes - wanted).max() <= 1e-6 * max(1, np.abs(wanted).max())
+        assert np.abs(slopes - expected).max() <= 1e-6 * max(1, np.abs(expected).max())
 
 
 @pytest.mark.slow
@@ -252,8 +252,8 @@ def test_derivatives_by_samples_of_an_input(tmp_path: Path) -> None:
         return module.simulate(p).x
 
     slopes = jitted(jax.jacfwd(ends))(module.parameters())
-    wanted = differences(jitted(ends), module.parameters(), 1e-6)
-    assert np.abs(slopes - wanted).max() <= 1e-6
+    expected = differences(jitted(ends), module.parameters(), 1e-6)
+    assert np.abs(slopes - expected).max() <= 1e-6
 
 
 @pytest.mark.slow

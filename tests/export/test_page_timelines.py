@@ -86,8 +86,8 @@ def test_segments_are_those_of_a_run(name: str, tmp_path: Path) -> None:
         runs.append(source_of(model, {"parameters": given}).problem)
         values = runs[-1].timeline.segments[0].data[:4]
         lines.append(" ".join(repr(float(number)) for number in (runs[-1].settings.until, *values)))
-    said = subprocess.run([tmp_path / "timeline"], input="\n".join(lines), capture_output=True, text=True, check=True)
-    for run, line in zip(runs, said.stdout.splitlines(), strict=True):
+    done = subprocess.run([tmp_path / "timeline"], input="\n".join(lines), capture_output=True, text=True, check=True)
+    for run, line in zip(runs, done.stdout.splitlines(), strict=True):
         status, *found = line.split()
         assert status == "0"
         assert [float.fromhex(text) for text in found] == timeline_numbers(run)

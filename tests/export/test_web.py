@@ -314,8 +314,8 @@ class TestInABrowser:
 
     def test_notes_of_a_run_are_shown(self, driver, tmp_path):
         opened(driver, exported(hsdsl.loads(STAND), tmp_path))
-        said = driver.find_element("id", "run").text
-        assert "Zeno at t = " in said and "at rest on the guard of on->on" in said
+        printed = driver.find_element("id", "run").text
+        assert "Zeno at t = " in printed and "at rest on the guard of on->on" in printed
         assert "left" in driver.find_element("id", "verdict").text
         typed(driver, "initial.x", 2.0)
         assert driver.find_element("id", "verdict-title").text.endswith("not of these")
@@ -440,8 +440,8 @@ def test_without_its_compiler_it_is_refused_before_anything_is_written(monkeypat
     monkeypatch.setattr(wasm, "zig_compiler", lambda: None)
     model = str(MODELS / "thermostat.yaml")
     assert obey(["export", model, "--to", "web", "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert "ziglang" in said and "pip install 'hsdsl[web]'" in said
+    printed = capsys.readouterr().err
+    assert "ziglang" in printed and "pip install 'hsdsl[web]'" in printed
     assert not (tmp_path / "out").exists()
 
 

@@ -6,7 +6,7 @@ python tests/fuzz/campaign.py --kind bytes --replay 4711
 
 Input number N of a kind and a seed is always the same one, as long as the files it is made from stay the same. Exit
 code 1 where anything was found: an exception that is not a refusal, a hang, too much memory, or a payload that did
-something. A hang is 5 seconds of processor time; the longest of any input is said in processor time and on the wall's
+something. A hang is 5 seconds of processor time; the longest of any input is given in processor time and on the wall's
 clock, with how many took over 5 s of the latter only because the machine had other work.
 """
 

@@ -152,15 +152,15 @@ def feed(kind: str, data: str | bytes, rng: Random, folder: Path, share: float =
 def feed_expression(text: str, rng: Random, share: float) -> str:
     """One expression, as a number, a condition and an inequality."""
     got = "refused"
-    for wanted in ("number", "condition", "inequality"):
+    for expected in ("number", "condition", "inequality"):
         try:
-            tree = parse(text, wanted)  # pyright: ignore[reportArgumentType]
+            tree = parse(text, expected)  # pyright: ignore[reportArgumentType]
             if SCOPE.faults(tree):
                 continue
             with deep_stack(), timebox(limits.DEFAULT.seconds, PARTS):
-                if wanted == "number":
+                if expected == "number":
                     found = [symbolic.number(tree, SCOPE, text).expr]
-                elif wanted == "inequality":
+                elif expected == "inequality":
                     both = inequality(tree, SCOPE, text, "when")
                     found = [both.left.expr, both.right.expr]
                 else:
@@ -233,7 +233,7 @@ def check_c(source: str) -> None:
 def _check_said(text: str) -> None:
     for jargon in ("sympy", "pydantic", "Traceback", " object at 0x", "\x1b"):
         if jargon in text.split("\n")[0]:
-            raise Violation(f"{jargon!r} is said: {text[:300]}")
+            raise Violation(f"{jargon!r} is printed: {text[:300]}")
 
 
 @contextmanager

@@ -26,8 +26,8 @@ def diagnostics(name):
 
 @pytest.mark.parametrize("case", CASES)
 def test_says_what_is_expected(case):
-    said = "".join(render(d) + "\n" for d in diagnostics(case))
-    assert_golden(said, FOLDER / f"{case}.txt")
+    printed = "".join(render(d) + "\n" for d in diagnostics(case))
+    assert_golden(printed, FOLDER / f"{case}.txt")
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -56,6 +56,6 @@ def test_nothing_is_left_over():
 
 def test_no_jargon_of_the_libraries():
     for path in FOLDER.glob("*.txt"):
-        said = path.read_text(encoding="utf-8").lower()
+        printed = path.read_text(encoding="utf-8").lower()
         for word in ("pydantic", "sympy", "traceback", "input should", "token", "scalar", "zoo", "node"):
-            assert word not in said, path.name
+            assert word not in printed, path.name

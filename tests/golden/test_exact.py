@@ -214,10 +214,10 @@ def test_the_stated_error_holds_at_random_times(name: str) -> None:
     near = [np.nextafter(t.time, to) for t in run.transitions[:20] for to in (0, end)]
     times = np.array([t for t in (*times, *near) if all(t != other.time for other in run.transitions)])
     columns = run.sample(times)
-    wanted = [truth(float(t)) for t in times]
+    expected = [truth(float(t)) for t in times]
     worst = 0.0
     for k, column in enumerate(columns.state_columns.T):
-        for value, exactly in zip(column, wanted, strict=True):
+        for value, exactly in zip(column, expected, strict=True):
             off = Fraction(float(value)) - exactly[k] if isinstance(exactly[k], Fraction) else exactly[k] - float(value)
             worst = max(worst, abs(float(off)))
     assert worst <= run.settings["error"]

@@ -1,4 +1,4 @@
-"""The stiff model's last switch, 3.5e-7 before its end: met, or said to be undecided, never passed over silently."""
+"""The stiff model's last switch, 3.5e-7 before its end: met or undecided, never passed over silently."""
 
 from pathlib import Path
 

@@ -59,7 +59,7 @@ def test_example_2_through_both_zeno_points(method: str, within: float) -> None:
     made = [i.time for i in exact.impacts if i.time < exact.zeno[0]]
     tail = [t.time for t in run.transitions if t.time < float(exact.zeno[0])]
     assert 20 <= len(tail) <= len(made)
-    assert max(abs(t - float(wanted)) for t, wanted in zip(tail, made, strict=False)) <= within
+    assert max(abs(t - float(expected)) for t, expected in zip(tail, made, strict=False)) <= within
     times = np.linspace(0, 12.5, 400)
     assert np.max(np.abs(run.sample(times)["x"] - exact.at(times)[0])) <= 1e-10
 

@@ -34,7 +34,7 @@ def ending(answer):
 
 
 @pytest.fixture
-def told(tmp_path, monkeypatch, capsys):
+def answered(tmp_path, monkeypatch, capsys):
     """What the command line says to a case."""
 
     def tell(case):
@@ -47,9 +47,9 @@ def told(tmp_path, monkeypatch, capsys):
         monkeypatch.setattr(sys, "argv", ["hsdsl", *case.get("command", ["validate", "model.yaml"])])
         with pytest.raises(SystemExit) as ended:
             main()
-        said = capsys.readouterr()
-        assert said.out == ""
-        return ended.value.code, said.err
+        printed = capsys.readouterr()
+        assert printed.out == ""
+        return ended.value.code, printed.err
 
     return tell
 
@@ -60,17 +60,17 @@ def test_there_are_enough_and_no_two_are_called_the_same():
 
 
 @pytest.mark.skipif("HSDSL_WRITE_GOLDEN" not in os.environ, reason="writes the answers")
-def test_write(told):
-    answers = {name: told(case)[1] for name, case in CASES.items()}
+def test_write(answered):
+    answers = {name: answered(case)[1] for name, case in CASES.items()}
     records = (f"{MARK}{name}\n{answer.removesuffix(ending(answer))}" for name, answer in answers.items())
     ANSWERS.write_text("".join(records), encoding="utf-8")
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_each_mistake_is_told(told, name):
-    code, said = told(CASES[name])
+def test_each_mistake_is_told(answered, name):
+    code, printed = answered(CASES[name])
     assert code in (1, 2)
-    assert said == known()[name] + ending(known()[name])
+    assert printed == known()[name] + ending(known()[name])
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -87,10 +87,10 @@ class Compared:
             waits = transition.resumed is not None and not check.forced
             self.delays.append(self.delays[-1] + (transition.resumed - transition.time if waits else 0.0))
 
-    def close(self, actual: float, wanted: str, name: str, what: str) -> None:
+    def close(self, actual: float, expected: str, name: str, what: str) -> None:
         """Assert that a number is the reference's."""
         allowed = self.trust + (self.check.within[name] if name in self.check.within else self.check.within["default"])
-        off = abs(actual - float(evaluate(wanted)))
+        off = abs(actual - float(evaluate(expected)))
         assert off <= allowed, f"{what}: {name} off by {off:.3g}, allowed {allowed:.3g}"
 
     def transitions(self, known: list[Any]) -> None:
@@ -102,8 +102,8 @@ class Compared:
             self.close(actual.time - self.delays[k], one["time"], "time", what)
             assert actual.edge == one.get("edge", actual.edge), what
             for side in ("before", "after"):
-                for name, wanted in one.get(side, {}).items():
-                    self.close(getattr(actual, side)[name], wanted, name, f"{what} {side}")
+                for name, expected in one.get(side, {}).items():
+                    self.close(getattr(actual, side)[name], expected, name, f"{what} {side}")
 
     def states(self, known: list[Any]) -> None:
         """Compare states at known times."""
@@ -113,8 +113,8 @@ class Compared:
             made = sum(t.time - d <= time for t, d in zip(self.run.transitions, self.delays, strict=False))
             point = self.run(min(time + self.delays[made], self.run.stop.time))
             assert point.mode == one.pop("mode", point.mode)
-            for name, wanted in one.items():
-                self.close(float(point.state[name]), wanted, name, f"state at {time}")
+            for name, expected in one.items():
+                self.close(float(point.state[name]), expected, name, f"state at {time}")
 
 
 @pytest.mark.parametrize(("name", "block", "reference"), references())

@@ -124,8 +124,8 @@ def test_digital_control_from_beside_the_diagonal(dx: str, dy: str, path: list[i
     assert [t.source for t in run.transitions] + [run.final.mode] == [f"D{k}" for k in path]
     assert all(not t.alternatives for t in run.transitions)
     state = digital_control(-1 - float(dx), -1 - float(dy)).final.state
-    wanted = [state["x"], state["y"]]
-    assert np.allclose([run.final.state["x"], run.final.state["y"]], wanted, rtol=0, atol=3e-4)
+    expected = [state["x"], state["y"]]
+    assert np.allclose([run.final.state["x"], run.final.state["y"]], expected, rtol=0, atol=3e-4)
 
 
 def default_beside(dx: str, dy: str) -> Any:

@@ -261,7 +261,7 @@ def _rises(attack: Attack, mode: str, edge: Edge, at: dict[str, float], time: fl
 
 
 def commutes(attack: Attack, message: str) -> str | None:
-    """HS508: which of two transitions goes first changes nothing, or something, where that is said."""
+    """HS508: which of two transitions goes first changes nothing, or something, where that is the claim."""
     first, second = _named(message)[:2]
     mode, one = attack.model.edge(first)
     other = attack.model.edge(second)[1]
@@ -339,8 +339,8 @@ def somewhere(check: Callable[[Attack, str, dict[str, float]], str | None]) -> C
         if not _plain(at):
             return None
         found = [check(attack, message, {**free, **at}) for free in ({}, *attack.points(), *attack.points())]
-        told = [verdict for verdict in found if verdict is not None]
-        return "" if "" in told else told[0] if told else None
+        answer = [verdict for verdict in found if verdict is not None]
+        return "" if "" in answer else answer[0] if answer else None
 
     return attempt
 
@@ -354,7 +354,7 @@ def _plain(at: dict[str, float]) -> bool:
 
 @somewhere
 def lands(attack: Attack, message: str, at: dict[str, float]) -> str | None:
-    """HS506: a transition from the point lands beyond, and what is said to happen happens."""
+    """HS506: a transition from the point lands beyond, and what the message says happens."""
     found = re.search(r"where '(\w+)' fires at once", message)
     run = _fired(attack, _named(message)[0], at)
     if run is None or (not found and "where the run stops" not in message):

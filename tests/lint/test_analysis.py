@@ -1,4 +1,4 @@
-"""The mathematics of lint rules: bounds that hold, answers that are right, points that are what they are said to be."""
+"""The mathematics of lint rules: bounds that hold, answers that are right, points that are what they claim."""
 
 from fractions import Fraction
 

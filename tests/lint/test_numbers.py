@@ -20,7 +20,7 @@ def read(text):
     return symbolic.number(parse(text), SCOPE, text).expr
 
 
-def asked(text):
+def arguments(text):
     return symbolic.condition(parse(text, "condition"), SCOPE, text)
 
 
@@ -76,7 +76,7 @@ def test_a_symbol_without_a_value():
     ],
 )
 def test_conditions(text, truth):
-    assert holds(asked(text), POINT) is truth
+    assert holds(arguments(text), POINT) is truth
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ def test_as_pint_reads_it(text):
     quantity = pint.UnitRegistry().parse_expression(text).to_base_units()
     found = read(text)
     assert found.factor == pytest.approx(quantity.magnitude, rel=1e-12)
-    wanted = {name: float(power) for name, power in quantity.dimensionality.items()}
-    assert {name: float(power) for name, power in found.powers} == pytest.approx(wanted)
+    expected = {name: float(power) for name, power in quantity.dimensionality.items()}
+    assert {name: float(power) for name, power in found.powers} == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_many_names_are_said_in_base_units():
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "said"),
+    ("one", "other", "printed"),
     [
         ("V", "mV", "V (1000 mV)"),
         ("nA/uF", "mV/ms", "nA/uF (0.001 mV/ms)"),
@@ -71,8 +71,8 @@ def test_many_names_are_said_in_base_units():
         ("V", "A", "V"),
     ],
 )
-def test_a_size_is_said_where_it_is_all_that_differs(one, other, said):
-    assert read(one).compared_with(read(other)) == said
+def test_a_size_is_said_where_it_is_all_that_differs(one, other, printed):
+    assert read(one).compared_with(read(other)) == printed
 
 
 def test_size_counts():

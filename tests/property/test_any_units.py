@@ -54,11 +54,11 @@ METHODS = ("taylor", "dopri5", "dop853", "radau")
 FACTORS = {"x": 1, "v": 2, "y": None}
 
 
-def in_units(name: str, factors: tuple[float, float, float], **asked: object) -> hsdsl.Execution:
+def in_units(name: str, factors: tuple[float, float, float], **given: object) -> hsdsl.Execution:
     modes, initial, until = SCENES[name]
     numbers = dict(zip("TXW", map(repr, factors), strict=True))
     text = HEAD.replace("{modes}", modes.replace("{", "{{").replace("}", "}}")).format(initial=initial, **numbers)
-    return hsdsl.loads(f"{text}experiment: {{until: {until}*T}}\n").simulate(**asked)
+    return hsdsl.loads(f"{text}experiment: {{until: {until}*T}}\n").simulate(**given)
 
 
 def assert_scaled(one: hsdsl.Execution, other: hsdsl.Execution, factors: tuple[float, float, float]) -> None:
@@ -95,16 +95,16 @@ def test_relaxed_runs_do_not_know_units_that_the_relaxation_has(name: str, metho
     one = in_units(name, (1.0, 1.0, 1.0), scheme="relaxed", method=method, relaxation=2.0**-10)
     for exponent in (-20, 5, 20):
         factors = powers((exponent, exponent, exponent))
-        asked = {"scheme": "relaxed", "method": method, "relaxation": 2.0**-10 * factors[0]}
-        assert_scaled(one, in_units(name, factors, **asked), factors)
+        given = {"scheme": "relaxed", "method": method, "relaxation": 2.0**-10 * factors[0]}
+        assert_scaled(one, in_units(name, factors, **given), factors)
 
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_python_loop_does_not_either(name: str) -> None:
-    asked = {"engine": "python", "tolerance": 1e-6}
-    one = in_units(name, (1.0, 1.0, 1.0), relaxation=2.0**-20, **asked)
+    given = {"engine": "python", "tolerance": 1e-6}
+    one = in_units(name, (1.0, 1.0, 1.0), relaxation=2.0**-20, **given)
     factors = powers((21, -17, 33))
-    assert_scaled(one, in_units(name, factors, relaxation=2.0, **asked), factors)
+    assert_scaled(one, in_units(name, factors, relaxation=2.0, **given), factors)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -147,9 +147,9 @@ experiment: {{until: {20 * scale!r}}}
 """
     run = hsdsl.loads(text).simulate(method=method)
     times = np.array([t.time for t in run.transitions])
-    wanted = np.pi / 10 * scale * np.arange(1, 64)
-    assert np.allclose(times[times > 0.01 * scale], wanted, rtol=1e-12)
-    assert len(times) <= len(wanted) + 1  # at the start the surface is zero: one that is crossed then, or none
+    expected = np.pi / 10 * scale * np.arange(1, 64)
+    assert np.allclose(times[times > 0.01 * scale], expected, rtol=1e-12)
+    assert len(times) <= len(expected) + 1  # at the start the surface is zero: one that is crossed then, or none
 
 
 @pytest.mark.parametrize("method", ("taylor", "dopri5", "radau"))

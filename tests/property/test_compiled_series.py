@@ -49,19 +49,19 @@ def outcome(taylor: Taylor, order: int, point: tuple[float, ...]) -> object:
     return [bits(line) for line in lines], [row and bits(row) for row in surfaces]
 
 
-def stored(wanted: Any, compiled: Any) -> Any:
+def stored(expected: Any, compiled: Any) -> Any:
     """The compiled outcome, with the other's lines behind those of states where nothing reads a line: C has zeros."""
-    if wanted is None or compiled is None:
+    if expected is None or compiled is None:
         return compiled
-    pairs = enumerate(zip(wanted[0], compiled[0], strict=True))
+    pairs = enumerate(zip(expected[0], compiled[0], strict=True))
     return [one if k not in STATES and not any(two) else two for k, (one, two) in pairs], compiled[1]
 
 
 def assert_alike(both: tuple[Taylor, Taylor], points: list[tuple[float, ...]], order: int) -> int:
     """How many points had values everywhere."""
     found = [outcome(both[0], order, point) for point in points]
-    for point, wanted in zip(points, found, strict=True):
-        assert stored(wanted, outcome(both[1], order, point)) == wanted, point
+    for point, expected in zip(points, found, strict=True):
+        assert stored(expected, outcome(both[1], order, point)) == expected, point
     return sum(one is not None for one in found)
 
 

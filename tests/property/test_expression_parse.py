@@ -65,11 +65,11 @@ def test_same_value_as_python(text):
 @settings(max_examples=300, deadline=None)
 @given(st.one_of(st.text(max_size=40), st.text(alphabet="x2.0+-*/()<>=!&,^ 'eandorsin", max_size=40)))
 def test_any_text_is_read_or_refused_at_a_place(text):
-    for wanted in ("number", "condition", "inequality"):
+    for right in ("number", "condition", "inequality"):
         try:
-            tree = parse(text, wanted)
+            tree = parse(text, right)
             if not SCOPE.faults(tree):
-                (symbolic.condition if wanted == "condition" else symbolic.number)(tree, SCOPE, text)
+                (symbolic.condition if right == "condition" else symbolic.number)(tree, SCOPE, text)
         except ExpressionError as error:
             assert 0 <= error.start < error.end <= max(1, len(text) + 1)
             assert str(error)

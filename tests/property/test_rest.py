@@ -30,8 +30,8 @@ def guard(rng: random.Random) -> str:
 def edges(rng: random.Random) -> str:
     found = ""
     for k in range(rng.randint(1, 3)):
-        asked = f", if: '{guard(rng)}'" if rng.random() < 0.6 else ""
-        found += f", {{name: e{k}, when: '{guard(rng)}'{asked}, to: z}}"
+        given = f", if: '{guard(rng)}'" if rng.random() < 0.6 else ""
+        found += f", {{name: e{k}, when: '{guard(rng)}'{given}, to: z}}"
     return found
 
 

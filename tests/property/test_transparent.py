@@ -128,8 +128,8 @@ def draw(rng: random.Random, modes: int = 4) -> tuple[str, list[tuple[str, float
         text += f"  m{i}:\n    flow: {{x: ({ax}) + ({bx})/2*s, y: ({ay}) + ({by})/2*s, s: 1}}\n    transitions:\n"
         landing = f"{{x: {starts[i + 1][0]}, y: {starts[i + 1][1]}, s: 0}}"
         for k, one in enumerate(surfaces):
-            asked = f", if: '{one.condition}'" if one.margin is not None else ""
-            text += f"      - {{name: e{i}{k}, when: '{one.text}'{asked}, to: m{i + 1}, reset: {landing}}}\n"
+            given = f", if: '{one.condition}'" if one.margin is not None else ""
+            text += f"      - {{name: e{i}{k}, when: '{one.text}'{given}, to: m{i + 1}, reset: {landing}}}\n"
         if stays:
             continue
         firsts = [(s, f"e{i}{k}") for k, one in enumerate(surfaces) if (s := one.fires()) is not None]
@@ -163,8 +163,8 @@ def check(seed: int, settings: Any, engines: Any) -> int:
             what = (seed, scheme, engine, arguments, run.stop)
             assert [t.edge for t in run.transitions] == [edge for edge, _ in expected], what
             entered = 0.0
-            for made, (_, wanted) in zip(run.transitions, expected, strict=True):
-                assert made.time - entered == pytest.approx(wanted, abs=1e-7 if wanted else TANGENTIAL), what
+            for made, (_, exact) in zip(run.transitions, expected, strict=True):
+                assert made.time - entered == pytest.approx(exact, abs=1e-7 if exact else TANGENTIAL), what
                 entered = made.resumed
     return len(expected)
 

@@ -153,9 +153,9 @@ def test_a_measurement_at_a_time_that_no_value_moves_is_not_named() -> None:
 
 
 def test_progress(model: Any, samples: dict[str, Any]) -> None:
-    told: list[float] = []
-    model.fit({"t": samples["t"], "x": samples["x"]}, "c", progress=lambda runs, values, total: told.append(total))
-    assert told and told[-1] < 1e-10
+    answer: list[float] = []
+    model.fit({"t": samples["t"], "x": samples["x"]}, "c", progress=lambda runs, values, total: answer.append(total))
+    assert answer and answer[-1] < 1e-10
 
 
 @pytest.mark.parametrize(

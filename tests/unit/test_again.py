@@ -19,8 +19,8 @@ OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 FAST = {"scheme": "relaxed", "method": "dopri5", "tolerance": 1e-6, "until": 10}
 
 
-def fresh(**asked):
-    return hsdsl.load(OSCILLATOR).simulate(**asked)
+def fresh(**given):
+    return hsdsl.load(OSCILLATOR).simulate(**given)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -59,8 +59,8 @@ def made(flow: str, initial: str, until: str) -> hsdsl.Model:
     return hsdsl.loads(ROOT.format(flow=flow, initial=initial, until=until))
 
 
-def prepared(model: hsdsl.Model, **asked: object):
-    return model.pipeline.prepare({"engine": "python", **asked}).settings
+def prepared(model: hsdsl.Model, **given: object):
+    return model.pipeline.prepare({"engine": "python", **given}).settings
 
 
 @pytest.mark.parametrize("name", CASES)

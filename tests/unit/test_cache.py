@@ -335,9 +335,9 @@ def test_what_is_no_program_is_not_taken(folder: Path) -> None:
 def test_a_run_of_a_model_seen_before_imports_little(program: str, with_loop) -> None:
     with_loop()
     command = [sys.executable, "-c", program, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
-    said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
+    lines = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
     by_another_process = program == LIGHT_COMMAND  # see `hsdsl.ahead`
-    assert ("sympy" in said[0][-1] or by_another_process) and said[1][-1] == "[]"
+    assert ("sympy" in lines[0][-1] or by_another_process) and lines[1][-1] == "[]"
 
 
 PYTHON_LOOP = tuple(f"hsdsl.simulate.{name}" for name in ("relaxed", "located", "entry", "zeno", "contact", "touching"))
@@ -353,8 +353,8 @@ def test_a_run_of_a_model_seen_before_imports_no_loop_and_no_summary(
     with_loop()
     unneeded = (*HEAVY, *PYTHON_LOOP, *OTHERS, *more)
     command = [sys.executable, "-c", LIGHT_COMMAND, str(ROOT / "models" / f"{name}.yaml"), *unneeded]
-    said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
-    assert said[0][-1] != "[]" and said[1][-1] == "[]"
+    lines = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
+    assert lines[0][-1] != "[]" and lines[1][-1] == "[]"
 
 
 @needs_compiler

@@ -149,8 +149,8 @@ def test_without_a_compiler_python_runs_and_one_line_says_so(monkeypatch, capsys
     monkeypatch.setenv("CC", "/no/such/compiler")
     oscillator = hsdsl.load(OSCILLATOR)
     assert [oscillator.simulate(until=0.1).engine for _ in range(2)] == ["python"] * 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "/no/such/compiler" in said
+    printed = capsys.readouterr().err
+    assert printed.count("\n") == 1 and "/no/such/compiler" in printed
     with pytest.raises(UsageError, match="engine 'c' cannot run this"):
         oscillator.simulate(until=0.1, engine="c")
 

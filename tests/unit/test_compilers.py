@@ -50,7 +50,7 @@ WRONG = {
 
 @pytest.fixture(autouse=True)
 def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Nothing is compiled, nothing has been said, and a compiler has a second."""
+    """Nothing is compiled, nothing has been printed, and a compiler has a second."""
     kernel._runtime.cache_clear()
     monkeypatch.setattr(process, "PATIENCE", 1.0)
     monkeypatch.setattr(compiler, "TRIAL", 60.0)  # what compiles may take long where much else runs
@@ -75,12 +75,12 @@ def use(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], Path
     return written
 
 
-def assert_python_runs_with_one_remark(said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def assert_python_runs_with_one_remark(printed: str, capsys: pytest.CaptureFixture[str]) -> None:
     model = hsdsl.load(MODEL)
     assert [model.simulate(until=until).engine for until in (0.1, 0.2)] == ["python"] * 2
     assert hsdsl.load(MODEL).simulate().engine == "python"
     error = capsys.readouterr().err
-    assert error.count("\n") == 1 and said in error and "Traceback" not in error, error
+    assert error.count("\n") == 1 and printed in error and "Traceback" not in error, error
     with pytest.raises(UsageError, match="engine 'c' cannot run this"):
         model.simulate(engine="c")
     assert capsys.readouterr().err == ""
@@ -88,11 +88,11 @@ def assert_python_runs_with_one_remark(said: str, capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize("fault", FAULTY)
 def test_a_faulty_compiler(fault: str, use, capsys, monkeypatch, tmp_path: Path) -> None:
-    script, said = FAULTY[fault]
-    if said == "does not end":
+    script, printed = FAULTY[fault]
+    if printed == "does not end":
         monkeypatch.setattr(compiler, "TRIAL", 1.0)
     use(script)
-    assert_python_runs_with_one_remark(said, capsys)
+    assert_python_runs_with_one_remark(printed, capsys)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith("hsdsl-")]
     assert not list((tmp_path / "cache").rglob("*.so"))
 
@@ -145,8 +145,8 @@ def test_a_compiler_has_so_much_time(use, capsys) -> None:
     real = compiler.find_compiler().command[0]
     use(f'case "$*" in *model.c*) sleep 600;; esac\nexec {real} "$@"')
     assert hsdsl.load(MODEL, limits=Limits(compile=2)).simulate(until=0.1).engine == "python"
-    said = capsys.readouterr().err
-    assert "--limit compile=20" in said and "the longest expression is the flow of T in mode" in said
+    printed = capsys.readouterr().err
+    assert "--limit compile=20" in printed and "the longest expression is the flow of T in mode" in printed
 
 
 @needs_compiler
@@ -163,9 +163,9 @@ def test_what_takes_too_long_is_tried_once(use, capsys, tmp_path: Path) -> None:
         return len(tried.read_text().split())
 
     assert [runs(2), runs(2), runs(1.5), runs(2.5), runs(2)] == [1, 1, 1, 2, 2]
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 5 and "took more than 2 s before" in said[1]
-    assert "--limit compile=20" in said[1] and "hsdsl doctor --forget" in said[1]
+    printed = capsys.readouterr().err.splitlines()
+    assert len(printed) == 5 and "took more than 2 s before" in printed[1]
+    assert "--limit compile=20" in printed[1] and "hsdsl doctor --forget" in printed[1]
     assert obey(["doctor", "--json"]) == 0
     assert '"given_up": 1' in capsys.readouterr().out
     assert obey(["doctor", "--forget"]) == 0

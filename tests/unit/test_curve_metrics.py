@@ -71,11 +71,11 @@ PAIRS = {
 @pytest.mark.parametrize("space", [Plane(), Bent()], ids=["convex", "points only"])
 @pytest.mark.parametrize("name", PAIRS)
 def test_exact_distances_in_the_plane(name, space):
-    a, b, wanted, time = PAIRS[name]
+    a, b, expected, time = PAIRS[name]
     found = rho(a, b, space, gap=1e-3)
-    assert found.lower <= wanted + 1e-15
-    assert found.upper >= wanted
-    assert found.upper - found.lower <= 1.1e-3 * wanted + 1e-13
+    assert found.lower <= expected + 1e-15
+    assert found.upper >= expected
+    assert found.upper - found.lower <= 1.1e-3 * expected + 1e-13
     if time is not None and isinstance(space, Plane) and not isinstance(space, Bent):
         assert found.time == pytest.approx(time, abs=1e-3)
 
@@ -98,12 +98,12 @@ def test_of_several_transitions_at_one_instant_only_the_last_value_counts():
 
 
 class Counting(Bent):
-    """Counts how many point distances it is asked for."""
+    """Counts how many point distances it computes."""
 
-    asked = 0
+    given = 0
 
     def between(self, p, q, enough=0.0):
-        self.asked += len(p.t)
+        self.given += len(p.t)
         return super().between(p, q)
 
 
@@ -114,7 +114,7 @@ def test_few_point_distances_decide_many_samples():
     space = Counting()
     found = rho(a, b, space)
     assert 5.0 - ROUNDING < found.lower <= 5.0 <= found.upper <= 5.0 * (1 + 2e-6)
-    assert space.asked < 200
+    assert space.given < 200
 
 
 class Clock(Bent):
@@ -308,7 +308,7 @@ def test_skorokhod_moves_jumps_together():
 def test_closeness_counts_jumps():
     a, b = hand_made.thermostat(3), hand_made.thermostat(4)
     assert tau_epsilon(a, b, tau=4.5).upper < 0.01
-    assert tau_epsilon(a, b).lower < 0.01  # b's last jump is at t + j = 4 + 3 = 7, beyond which neither is asked
+    assert tau_epsilon(a, b).lower < 0.01  # b's last jump is at t + j = 4 + 3 = 7, beyond which neither counts
     late = replace(a, times=a.times * 1.125)
     found = tau_epsilon(a, late, tau=7.0)
     # the longest way is from the beginning (3, 3) of a's last arc to that of the other's, (3.375, 3)

@@ -37,7 +37,7 @@ def test_sixteen_digits_have_the_default_of_floats():
 
 
 @pytest.mark.parametrize(
-    ("model", "asked", "kept"),
+    ("model", "given", "kept"),
     [
         (KINKED, {}, 9),
         (SPIN, {"method": "dopri5"}, 9),
@@ -46,8 +46,8 @@ def test_sixteen_digits_have_the_default_of_floats():
         (SPIN.replace("until: 1.5", "until: 1.5, tolerance: 1e-20"), {}, 20),
     ],
 )
-def test_elsewhere_the_digits_kept_are_said(model, asked, kept):
-    run = hsdsl.loads(model).simulate(precision=50, **asked)
+def test_elsewhere_the_digits_kept_are_said(model, given, kept):
+    run = hsdsl.loads(model).simulate(precision=50, **given)
     assert round(-mp.log10(run.settings["tolerance"])) == kept
     assert f"50 digits, of which the tolerance keeps {kept}" in " ".join(summary(run).split())
 

@@ -1,4 +1,4 @@
-"""Documents to mathematics: what names mean, how edges are made, and what is said when something is wrong."""
+"""Documents to mathematics: what names mean, how edges are made, and the messages where something is wrong."""
 
 import hashlib
 import time
@@ -101,7 +101,7 @@ def test_outputs_are_read_in_each_mode():
         ("    outputs: {o: 1/0}\n", "", ["HS118"]),
         ("", "outputs: {o: pq}\n", ["HS111"]),
         ("    let: {p: 0}\n", "outputs: {o: 1/p}\n", ["HS118"]),  # without a value in this mode alone
-        ("    let: {p: nothing}\n", "outputs: {o: p}\n", ["HS111"]),  # the fault is told where it is
+        ("    let: {p: nothing}\n", "outputs: {o: p}\n", ["HS111"]),  # the fault is reported where it is
         ("  C: {final: true, outputs: {o: 1}}\n", "", ["HS315"]),
     ],
 )

@@ -37,9 +37,9 @@ def assert_as_single_runs(ensemble):
         found = ensemble.transition_times[place]
         times = [t.time for t in run.transitions[: len(found)]]
         assert found[: len(times)].tolist() == times and np.isnan(found[len(times) :]).all()
-        asked = ensemble.sample_times[place]
-        inside = asked <= run.times[-1] + 1e-12 * max(1, run.times[-1])
-        samples = run.sample(asked[inside])
+        given = ensemble.sample_times[place]
+        inside = given <= run.times[-1] + 1e-12 * max(1, run.times[-1])
+        samples = run.sample(given[inside])
         for name, column in ensemble.samples.items():
             assert np.isnan(column[place][~inside]).all()
             if name in samples.names:
@@ -121,17 +121,17 @@ def test_engines_and_numbers_of_threads_agree():
 
 @needs_compiler
 def test_control_c_keeps_what_is_done_and_progress_is_told():
-    told = []
+    answer = []
 
     def progress(done, count):
-        told.append((done, count))
+        answer.append((done, count))
         if done:
             os.kill(os.getpid(), signal.SIGINT)
 
     ensemble = hsdsl.load(OSCILLATOR).ensemble(
         parameters={"c": np.linspace(0.3, 0.9, 400)}, method="rk4", step=1e-4, threads=1, progress=progress, engine="c"
     )
-    assert ensemble.reasons["interrupted"] > 0 and told[0][1] == 400 and threading.active_count() < 5
+    assert ensemble.reasons["interrupted"] > 0 and answer[0][1] == 400 and threading.active_count() < 5
     done = int(np.argmax(ensemble.stop == "interrupted"))
     assert (ensemble.stop[:done] == "until").all() and np.isnan(ensemble.time[done:]).all()
     assert "interrupted" in ensemble.failures(1)[0].message

@@ -90,7 +90,7 @@ def test_outputs_between_rows_come_from_the_function_and_without_one_from_the_li
 
     assert replace(line, output_function=energy)(0.5)["energy"] == 2.0
     assert calls == [("fly", 0.5, (1.875, -0.5))]
-    assert replace(line, output_function=energy)(2.0, "left")["energy"] == 4.0  # recorded: the function is not asked
+    assert replace(line, output_function=energy)(2.0, "left")["energy"] == 4.0  # recorded: the function is not called
 
 
 def test_an_output_without_a_value_is_not_a_number():

@@ -26,12 +26,12 @@ def condition(text):
     return symbolic.condition(parse(text, "condition"), SCOPE, text)
 
 
-def fault(text, wanted="number"):
+def fault(text, exact="number"):
     with pytest.raises(ExpressionError) as raised:
-        tree = parse(text, wanted)
+        tree = parse(text, exact)
         for error in SCOPE.faults(tree):
             raise error
-        (condition if wanted == "condition" else number)(text)
+        (condition if exact == "condition" else number)(text)
     return raised.value
 
 
@@ -136,9 +136,9 @@ FAULTS = [
 ]
 
 
-@pytest.mark.parametrize(("text", "wanted", "code", "start", "end"), FAULTS)
-def test_faults_have_places(text, wanted, code, start, end):
-    error = fault(text, wanted)
+@pytest.mark.parametrize(("text", "exact", "code", "start", "end"), FAULTS)
+def test_faults_have_places(text, exact, code, start, end):
+    error = fault(text, exact)
     assert (error.code, error.start, error.end) == (code, start, end)
 
 

@@ -1,4 +1,4 @@
-"""Models from text, what is said to a text in place of a path, and what tab completion lists."""
+"""Models from text, the message for a text in place of a path, and what tab completion lists."""
 
 from __future__ import annotations
 

@@ -138,7 +138,7 @@ def test_no_path_has_more_passages_than_asked_for():
     space = make_space(hsdsl.loads(text).system, [])
     for hops, expected in enumerate((15, 7, 3, 1, 0)):
         found = distance(space, SpacePoint("a", (0, 16)), SpacePoint("a", (0, 1)), hops=hops)
-        assert found.interval.lower == 0  # whatever the cap: four passages lead there
+        assert found.interval.lower == 0  # for any cap: four passages lead there
         assert expected <= found.interval.upper < expected + 1e-9
         assert len(found.path) - 1 == hops
         assert found.status == f"up to {hops} hops" or expected == 0

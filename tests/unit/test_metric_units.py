@@ -221,7 +221,7 @@ class Looks(Budget):
 @pytest.mark.parametrize("looks", [0, 1, 10, 40])
 def test_when_the_time_is_over_little_more_is_solved_and_both_ends_hold(monkeypatch, looks):
     solved = []
-    monkeypatch.setattr(passage_bounds, "solve", lambda *asked: solved.append(1) or solve(*asked))
+    monkeypatch.setattr(passage_bounds, "solve", lambda *given: solved.append(1) or solve(*given))
     for seed in range(4):
         rng = np.random.default_rng(300 + seed)
         scene = random_scene(rng, dimensions=(2,), edges=6)

@@ -1,4 +1,4 @@
-"""What a run is asked from file, --set and options: the later wins, and step and tolerance exclude each other."""
+"""What a run is given by file, --set and options: the later wins, and step and tolerance exclude each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a run was asked beyond its file: recorded in every form of it, and used by distances."""
+"""What a run was given beyond its file: recorded in every form of it, and used by distances."""
 
 from __future__ import annotations
 

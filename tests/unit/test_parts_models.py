@@ -112,8 +112,8 @@ def test_platoon_shifts_gears():
         front, speed = y[0], lead
         for i in range(6):
             x, v = y[1 + 2 * i], y[2 + 2 * i]
-            wanted = (front - x - 10 - v) / 5 + 0.6 * (speed - v)
-            slopes += [v, factor[modes[i]] * (1 + (i + 1) / 20) * wanted]
+            expected = (front - x - 10 - v) / 5 + 0.6 * (speed - v)
+            slopes += [v, factor[modes[i]] * (1 + (i + 1) / 20) * expected]
             front, speed = x, v
         return np.array(slopes)
 

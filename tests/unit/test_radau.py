@@ -39,8 +39,8 @@ def test_coefficients_as_published() -> None:
         [(296 + 169 * root) / 1800, (88 + 7 * root) / 360, (-2 - 3 * root) / 225],
         [(16 - root) / 36, (16 + root) / 36, (MANY.zero + 1) / 9],
     ]
-    for row, wanted in zip(known.a, published, strict=True):
-        assert all(abs(a - w) <= 8 * MANY.unit for a, w in zip(row, wanted, strict=True))
+    for row, expected in zip(known.a, published, strict=True):
+        assert all(abs(a - w) <= 8 * MANY.unit for a, w in zip(row, expected, strict=True))
 
 
 def test_quadrature_of_order_five_and_no_more() -> None:
@@ -72,11 +72,11 @@ def test_one_real_and_one_complex_system() -> None:
             for row in p
         ]
 
-    for found, wanted in (
+    for found, expected in (
         (product(known.a, product(known.mix, middle)), known.mix),
         (product(known.mix, known.unmix), [[zero + (i == j) for j in range(3)] for i in range(3)]),
     ):
-        pairs = [(a, b) for row, line in zip(found, wanted, strict=True) for a, b in zip(row, line, strict=True)]
+        pairs = [(a, b) for row, line in zip(found, expected, strict=True) for a, b in zip(row, line, strict=True)]
         assert max(abs(a - b) for a, b in pairs) <= 256 * MANY.unit
 
 
@@ -105,9 +105,9 @@ def one_step(rate: float, h: float) -> tuple[float, float]:
 def test_stability_function(product: float) -> None:
     """One step multiplies by the (2, 3) Pade approximant of the exponential, which vanishes at infinity."""
     s = mp.mpf(product)
-    wanted = (1 + 2 * s / 5 + s**2 / 20) / (1 - 3 * s / 5 + 3 * s**2 / 20 - s**3 / 60)
+    expected = (1 + 2 * s / 5 + s**2 / 20) / (1 - 3 * s / 5 + 3 * s**2 / 20 - s**3 / 60)
     for h in (1.0, 1e-3):
-        assert abs(one_step(product / h, h)[0] - wanted) <= 1e-15
+        assert abs(one_step(product / h, h)[0] - expected) <= 1e-15
 
 
 def test_what_decays_is_gone_after_one_step() -> None:
@@ -171,8 +171,8 @@ def test_jacobian(flow: str) -> None:
         [(a - b) / (2 * h) for a, b in zip(field(t, *up), field(t, *down), strict=True)]
         for up, down in [((x + h, v), (x - h, v)), ((x, v + h), (x, v - h))]
     ]
-    wanted = [columns[j][i] for i in range(2) for j in range(2)]
-    assert all(abs(a - b) <= 1e-28 for a, b in zip(slopes(t, x, v), wanted, strict=True))
+    expected = [columns[j][i] for i in range(2) for j in range(2)]
+    assert all(abs(a - b) <= 1e-28 for a, b in zip(slopes(t, x, v), expected, strict=True))
 
 
 def test_many_digits() -> None:

@@ -1,4 +1,4 @@
-"""What is said of a run, in text and in JSON."""
+"""Reports of a run, in text and in JSON."""
 
 from __future__ import annotations
 

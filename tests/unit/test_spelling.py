@@ -17,26 +17,26 @@ modes:
 """
 
 
-def said(text: str) -> list[tuple[str, int, str | None]]:
+def printed(text: str) -> list[tuple[str, int, str | None]]:
     with pytest.raises(ModelError) as raised:
         hsdsl.loads(text)
     return [(d.code, d.span.line if d.span else 0, d.hint) for d in raised.value.diagnostics]
 
 
 def test_one_fault_for_one_slip():
-    assert said(MODEL.replace("vel: -c*x", "vle: -c*x") + TAIL) == [("HS111", 5, "did you mean 'vel'?")]
+    assert printed(MODEL.replace("vel: -c*x", "vle: -c*x") + TAIL) == [("HS111", 5, "did you mean 'vel'?")]
 
 
 def test_a_state_that_nothing_uses_is_no_slip():
     hsdsl.loads(MODEL.replace("vel: -c*x", "vel: -c*x, vle: 1") + TAIL.replace("vel: 1", "vel: 1, vle: 0"))
-    found = said(MODEL.replace("vel: -c*x", "vel: -c*x, other: 1") + TAIL)
+    found = printed(MODEL.replace("vel: -c*x", "vel: -c*x, other: 1") + TAIL)
     assert [(code, line) for code, line, _ in found] == [("HS308", 7)]
 
 
 def test_names_of_a_section_called_otherwise_are_no_states():
     model = MODEL.replace("parameters", "constants").replace("vel: -c*x", "vel: -c*x, c1: 1")
-    assert said(model + TAIL.replace("vel: 1", "vel: 1, c2: 0"))[0][0] == "HS201"
-    assert not any("'c1', and the rest" in str(fault) for fault in said(model + TAIL))
+    assert printed(model + TAIL.replace("vel: 1", "vel: 1, c2: 0"))[0][0] == "HS201"
+    assert not any("'c1', and the rest" in str(fault) for fault in printed(model + TAIL))
 
 
 @pytest.mark.parametrize("name", ["final", "let", "domain", "transitions", "flow", "outputs"])
@@ -59,23 +59,23 @@ def test_a_mode_may_have_the_name_of_a_section(name):
 def test_lines_too_far_left_are_told_once(right, left, line, where):
     text = MODEL + TAIL
     assert right in text
-    ((code, place, hint),) = said(text.replace(right, left))
+    ((code, place, hint),) = printed(text.replace(right, left))
     assert (code, place) == ("HS201", line) and hint is not None and hint.endswith(f"{where}")
 
 
 def test_a_mode_and_all_its_sections_too_far_left():
     text = MODEL.replace("    flow", "  flow").replace("    transitions", "  transitions") + TAIL
-    ((code, line, hint),) = said(text)
+    ((code, line, hint),) = printed(text)
     assert (code, line, hint) == ("HS201", 5, "indent these lines, so that they are in the mode 'm'")
 
 
 def test_a_key_misspelt_behind_an_empty_section():
     text = MODEL.replace("{x: vel, vel: -c*x}", "").replace("    transitions", "    transition") + TAIL
-    assert (said(text)[0][0], said(text)[0][2]) == ("HS201", "did you mean 'transitions'?")
+    assert (printed(text)[0][0], printed(text)[0][2]) == ("HS201", "did you mean 'transitions'?")
     text = MODEL.replace("parameters: {c: 1}", "parameters:") + TAIL.replace("initial:", "initail:")
-    assert ("HS201", 7, "did you mean 'initial'?") in said(text)
+    assert ("HS201", 7, "did you mean 'initial'?") in printed(text)
 
 
 def test_a_section_that_is_there_twice_is_not_moved():
-    found = said(MODEL + "  domain: [x >= 0]\n  transitions: []\n" + TAIL)
+    found = printed(MODEL + "  domain: [x >= 0]\n  transitions: []\n" + TAIL)
     assert found[0][1] >= 7 and all(code.startswith("HS2") for code, _, _ in found)

@@ -1,4 +1,4 @@
-"""Streamed runs: the rows that a kept run has, in constant memory, readable whatever happens."""
+"""Streamed runs: the rows that a kept run has, in constant memory, readable at any end."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ def table(path):
 )
 def test_rows_are_those_of_a_kept_run(path, rows, every, tmp_path, monkeypatch):
     monkeypatch.setattr(output_buffers, "LEAST_ROWS", rows)
-    model, asked = (
+    model, given = (
         hsdsl.load(path),
         {"scheme": "relaxed", "method": "rk4", "step": "0.0171", "relaxation": 1e-3, "until": 8},
     )
-    streamed = model.stream(tmp_path / "run.csv", every=every, **asked)
-    kept = model.simulate(**asked)
+    streamed = model.stream(tmp_path / "run.csv", every=every, **given)
+    kept = model.simulate(**given)
     assert (streamed.stop, streamed.transitions, streamed.steps) == (kept.stop, len(kept.transitions), len(kept.times))
     jump_of = [arc.jump for arc in kept.arcs for _ in range(arc.first, arc.last + 1)]
     last = len(jump_of) - 1
@@ -126,9 +126,9 @@ def test_the_command_line_streams(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(sys, "argv", arguments)
     with pytest.raises(SystemExit) as ended:
         main()
-    said = json.loads(capsys.readouterr().out)
-    assert not ended.value.code and said["out"]["rows"] == len(table(out)) - 1 and said["transition_count"] == 2
-    assert said["final"]["time"] == 3 and list(said["final"]["state"]) == ["x", "v"]
+    printed = json.loads(capsys.readouterr().out)
+    assert not ended.value.code and printed["out"]["rows"] == len(table(out)) - 1 and printed["transition_count"] == 2
+    assert printed["final"]["time"] == 3 and list(printed["final"]["state"]) == ["x", "v"]
 
 
 GROWTH = """

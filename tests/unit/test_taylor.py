@@ -48,8 +48,8 @@ def both(taylor: Any, order: int, t: Any, x: Any) -> Any:
     return [line[: order + 1] for line in lines[1 : len(x) + 1]], taylor.surfaces(order, lines)
 
 
-def near(actual: Any, wanted: Any) -> bool:
-    return all(abs(a - w) <= DIGITS * max(1, abs(w)) for a, w in zip(actual, wanted, strict=True))
+def near(actual: Any, expected: Any) -> bool:
+    return all(abs(a - w) <= DIGITS * max(1, abs(w)) for a, w in zip(actual, expected, strict=True))
 
 
 EXACT = {
@@ -67,10 +67,10 @@ EXACT = {
 
 @pytest.mark.parametrize("name", EXACT)
 def test_series_of_known_solutions(name: str, tmp_path: Any) -> None:
-    flow, start, wanted = EXACT[name]
+    flow, start, expected = EXACT[name]
     with mp.workdps(60):
         more = {"parameters": "{p: 3}"} if "p" in flow else {}
-        assert near(series(tmp_path, flow, 20, start, **more), [wanted(k) for k in range(21)])
+        assert near(series(tmp_path, flow, 20, start, **more), [expected(k) for k in range(21)])
 
 
 ARGUMENTS = {"acosh": "2 + x", "atan2": "1 + x, 2 - x**2", "log": "1 + x", "sqrt": "1 + x"}
@@ -95,8 +95,8 @@ def test_surfaces_along_a_straight_flow(text: str, tmp_path: Any) -> None:
     residual = hsdsl.load(tmp_path / "model.yaml").system.modes[0].walls[0].residual
     x, p = (sp.Symbol(name, real=True) for name in "xp")
     with mp.workdps(60):
-        wanted = mp.taylor(sp.lambdify(x, residual.subs(p, 5), "mpmath"), mp.mpf(3) / 10, 8)  # by differences
-        assert near([mp.mpf(c) for c in found], wanted)
+        expected = mp.taylor(sp.lambdify(x, residual.subs(p, 5), "mpmath"), mp.mpf(3) / 10, 8)  # by differences
+        assert near([mp.mpf(c) for c in found], expected)
 
 
 def test_a_whole_power_of_a_series_that_begins_with_zero(tmp_path: Any) -> None:

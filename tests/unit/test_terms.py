@@ -58,9 +58,9 @@ def test_terms_bound_the_round_off_of_a_flow(text: str) -> None:
     for _ in range(50):
         at = draw.uniform(0, 1), draw.uniform(0.5, 2), draw.uniform(0.5, 2)
         value, _ = floats.bind(0, ()).flow(*at)
-        wanted, _ = exact.bind(0, ()).flow(*(exact.arithmetic.zero + v for v in at))
+        expected, _ = exact.bind(0, ()).flow(*(exact.arithmetic.zero + v for v in at))
         bound, _ = terms(*at, *map(abs, at[1:]))
-        assert abs(float(value - wanted)) <= 2 * FLOAT64.unit * bound
+        assert abs(float(value - expected)) <= 2 * FLOAT64.unit * bound
         assert abs(value) <= bound
 
 

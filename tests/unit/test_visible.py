@@ -140,12 +140,12 @@ def test_a_file_name_steers_nothing(name, tmp_path, monkeypatch, capfd):
         monkeypatch.setattr(sys, "argv", ["hsdsl", *words])
         with pytest.raises(SystemExit):
             main()
-        said = capfd.readouterr()
-        for stream in said:
+        printed = capfd.readouterr()
+        for stream in printed:
             assert not HIDDEN.search(stream), words
             assert words[:3] == ["lint", "--format", "github"] or not re.search("^::", stream, re.M), words
-        assert len(said.out.splitlines()) == 1 or words[:3] != ["lint", "--format", "github"]
-        assert said.out or said.err
+        assert len(printed.out.splitlines()) == 1 or words[:3] != ["lint", "--format", "github"]
+        assert printed.out or printed.err
 
 
 def test_what_is_visible_stays(capfd):

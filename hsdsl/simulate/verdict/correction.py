@@ -96,5 +96,5 @@ def _of_power(k: int) -> Array:
     first = [POLE, POLE - k * POLE**2]
     powers = range(POWERS - len(first))
     terms = np.array([[comb(m + i, i) * POLE**i for m in range(POWERS)] for i in powers])
-    wanted = [factorial(k) / factorial(k + i + 1) for i in powers] - terms[:, :2] @ first
-    return np.array([*first, *np.linalg.solve(terms[:, 2:], wanted)])
+    right = [factorial(k) / factorial(k + i + 1) for i in powers] - terms[:, :2] @ first
+    return np.array([*first, *np.linalg.solve(terms[:, 2:], right)])

@@ -262,7 +262,7 @@ static const char *why(const hs_stop *stop) {
          "compile its sources with a larger PROBLEM_VISITED";
 }
 
-/* Whether a run has ended other than in a final mode; it is said why. */
+/* Whether a run has ended other than in a final mode; the reason is reported. */
 static int has_failed(fmu *unit) {
   if (!unit->now.ended || unit->run.task.stop.reason == HS_FINAL) return 0;
   unit->complaint = why(&unit->run.task.stop);

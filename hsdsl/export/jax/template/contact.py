@@ -131,7 +131,7 @@ def let_go(model, config, p, lane, event):
     return lane, event._replace(mask=event.mask & ~ends)
 
 
-def fixed_point(reset, x, wanted):
+def fixed_point(reset, x, needed):
     """The point that repeated resets run to (Aitken's acceleration, by component)."""
 
     def accelerate(_, x):
@@ -141,7 +141,7 @@ def fixed_point(reset, x, wanted):
         further = jnp.where(bend == 0, two, x - (one - x) * (one - x) / jnp.where(bend == 0, 1.0, bend))
         return jnp.where((one == x).all(), x, further)
 
-    found = when(wanted, lambda: lax.fori_loop(0, MOST_ROUNDS, accelerate, frozen(x)), frozen(x))
+    found = when(needed, lambda: lax.fori_loop(0, MOST_ROUNDS, accelerate, frozen(x)), frozen(x))
     return keeping(found, accelerate(0, x))
 
 
@@ -159,17 +159,17 @@ def onto_guard(bound, lane, k, t, x, scales):
     return lax.fori_loop(0, CORRECTIONS, correct, x)
 
 
-def limit_of(model, p, lane, k, end, left, wanted):
+def limit_of(model, p, lane, k, end, left, needed):
     """The point that a tail runs to: kept by resets, moved along the guard to its end, and kept by resets there."""
     bound, whole = Bound(model, frozen(p), lane.segment), Bound(model, p, lane.segment)
     contact = model.of(model.contact, lane.mode)[k]
-    q = fixed_point(lambda x: after_reset(model, whole, lane.mode, k, lane.t, x), lane.x, wanted)
+    q = fixed_point(lambda x: after_reset(model, whole, lane.mode, k, lane.t, x), lane.x, needed)
     still, t = frozen(q), frozen(lane.t)
     moved = still + left * bound.flow(jnp.maximum(contact, 0), t, still)
     moved = onto_guard(bound, lane, k, end, moved, scales_here(model, frozen(lane)))
     q = jnp.where(contact >= 0, keeping(moved, q), q)
     then = keeping(end, lane.t)
-    return fixed_point(lambda x: after_reset(model, whole, lane.mode, k, then, x), q, wanted)
+    return fixed_point(lambda x: after_reset(model, whole, lane.mode, k, then, x), q, needed)
 
 
 def close_tail(model, config, p, lane, record, mask):

@@ -100,10 +100,10 @@ def chosen(mask, ours, theirs):
     return jax.tree.map(lambda a, b: jnp.where(mask, a, b), ours, theirs)
 
 
-def when(wanted, compute, otherwise):
-    """The result of a function where it is wanted; of a batch it is called only if one of it wants that.
+def when(needed, compute, otherwise):
+    """The result of a function where it is needed; of a batch it is called only if one of it needs that.
 
     It has no derivatives.
     """
-    state = wanted, otherwise
+    state = needed, otherwise
     return jax.lax.while_loop(lambda state: state[0], lambda state: (jnp.zeros_like(state[0]), compute()), state)[1]

@@ -29,7 +29,7 @@ def slopes_at(bound, lane, trial, shares):
     return gradients[:, 0] * trial.h + (gradients[:, 1:] * moved).sum(axis=1)
 
 
-def crests(bound, lane, trial, low, high, wanted):
+def crests(bound, lane, trial, low, high, needed):
     """Where surfaces turn that rise at one share and fall at another."""
 
     def close(state):
@@ -39,7 +39,7 @@ def crests(bound, lane, trial, low, high, wanted):
         return jnp.where(rises, middle, low), jnp.where(rises, high, middle), turn + 1
 
     state = low, high, jnp.zeros((), int)
-    return lax.while_loop(lambda s: wanted.any() & (s[2] < JUMP_HALVINGS), close, state)[0]
+    return lax.while_loop(lambda s: needed.any() & (s[2] < JUMP_HALVINGS), close, state)[0]
 
 
 def settled(model, bound, lane, trial, shares):
@@ -75,11 +75,11 @@ def chosen_rows(mask, ours, theirs):
     return jax.tree.map(lambda a, b: jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b), ours, theirs)
 
 
-def first_rises(model, bound, lane, trial, wanted):
+def first_rises(model, bound, lane, trial, needed):
     """The first point of a step where each surface is crossed and its condition holds, if there is one."""
     looked, slopes, level = looked_along(bound, lane, trial)
     values, first = looked.shares.values, looked.first_noise
-    rows = rising(lane, values, slopes, first, level) & wanted
+    rows = rising(lane, values, slopes, first, level) & needed
     numbers, ends = jnp.arange(model.M), jnp.arange(SCAN + 1) / SCAN
     base = jnp.where(lane.active, values[0], 0.0)
 
@@ -119,8 +119,8 @@ def located_crossing(model, config, p, lane):
     mask, mode = lane.phase == CROSS, lane.mode
     still, bound = frozen(lane), Bound(model, frozen(p), lane.segment)
     trial = attempted(model, bound, still, still.trial)
-    wanted = model.of(model.is_edge | model.is_wall, mode) & mask
-    found, points = first_rises(model, bound, still, trial, wanted)
+    needed = model.of(model.is_edge | model.is_wall, mode) & mask
+    found, points = first_rises(model, bound, still, trial, needed)
     here, facts = facts_here_and_at(bound, still, found, *points[1:])
     guards, walls, times = found & model.of(model.is_edge, mode), found & model.of(model.is_wall, mode), points[1]
     wall = jnp.argmin(jnp.where(walls, times, INF))

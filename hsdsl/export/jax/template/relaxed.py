@@ -44,14 +44,14 @@ def crossings(model, config, bound, lane, trial):
 
     def solve(state, numbered):
         """Search the surfaces on one interpolant; those that turn back little are searched on the next."""
-        wanted, share, passed, back = state
+        needed, share, passed, back = state
         number, piece = numbered
-        found = last_up_crossing(lambda s: each_at(bound, mode, t, h, x, piece, s), small, wanted)
-        none = wanted & jnp.isnan(found) & may_pass
-        share = jnp.where(wanted & ~none, jnp.where(jnp.isnan(found), 0.0, found), share)
+        found = last_up_crossing(lambda s: each_at(bound, mode, t, h, x, piece, s), small, needed)
+        none = needed & jnp.isnan(found) & may_pass
+        share = jnp.where(needed & ~none, jnp.where(jnp.isnan(found), 0.0, found), share)
         rates = jnp.diagonal(bound.facts(mode, t + share * h, states_at(x, piece, share)).rates)
-        back = jnp.where(wanted, jnp.where(-rates * h > noise, -rates * h, 0.0), back)
-        again = wanted & ~none & (back > 0) & (back <= config.relaxation * norm)
+        back = jnp.where(needed, jnp.where(-rates * h > noise, -rates * h, 0.0), back)
+        again = needed & ~none & (back > 0) & (back <= config.relaxation * norm)
         return (again, share, passed | (none & (number == 0)), back), again
 
     no, zero = jnp.zeros(model.M, bool), jnp.zeros(model.M)
@@ -79,17 +79,17 @@ def crossings(model, config, bound, lane, trial):
 def holds_next(model, bound, lane, trial, pieces, share, values, found, facts):
     """Whether an `if` holds next, of a surface that the state is on: where a hop ends that round-off hides."""
     returns = model.of(model.loops, lane.mode) & ((share == 0) | lane.active)
-    asked = found & returns & ~jnp.diagonal(facts.conditions)
+    returning = found & returns & ~jnp.diagonal(facts.conditions)
     back = -jnp.diagonal(facts.rates) * trial.h
     hop = share + jnp.where(back > 0, (1 - share) * back / (jnp.where(back > 0, back, 0.0) + values), 0.0)
-    points, scales = states_at(trial.x, pieces, jnp.where(asked, hop, share)), scales_here(model, lane)
+    points, scales = states_at(trial.x, pieces, jnp.where(returning, hop, share)), scales_here(model, lane)
 
     def look():
         times = trial.t + hop * trial.h
         each = jnp.arange(model.M), times, points
         return jax.vmap(lambda k, t, x: is_possible(model, bound, lane.mode, k, t, x, scales))(*each)
 
-    return asked & when(asked.any(), look, asked)
+    return returning & when(returning.any(), look, returning)
 
 
 def relaxed_crossing(model, config, p, lane):

@@ -55,8 +55,8 @@ def choose(model, config, lane, found, facts, times, states):
     return first, edge, tied.sum() > 1
 
 
-def closed(value, low, high, small, wanted):
-    """Close brackets (share, value) with a value <= 0 below and > 0 above, where ``wanted``: shares of the roots.
+def closed(value, low, high, small, needed):
+    """Close brackets (share, value) with a value <= 0 below and > 0 above, where ``needed``: shares of the roots.
 
     By the Illinois variant of regula falsi, until a value is below ``small`` or a bracket a few units wide.
     """
@@ -65,7 +65,7 @@ def closed(value, low, high, small, wanted):
 
     def is_open(state):
         a, b, fa, fb, *_, turn = state
-        return wanted & ~((-fa <= small) | (b - a <= 4 * UNIT) | (fb <= small)) & (turn < 200)
+        return needed & ~((-fa <= small) | (b - a <= 4 * UNIT) | (fb <= small)) & (turn < 200)
 
     def close(state):
         a, b, fa, fb, wa, wb, side, turn = state
@@ -84,7 +84,7 @@ def closed(value, low, high, small, wanted):
     return jnp.where((-fa <= small) | (b - a <= 4 * UNIT) | ~(fb <= small), a, b)
 
 
-def last_up_crossing(value, small, wanted):
+def last_up_crossing(value, small, needed):
     """For each function the last share where it rises through zero, being positive at 1; not-a-number if it never does.
 
     ``value`` takes a share for each function.
@@ -93,6 +93,6 @@ def last_up_crossing(value, small, wanted):
     ends = jax.vmap(lambda s: value(jnp.full(count, s)))(jnp.arange(SCAN + 1) / SCAN)
     below = ends[:-1] <= 0
     last = SCAN - 1 - jnp.argmax(below[::-1], axis=0)
-    rises, column = below.any(axis=0) & wanted, jnp.arange(count)
+    rises, column = below.any(axis=0) & needed, jnp.arange(count)
     low, high = (last / SCAN, ends[last, column]), ((last + 1) / SCAN, ends[last + 1, column])
     return jnp.where(rises, closed(value, low, high, small, rises), jnp.nan)

@@ -1,4 +1,4 @@
-"""States that nothing asked for depends on are not integrated, and what stays runs as if they had not been written."""
+"""States that no output depends on are not integrated, and what stays runs as if they had not been written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hsdsl.elaborate.slicing import only
 
 HEAD = "hsdsl: 1\nmodes: {modes}\n{more}experiment: {{until: 3, tolerance: 1e-7, method: dopri5, scheme: relaxed}}\n"
 BALL = "{up: {flow: {h: v, v: -9.8%s}, transitions: [{when: h <= 0, to: up, reset: {v: -0.8*v%s}}]%s}}"
-# modes, the rest, asked, modes without the rest, the rest, what is left out
+# modes, the rest, outputs of the call, modes without the rest, the rest, what is left out
 CASES = {
     "a state beside": (
         BALL % (", y: 2*y", ", y: y + v", ""), "initial: {mode: up, h: 1, v: 0, y: 1}\n", ["v"],
@@ -70,10 +70,10 @@ def write(folder: Path, name: str, modes: str, more: str) -> Path:
 @pytest.mark.parametrize("times", [1, 2], ids=["first", "seen"])
 def test_what_stays_runs_as_if_it_were_all(name: str, times: int, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "caches"))
-    modes, more, asked, fewer, less, gone = CASES[name]
+    modes, more, given, fewer, less, gone = CASES[name]
     path, small = write(tmp_path, "whole", modes, more), write(tmp_path, "small", fewer, less)
     for _ in range(times):
-        run = hsdsl.load(path).simulate(outputs=asked, engine="python")
+        run = hsdsl.load(path).simulate(outputs=given, engine="python")
     alone = hsdsl.load(small).simulate(engine="python")
     assert np.array_equal(run.times, alone.times) and np.array_equal(run.values, alone.values, equal_nan=True)
     assert np.array_equal(run.outputs, alone.outputs, equal_nan=True)
@@ -103,13 +103,13 @@ def test_overrides_of_what_is_left_out_are_heard_and_without_effect(tmp_path: Pa
 def test_the_command_line_says_so(tmp_path: Path, monkeypatch, capsys) -> None:
     modes, more, *_ = CASES["a state beside"]
     path = write(tmp_path, "m", modes, more)
-    said = {}
+    printed = {}
     for options in ([], ["--json"]):
         monkeypatch.setattr(sys, "argv", ["hsdsl", "run", str(path), "--outputs", "v", "--engine", "python", *options])
         with pytest.raises(SystemExit):
             main()
-        said[bool(options)] = capsys.readouterr().out
-    found = json.loads(said[True])
+        printed[bool(options)] = capsys.readouterr().out
+    found = json.loads(printed[True])
     assert found["left_out"]["states"] == ["y"] and "depends on them" in found["left_out"]["reason"]
     assert set(found["final"]["state"]) == {"h", "v"}
-    assert "left out  y: no requested output" in said[False]
+    assert "left out  y: no requested output" in printed[False]
