@@ -67,7 +67,7 @@ class Fit:
         """Show the values and a picture in notebooks."""
         from hsdsl.plot.notebook import measured_html
 
-        return measured_html(self.summary, self.execution, self.measured.times, self.measured.columns)
+        return measured_html(self.summary, self.execution, self.measured.times, self.measured.columns, self.units)
 
     @property
     def deviations(self) -> dict[str, float]:

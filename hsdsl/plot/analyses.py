@@ -6,7 +6,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
 from textwrap import fill
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -54,11 +53,7 @@ def plot_over_time(times: Array, bounds: dict[str, tuple[Array, Array]], title: 
 
 
 def measured(
-    run: Execution,
-    times: Array,
-    columns: Mapping[str, Array],
-    units: Mapping[str, str] = MappingProxyType({}),
-    values: str = "",
+    run: Execution, times: Array, columns: Mapping[str, Array], units: Mapping[str, str], values: str = ""
 ) -> Figure:
     """Draw measurements and the run fitted to them, a panel for each column; ``values`` are what was fitted."""
     from matplotlib.figure import Figure

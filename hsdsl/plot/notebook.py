@@ -59,12 +59,14 @@ def lines_html(text: str) -> str:
     return f'<div class="hsdsl"><pre>{escape(visible_lines(text))}</pre></div>'
 
 
-def measured_html(text: str, run: Execution, times: Array, columns: Mapping[str, Array]) -> str:
+def measured_html(
+    text: str, run: Execution, times: Array, columns: Mapping[str, Array], units: Mapping[str, str]
+) -> str:
     """Return lines of text, and a picture of measurements and the run fitted to them."""
     with styled():
         from hsdsl.plot.analyses import measured
 
-        return f"{lines_html(text)}\n{_element(measured(run, times, columns), words.heading(run))}"
+        return f"{lines_html(text)}\n{_element(measured(run, times, columns, units), words.heading(run))}"
 
 
 def _range(values: Any) -> str:

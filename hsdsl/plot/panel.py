@@ -11,7 +11,7 @@ import numpy as np
 from hsdsl.names import shown
 from hsdsl.parts import parts_in, short_names
 from hsdsl.plot.curves import SEVERAL, Array, Curves, GuardLine, limits_of, line, merged, modes_of, moving_levels
-from hsdsl.plot.style import ALARM, FAINT, INK, LETTER, Look, fills, looks
+from hsdsl.plot.style import ALARM, FAINT, INK, LETTER, Look, fills, looks, whole_ticks
 from hsdsl.plot.view import View
 
 if TYPE_CHECKING:
@@ -50,6 +50,7 @@ def draw_panel(
     _draw_moving(axis, runs, guards)
     for run, look in zip(runs, looks(len(runs)), strict=True):
         _draw_curve(axis, run, name, look, (start, end, low, high))
+    whole_ticks(axis.yaxis, np.concatenate([run.column(name) for run in runs]))
     if not any(run.has_values(name) for run in runs):
         axis.text(0.5, 0.5, "no value in this run", transform=axis.transAxes, ha="center", va="center", color=FAINT)
     axis.set_ylabel(label(name, view.units), parse_math=False)

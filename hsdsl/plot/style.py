@@ -13,12 +13,15 @@ from pathlib import Path
 from threading import RLock
 from typing import TYPE_CHECKING, Any, BinaryIO, Concatenate, ParamSpec
 
+import numpy as np
+
 from hsdsl.errors import UsageError
 from hsdsl.names import visible_lines
 from hsdsl.plot.curves import SEVERAL
 from hsdsl.store.atomic import replacing
 
 if TYPE_CHECKING:
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure, FigureBase
 
 P = ParamSpec("P")
@@ -51,6 +54,15 @@ RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222", "#e69f00", "#56b4
 DASHES = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)))  # distinct without any colour
 PLAIN, HATCHES = 5, ("////", "\\\\\\\\", "xxxx", "....")  # of the bands of modes: so many without, then these
 _drawing = RLock()  # matplotlib's settings are the whole process's
+
+
+def whole_ticks(axis: Axis, values: Any) -> None:
+    """Let an axis have ticks at whole numbers only, where all values are whole, as counts are."""
+    finite = values[np.isfinite(values)]
+    if len(finite) and not (finite % 1).any():
+        from matplotlib.ticker import MaxNLocator
+
+        axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], integer=True))
 
 
 def save(draw: Callable[[], Figure], *paths: str | os.PathLike[str]) -> None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.plot.style import FAINT, PALETTE, curve, to_file
+from hsdsl.plot.style import FAINT, PALETTE, curve, to_file, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -55,6 +55,7 @@ def plot_curve(x: Axis, of: Quantity, title: str) -> Figure:
     else:
         line = "-" if x.grid is not None and len(x.grid) == len(x.values) else "."
         axes.plot(x.values[order], of.values[order], line, color=curve(PALETTE[5]), linewidth=1.2, markersize=2)
+        whole_ticks(axes.yaxis, of.values)
     axes.set_ylabel(of.label, parse_math=False)
     return _labelled(figure, axes, x, title)
 
@@ -67,6 +68,7 @@ def plot_dots(x: Axis, of: Quantity, where: Any, title: str) -> Figure:
     dots: dict[str, Any] = {"markersize": size, "alpha": alpha, "markeredgewidth": 0, "rasterized": True}
     axes.plot(x.values[where], of.values, "o", color=curve(PALETTE[5]), **dots)
     axes.set_ylabel(of.label, parse_math=False)
+    whole_ticks(axes.yaxis, of.values)
     axes.margins(x=MARGIN)
     return _labelled(figure, axes, x, title)
 
@@ -154,7 +156,9 @@ def edges(values: Any, logarithmic: bool) -> Any:
 
 def _legend(figure: Figure, axes: Axes, drawn: Any, of: Quantity) -> None:
     if not of.words:
-        figure.colorbar(drawn, ax=axes).set_label(of.label, parse_math=False)
+        bar = figure.colorbar(drawn, ax=axes)
+        bar.set_label(of.label, parse_math=False)
+        whole_ticks(bar.ax.yaxis, of.values)
         return
     from matplotlib.patches import Patch
 

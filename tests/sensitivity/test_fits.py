@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -150,6 +151,7 @@ def test_a_measurement_at_a_time_that_no_value_moves_is_not_named() -> None:
     assert repr(fit).startswith("<Fit of ") and f"k {fit.values['k']:.6g}" in repr(fit)
     shown = fit._repr_html_()
     assert "5 measurements" in shown and "<img" in shown
+    assert replace(fit, units={"A": "mg"})._repr_html_() != shown  # the picture has the unit
 
 
 def test_progress(model: Any, samples: dict[str, Any]) -> None:

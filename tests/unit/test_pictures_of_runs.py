@@ -339,3 +339,15 @@ def test_pages_have_guards_that_move(tmp_path):
     times, values = (np.frombuffer(base64.b64decode(plate[key])) for key in ("times", "values"))
     assert (plate["state"], plate["label"], times[0], times[-1]) == ("h", "bounce", 0, 2)
     np.testing.assert_allclose(values, 0.05 * np.sin(5 * times), atol=1e-15)
+
+
+@pytest.mark.parametrize(("first", "whole"), [(1.0, True), (0.5, False)])
+def test_counts_have_whole_ticks(first, whole):
+    count = hsdsl.loads(f"""
+hsdsl: 1
+modes: {{m: {{flow: {{s: 1, n: 0}}, transitions: [{{when: s >= 1, to: m, reset: {{s: 0, n: n + 1}}}}]}}}}
+initial: {{mode: m, s: 0, n: {first}}}
+experiment: {{until: 2.5}}
+""").simulate()
+    (axis,) = picture([count], View(columns=["n"])).axes
+    assert bool((axis.get_yticks() % 1 == 0).all()) is whole
