@@ -208,7 +208,17 @@ def _cycle_finding(dynamics: Dynamics, mode: Mode, edge: EdgePart, answer: Answe
     follow = "follow each other" if len(edges) > 1 else "follows itself"
     message = f"once '{edge.edge.name}' has fired {where}, {names} {follow} at one instant without end"
     hint = "give them different levels" if len(edges) > 1 else "let its reset lead inside the domain"
+    if len(edges) == 1 and _reflects(dynamics, mode, edges[0]):
+        hint = "let it reflect the speed relative to its guard: where that moves at the speed s, v: s - e*(v - s)"
     return Finding(edge.target_span, message, hint, "sampled")
+
+
+def _reflects(dynamics: Dynamics, mode: Mode, edge: Edge) -> bool:
+    """Whether the reset of an edge to its own mode stays where it is on the guard, and changes the rate there."""
+    residual = dynamics.residual(edge.surface)
+    rate = dynamics.rate(mode, residual)
+    known = edge.target == mode.name and rate is not None
+    return known and dynamics.carried(residual, edge) == residual and dynamics.carried(rate, edge) != rate
 
 
 def _followed_at_once(dynamics: Dynamics, mode: Mode, edge: Edge) -> Iterator[Answer]:
