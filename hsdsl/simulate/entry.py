@@ -6,8 +6,6 @@ strip, and so may the next; the walls are looked at when no such transition is l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
@@ -15,7 +13,7 @@ from hsdsl.program import EdgeProgram
 from hsdsl.simulate.run import ModeState, Run, reset
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import ENTERED, endless, entered_final, left_domain
-from hsdsl.simulate.surfaces import NONE, Crossing
+from hsdsl.simulate.surfaces import ANY, Arrival, Crossing
 
 
 def enter(
@@ -26,17 +24,11 @@ def enter(
     x: State,
     scale: State,
     before: ModeState | None = None,
-    since: Number = 0,
-    inside: frozenset[int] = frozenset(),
-    reset_at: Number = None,
-    stood: Mapping[int, Number] = NONE,
+    arrival: Arrival = ANY,
 ) -> ModeState | Stop:
     """Enter a mode and make the transitions that fire at once; return the mode entered last, or why the run stops.
 
-    A surface that the flow passes within the time ``since`` is active: tied transitions share one point. A surface that
-    moved past the state while it waited in a strip, since its reset at ``reset_at``, is active too. Edges in ``inside``
-    were not reached before an input jumped: a state on such a surface counts as beyond it. Those that the state
-    ``stood`` on, off them by numbers, it is still on if it is no further off.
+    Of ``arrival`` the time ``since`` holds for all of them, the rest for the mode entered first.
     """
     visited: set[tuple[int, State]] = set()
     while True:
@@ -49,7 +41,7 @@ def enter(
         try:
             values = here.kernel.surfaces(t, *x)
             finite = all(map(run.arithmetic.isfinite, values))
-            outside = here.surfaces.enter(t, x, values, since, inside, reset_at, stood)
+            outside = here.surfaces.enter(t, x, values, arrival)
         except DOMAIN_ERRORS:
             return standstill(run, here).not_finite([(t, x)])
         if not finite:
@@ -69,7 +61,7 @@ def enter(
         run.record(here, chosen, t, outcome[0], alternatives, entry=True)
         edge = edges[chosen.edge]
         before, mode, states, (x, scale) = here, edge.target, edge.target_states, outcome
-        inside, reset_at, stood = frozenset(), None, NONE
+        arrival = Arrival(arrival.since)
 
 
 def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tuple[Crossing, tuple[str, ...]]:

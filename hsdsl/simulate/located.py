@@ -23,7 +23,7 @@ from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
-from hsdsl.simulate.surfaces import NONE, Crossing, StepFailure, close_bracket
+from hsdsl.simulate.surfaces import NONE, Arrival, Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
 from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts
 
@@ -252,10 +252,10 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     since = run.tie(t) if event.alternatives or same_instant(run, t) else run.arithmetic.zero
     flowed = run.has_flowed(t)
     run.record(here, crossing, resumed, after, event.alternatives)
-    waited = t if resumed > t else None
     stood = still_on(here, event) if edge.target == here.index else NONE
+    arrival = Arrival(since, reset_at=t if resumed > t else None, stood=stood)
     target = edge.target, edge.target_states
-    entered = enter(run, *target, resumed, after, scale, here, since, reset_at=waited, stood=stood)
+    entered = enter(run, *target, resumed, after, scale, here, arrival)
     if isinstance(entered, Stop):
         return entered
     if run.cascade.returns(flowed, entered.index, entered.x):

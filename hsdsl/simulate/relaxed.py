@@ -25,7 +25,7 @@ from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.stall_detection import Patience
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import reached, reached_in_strip
-from hsdsl.simulate.surfaces import Crossing, StepFailure, Trial
+from hsdsl.simulate.surfaces import Arrival, Crossing, StepFailure, Trial
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
 NOT_FINITE, TOO_WRONG, UNSOLVED = StepFailure("not finite"), StepFailure("error"), StepFailure("unsolved")
@@ -175,7 +175,7 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     after, scale = outcome
     flowed = run.has_flowed(t)
     run.record(here, crossing, resumed, after, event.alternatives)
-    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, reset_at=t)
+    entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, Arrival(reset_at=t))
     if isinstance(entered, Stop) or not run.cascade.returns(flowed, entered.index, entered.x):
         return entered
     return slides(edge.name, here.mode, entered.mode, entered.t) if moves_on(here, crossing, entered) else entered
@@ -217,7 +217,7 @@ def go_on(run: Run, here: ModeState) -> ModeState | Stop:
             stood = surfaces.off(t, x, surfaces.active - surfaces.emerging)
         except DOMAIN_ERRORS:
             return standstill(run, here).not_finite([(t, x)])
-        return enter(run, mode, here.mode.states, t, x, surfaces.scale, inside=inside, stood=stood)
+        return enter(run, mode, here.mode.states, t, x, surfaces.scale, arrival=Arrival(inside=inside, stood=stood))
     after = run.place(mode, here.mode.states, t, x, surfaces.scale, active=surfaces.active)
     after.surfaces.emerging.update(surfaces.emerging)
     return after

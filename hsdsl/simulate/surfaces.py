@@ -41,6 +41,25 @@ class Crossing:
 
 
 @dataclass(frozen=True)
+class Arrival:
+    """How a state has come to a mode, which decides what surfaces it is on.
+
+    A surface that the flow passes within the time ``since`` is active: tied transitions share one point. A surface that
+    moved past the state while it waited in a strip, since its reset at ``reset_at``, is active too. Edges in ``inside``
+    were not reached before an input jumped: a state on such a surface counts as beyond it. Those that the state
+    ``stood`` on, off them by numbers, it is still on if it is no further off.
+    """
+
+    since: Number = 0
+    inside: frozenset[int] = frozenset()
+    reset_at: Number = None
+    stood: Mapping[int, Number] = field(default_factory=dict[int, Number])
+
+
+ANY = Arrival()
+
+
+@dataclass(frozen=True)
 class StepFailure:
     """Why a trial step ends outside the relaxed domain."""
 
@@ -146,33 +165,19 @@ class Surfaces:
         scale = self.scale if entry or k in self.active else tuple(self.arithmetic.zero for _ in x)
         return roundoff(unit, magnitude, gradient, t, x, scale)
 
-    def enter(
-        self,
-        t: Number,
-        x: State,
-        values: Vector,
-        since: Number = 0,
-        inside: frozenset[int] = frozenset(),
-        reset_at: Number = None,
-        stood: Mapping[int, Number] = NONE,
-    ) -> list[int]:
-        """Look at the surfaces on entry: return those the state is beyond, and note those it is on.
-
-        A surface that the flow passes within the time ``since`` is active. So is one that the state was not beyond when
-        it was reset, before it waited in a strip. A state on a surface ``inside`` counts as beyond it. It ``stood`` on
-        some surfaces, off them by numbers: no further off them it still does.
-        """
+    def enter(self, t: Number, x: State, values: Vector, arrival: Arrival = ANY) -> list[int]:
+        """Look at the surfaces on entry: return those the state is beyond, and note those it is on."""
         beyond: list[int] = []
-        then = values if reset_at is None else self.kernel.surfaces(reset_at, *x)
+        then = values if arrival.reset_at is None else self.kernel.surfaces(arrival.reset_at, *x)
         for k, r in enumerate(values):
-            noise = max(self.roundoff_bound(k, t, x, entry=True), abs(stood.get(k, self.arithmetic.zero)))
-            if since and abs(r) > noise:
-                noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * since)
+            noise = max(self.roundoff_bound(k, t, x, entry=True), abs(arrival.stood.get(k, self.arithmetic.zero)))
+            if arrival.since and abs(r) > noise:
+                noise = max(noise, abs(self.kernel.rates[k](t, *x)[0]) * arrival.since)
             if r > noise and not then[k] > noise:
                 self.active.add(k)
                 if self.kernel.rates[k](t, *x)[0] < 0:
                     self.emerging.add(k)
-            elif r > noise or (k in inside and r >= -noise):
+            elif r > noise or (k in arrival.inside and r >= -noise):
                 beyond.append(k)
             elif r >= -noise:
                 self.active.add(k)

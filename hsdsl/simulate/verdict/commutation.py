@@ -12,6 +12,7 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.surfaces import Arrival
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
@@ -105,7 +106,7 @@ def settle(run: RunView, place: Place, k: int, since: Number) -> Landed | None:
 def _next(place: Place, since: Number) -> int | None:
     """The edge that goes at once from a state."""
     surfaces, edges = place.surfaces, place.mode.edges
-    beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), since)
+    beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), Arrival(since))
     ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]
     ready = ready or surfaces.standing(place.t, place.x, since)
     return min(ready, key=lambda k: (-edges[k].priority, k), default=None)
