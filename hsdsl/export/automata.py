@@ -11,7 +11,7 @@ from hsdsl.elaborate import elaborate_files
 from hsdsl.export.source import Source
 from hsdsl.expression.plain import names_in
 from hsdsl.expression.syntax import ExpressionError
-from hsdsl.schema import SystemDocument
+from hsdsl.schema import ModelDocument, SystemDocument
 
 Pairs = list[tuple[str, str]]  # names and texts of expressions
 
@@ -124,10 +124,15 @@ def _names(text: str) -> list[str]:
         return []
 
 
-def automata_of(source: Source) -> Automata:
-    """The automata of a source whose system has parts."""
+def document_of(source: Source) -> ModelDocument | SystemDocument:
+    """The file of a source."""
     files = source.model.pipeline.files
     assert files is not None
-    document = elaborate_files(files).document
+    return elaborate_files(files).document
+
+
+def automata_of(source: Source) -> Automata:
+    """The automata of a source whose system has parts."""
+    document = document_of(source)
     assert isinstance(document, SystemDocument)
     return Automata(document)

@@ -50,12 +50,13 @@ def _parsed(text: str, expected: Expected = "number") -> Tree:
 
     def whole(tree: Tree) -> Tree:
         inside = text[tree.start : tree.end]
-        if isinstance(tree, Call) and tree.function in RANGES and len(tree.arguments) == 1 and "." in inside:
+        one = isinstance(tree, Call) and len(tree.arguments) == 1 and tree.function in RANGES
+        if one and ("." in inside or inside.startswith("count")):
             return Name(inside, tree.start, tree.end)
         return mapped(tree, whole)
 
     tree = parse(text, expected)
-    return whole(tree) if "." in text else tree
+    return whole(tree) if "." in text or "count" in text else tree
 
 
 def _scope(tree: Tree, functions: Mapping[str, Function]) -> Scope:

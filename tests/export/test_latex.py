@@ -138,3 +138,40 @@ def test_documents_compile(path: Path | None, tmp_path: Path) -> None:
     done = subprocess.run([compiler, *safe, "model.tex"], cwd=tmp_path, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout[-2000:]
     assert "Overfull" not in done.stdout
+
+
+EVENTS = """
+hsdsl: 1
+parameters: {wait: 2}
+let: {twice: 2*x, half: x/2}
+outputs: {y: twice + 1}
+units: {y: m}
+modes:
+  m:
+    flow: {x: 1, n: 0}
+    outputs: {z: half}
+    transitions:
+      - {name: count, event: x >= 1 and n < 3, delay: wait, persistent: false, reset: {n: n + 1}}
+      - {name: leave, when: x >= 4, to: e}
+  e: {final: true}
+initial: {mode: m, x: 0, n: 0}
+experiment: {until: 5}
+"""
+
+
+def test_events_and_outputs_are_in_the_document() -> None:
+    document = latex(EVENTS)
+    check(document)
+    assert r"\item \textbf{count}, to m where \(x \geq 1 \wedge n < 3\) turns true, after" in document
+    assert r"after \(\mathrm{wait}\), persistent false:" in document
+    assert r"y\ \text{(m)} &= \mathrm{twice} + 1" in document and r"\mathrm{twice} &= 2\,x" in document
+    assert r"z &= \mathrm{half}" in document and "count@" not in document
+    assert document.count(r"\subsection*{Mode ") == document.count(r"\item ") == 2
+
+
+def test_outputs_of_parts_are_in_the_document() -> None:
+    folder = MODELS[0].parent / "parts"
+    document = latex((folder / "balls.yaml").read_text("utf-8"))
+    check(document)
+    model = hsdsl.load(folder / "balls.yaml")
+    assert model.program.outputs and r"\subsection*{Outputs}" in document

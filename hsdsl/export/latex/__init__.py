@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from hsdsl.elaborate.functions import named_functions
 from hsdsl.errors import UsageError
+from hsdsl.export.automata import Pairs, document_of, pairs, texts
 from hsdsl.export.latex.automata import of_parts
 from hsdsl.export.latex.escaping import escaped
 from hsdsl.export.latex.layout import equations, stacked
@@ -14,6 +15,8 @@ from hsdsl.export.source import Source
 from hsdsl.expression.plain import names_in
 from hsdsl.expression.scope import state
 from hsdsl.graphs import closure
+from hsdsl.names import without_memory
+from hsdsl.schema import ModeDocument, ModelDocument, TransitionDocument
 from hsdsl.system import Edge, HybridSystem, Mode
 
 _HEAD = r"""\documentclass[11pt,a4paper]{article}
@@ -36,8 +39,6 @@ def files(source: Source) -> dict[str, bytes]:
 def document(source: Source) -> str:
     """The text of the document."""
     system = source.system
-    if any(edge.of_event for mode in system.modes for edge in mode.edges):
-        raise UsageError("a model with events cannot be written as LaTeX", "write them as modes, with `when`")
     if system.unknowns:
         raise UsageError("a model with `solve` cannot be written as LaTeX", "write its solutions under `let`")
     parameters = {parameter.name: state(parameter.name) for parameter in system.parameters}
@@ -48,10 +49,16 @@ def document(source: Source) -> str:
     lines += _inputs(system, math)
     if system.parts:
         return "\n".join([*lines, *of_parts(source, math), *_settings(source), r"\end{document}", ""])
-    shared = _where(system, None, [text for mode in system.modes for text in _texts(mode)], math)
+    written = document_of(source)
+    assert isinstance(written, ModelDocument)
+    modes = {str(name): mode for name, mode in written.modes.items()}
+    own = [(mode, modes[mode.name]) for mode in system.modes if mode.name in modes]  # others are those of events
+    used = [text for mode, as_written in own for text in _texts(mode, as_written)]
+    shared = _where(system, None, [*used, *texts(written.outputs)], math)
     lines += [r"\subsection*{Definitions}", *shared] if shared else []
-    for mode in system.modes:
-        lines += _mode(system, mode, math)
+    for mode, as_written in own:
+        lines += _mode(system, mode, as_written, math)
+    lines += _outputs(pairs(written.outputs), system, math)
     lines += _run(source, math)
     return "\n".join([*lines, r"\end{document}", ""])
 
@@ -87,21 +94,39 @@ def _unit(unit: str | None) -> str:
     return f" in {escaped(unit)}" if unit else ""
 
 
-def _mode(system: HybridSystem, mode: Mode, math: Mathematics) -> list[str]:
+def _outputs(given: Pairs, system: HybridSystem, math: Mathematics) -> list[str]:
+    names = (f"{math.name(name)}{_unit_after(system, name)}" for name, _ in given)
+    lines = equations([(name, math.expression(text)) for name, (_, text) in zip(names, given, strict=True)])
+    return [r"\subsection*{Outputs}", *lines] if given else []
+
+
+def _unit_after(system: HybridSystem, name: str) -> str:
+    unit = system.units.get(name)
+    return rf"\ \text{{({escaped(unit)})}}" if unit else ""
+
+
+def _mode(system: HybridSystem, mode: Mode, written: ModeDocument, math: Mathematics) -> list[str]:
     end = ", final" if mode.final else ""
     lines = [rf"\subsection*{{Mode {escaped(mode.name)}{end}}}"]
-    if mode.states:
-        lines.append("States " + ", ".join(_state(system, math, name) for name in mode.states) + ".")
-    flow = zip(mode.states, mode.flow_texts, strict=True)
+    states = without_memory(mode.states)
+    if states:
+        lines.append("States " + ", ".join(_state(system, math, name) for name in states) + ".")
+    flow = [(s, text) for s, text in zip(mode.states, mode.flow_texts, strict=True) if s in states]
     lines += equations([(rf"\dot{{{math.name(s)}}}", math.expression(text)) for s, text in flow])
-    own = _where(system, mode.name, _texts(mode), math)
+    own = _where(system, mode.name, [*_texts(mode, written), *texts(written.outputs)], math)
     lines += ["with", *own] if own else []
+    given = [(math.name(name), math.expression(text)) for name, text in pairs(written.outputs)]
+    lines += ["and the outputs", *equations(given)] if given else []
     if mode.walls:
         lines += ["The flow is meant where", *stacked([math.inequality(wall.text) for wall in mode.walls])]
-    if mode.edges:
+    edges = [edge for edge in mode.edges if not edge.of_event]
+    events = [made for made in written.transitions if made.event is not None]
+    if edges or events:
         lines.append(r"\begin{itemize}")
-        for edge in mode.edges:
+        for edge in edges:
             lines += _edge(edge, math)
+        for made in events:
+            lines += _event(mode.name, made, math)
         lines.append(r"\end{itemize}")
     return [*lines, ""]
 
@@ -111,12 +136,17 @@ def _state(system: HybridSystem, math: Mathematics, name: str) -> str:
     return rf"\({math.name(name)}\)" + (f" ({escaped(unit)})" if unit else "")
 
 
-def _texts(mode: Mode) -> list[str]:
+def _texts(mode: Mode, written: ModeDocument) -> list[str]:
     """What is written in a mode."""
-    texts = [*mode.flow_texts, *(wall.text for wall in mode.walls)]
+    found = [*mode.flow_texts, *(wall.text for wall in mode.walls)]
     for edge in mode.edges:
-        texts += [edge.surface.text, edge.condition_text or "0", *edge.reset_texts]
-    return texts
+        if not edge.of_event:
+            found += [edge.surface.text, edge.condition_text or "0", *(text for _, text in _changes(edge))]
+    for made in written.transitions:
+        given = (made.event, made.delay) if made.event is not None else ()
+        found += [scalar.value for scalar in given if scalar is not None]
+        found += texts(made.reset) if given else []
+    return found
 
 
 def _where(system: HybridSystem, mode: str | None, texts: Iterable[str], math: Mathematics) -> list[str]:
@@ -129,13 +159,32 @@ def _where(system: HybridSystem, mode: str | None, texts: Iterable[str], math: M
     return equations([(math.name(d.name), math.expression(d.text)) for d in used])
 
 
+def _changes(edge: Edge) -> Pairs:
+    """What a reset changes, but for what events remember."""
+    known = without_memory(edge.target_states)
+    resets = zip(edge.target_states, edge.reset_texts, strict=True)
+    return [(name, text) for name, text in resets if name in known and text != name]
+
+
 def _edge(edge: Edge, math: Mathematics) -> list[str]:
     when = rf"when \({math.inequality(edge.surface.text)}\) is reached"
     condition = rf" while \({math.condition(edge.condition_text)}\)" if edge.condition_text else ""
-    resets = zip(edge.target_states, edge.reset_texts, strict=True)
-    changed = [(rf"{math.name(name)}^{{+}}", math.expression(text)) for name, text in resets if text != name]
+    changed = [(rf"{math.name(name)}^{{+}}", math.expression(text)) for name, text in _changes(edge)]
     priority = f", with priority {edge.priority}" if edge.priority else ""
     line = rf"\item \textbf{{{escaped(edge.name)}}} to {escaped(edge.target)}, {when}{condition}{priority}"
+    return [line + (":" if changed else "."), *equations(changed)]
+
+
+def _event(mode: str, made: TransitionDocument, math: Mathematics) -> list[str]:
+    """A transition where a condition turns true, with its options as they are written."""
+    assert made.event is not None
+    label = rf"\textbf{{{escaped(made.name.value)}}}, " if made.name else ""
+    target = made.target or mode
+    when = rf"where \({math.condition(made.event.value)}\) turns true"
+    delay = rf", after \({math.expression(made.delay.value)}\)" if made.delay else ""
+    options = "".join(f", {escaped(option)}" for option in made.options if not option.startswith("delay "))
+    changed = [(rf"{math.name(name)}^{{+}}", math.expression(text)) for name, text in pairs(made.reset)]
+    line = rf"\item {label}to {escaped(target)} {when}{delay}{options}"
     return [line + (":" if changed else "."), *equations(changed)]
 
 
@@ -145,7 +194,10 @@ def _run(source: Source, math: Mathematics) -> list[str]:
     given = settings.overrides
     initial = dict(source.system.initial.values)
     values: list[tuple[str, str]] = []
+    known = without_memory(problem.states)
     for name, number in zip(problem.states, problem.x, strict=True):
+        if name not in known:
+            continue
         text = given.get(f"initial.{name}")
         value = initial.get(name, number) if text is None else None
         values.append((rf"{math.name(name)}(0)", math.expression(str(text)) if value is None else math.number(value)))

@@ -20,6 +20,8 @@ def of_parts(source: Source, math: Mathematics) -> Iterator[str]:
     for automaton in found.automata:
         yield from _automaton(automaton, math)
     yield from _instances(found, math)
+    outputs = pairs(found.document.outputs)
+    yield from [r"\subsection*{Outputs}", *_defined(outputs, math)] if outputs else []
 
 
 def _defined(given: Pairs, math: Mathematics) -> list[str]:
@@ -36,6 +38,9 @@ def _automaton(automaton: Automaton, math: Mathematics) -> Iterator[str]:
     shared = pairs(automaton.document.let)
     if shared:
         yield from ["Definitions", *_defined(shared, math)]
+    outputs = pairs(automaton.document.outputs)
+    if outputs:
+        yield from ["Outputs", *_defined(outputs, math)]
     for name, mode in automaton.modes:
         yield from _mode(name, mode, math)
 
