@@ -17,6 +17,7 @@ _HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrog
 _MEMORY = "@"  # in no name of a file
 _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
+INITIAL = "initial."  # before the name of a state: its initial value
 NO_FILE = "<text>"  # the path of a model that is in no file
 WORDS = ("and", "or", "not", "true", "false")
 _SIGNS = {  # signs that Unicode does not take for the ASCII sign they look like, or not for that alone

@@ -9,11 +9,9 @@ are known. `runtime/c/hs_series.h` has the same functions and must add in the sa
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from hsdsl.arithmetic import Number
+from hsdsl.kernel import Series
 
-Series = Sequence[Number]
 INTEGER_POWERS = 64  # of a series that begins with zero: repeated products
 
 

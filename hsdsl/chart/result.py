@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
-import numpy.typing as npt
-
-from hsdsl.execution import Execution
-
-Array = npt.NDArray[Any]
+from hsdsl.execution import Array, Execution
 
 
 class Refused(Exception):

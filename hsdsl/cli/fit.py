@@ -10,12 +10,11 @@ from typing import Annotated, Any
 from typer import Argument, Exit
 
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import Answer, Located, Model, option, overriding
+from hsdsl.cli.options import WRT, Answer, Located, Model, option, overriding
 from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
 SET = "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first value."
-WRT = "Parameters by name and initial states as initial.NAME, with commas between them."
 SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
 WEIGHT = "The weight of a column; left out, one over its largest size. May be repeated."
 Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file: t or time, and states and outputs.")]

@@ -58,6 +58,7 @@ def overriding(help: str) -> Any:
     return option("NAME=VALUE", help, "--set", complete=override_names)
 
 
+WRT = "Parameters by name and initial states as initial.NAME, with commas between them."
 COMPLETES = "Where transitions accumulate: contact follows guards, auto slides on surfaces of two modes, too; or none."
 
 

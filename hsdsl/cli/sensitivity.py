@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from typer import Option
 
 from hsdsl.cli.console import progress, say
-from hsdsl.cli.options import AS_RUN, Answer, Located, Model, Until, option, overriding
+from hsdsl.cli.options import AS_RUN, WRT, Answer, Located, Model, Until, option, overriding
 from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
 if TYPE_CHECKING:
     from hsdsl.orbits.sampling import OrbitalStability
 
-WRT = "Parameters by name and initial states as initial.NAME, with commas between them."
 AT = "Only the derivatives of the end, of transition times, or of states and outputs at the run's samples."
 STABILITY = "Run from nearby as well, and tell whether the execution is orbitally stable, as far as was sampled."
 At = Literal["final", "transitions", "outputs"]

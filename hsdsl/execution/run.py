@@ -10,17 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
 from hsdsl.execution.records import Deferred, same
-from hsdsl.execution.samples import Samples
+from hsdsl.execution.samples import Array, Samples
 from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
 from hsdsl.names import visible, without_memory
 
-Array = npt.NDArray[Any]
 OutputFunction = Callable[[str, Any, tuple[Any, ...]], Sequence[Any]]
 Assessment = Callable[..., Verdict]
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-import numpy.typing as npt
 
 from hsdsl.bernstein import from_powers
+from hsdsl.execution import Array
 from hsdsl.metrics.rounding import UNIT
-
-Array = npt.NDArray[Any]
 
 
 def restrict(coefficients: Array, begin: Array, end: Array) -> Array:

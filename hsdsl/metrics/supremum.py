@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from hsdsl.execution import Array
 from hsdsl.metrics.budget import Budget
 from hsdsl.metrics.merge import Cells, Side
-
-Array = npt.NDArray[Any]
 
 CHUNK = 65_536  # cells whose polynomials are held at once
 FIRST_BATCH, LARGEST_BATCH = 32, 4096

@@ -9,16 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from hsdsl.execution import Execution
+from hsdsl.execution import Array, Execution
 from hsdsl.metrics.bernstein import sizes
 from hsdsl.metrics.rounding import UNIT
-
-Array = npt.NDArray[Any]
 
 
 @dataclass(frozen=True, eq=False)

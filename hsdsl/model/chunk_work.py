@@ -12,7 +12,7 @@ import numpy as np
 
 from hsdsl.errors import UsageError
 from hsdsl.model.ensemble import NothingToRunError
-from hsdsl.model.ensemble_request import INITIAL
+from hsdsl.names import INITIAL
 from hsdsl.sweep.dataset import encoded
 from hsdsl.sweep.manifest import Manifest
 from hsdsl.sweep.rows import library, refused, table

@@ -14,9 +14,8 @@ from hsdsl.execution import Array
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.settings import whole
 from hsdsl.model.values import InstanceTable
+from hsdsl.names import INITIAL
 from hsdsl.program import Program
-
-INITIAL = "initial."
 
 
 @dataclass(frozen=True)

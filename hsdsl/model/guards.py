@@ -9,9 +9,9 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import sympy as sp
 
+from hsdsl.execution import Array
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import FUNCTIONS
 from hsdsl.model.values import Values
@@ -19,7 +19,6 @@ from hsdsl.names import without_memory
 from hsdsl.plot import GuardLine
 from hsdsl.system import TIME
 
-Array = npt.NDArray[Any]
 _OWN: dict[str, Callable[..., Any]] = {  # functions of the language that SymPy's printer for NumPy does not know
     "abs": np.abs,
     "sign": np.sign,

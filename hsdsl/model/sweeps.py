@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -14,10 +14,10 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.limits import cores
 from hsdsl.model.chunk_work import ChunkWork, chunk_size
-from hsdsl.model.ensemble_request import INITIAL
 from hsdsl.model.options import KEYS, as_written, check_arguments, overrides_of
 from hsdsl.model.values import with_parameters
-from hsdsl.names import without_memory
+from hsdsl.model.workers import Progress
+from hsdsl.names import INITIAL, without_memory
 from hsdsl.parts import meant, of_all
 from hsdsl.processes import can_fork
 from hsdsl.sweep import Sweep, recording, variation
@@ -29,8 +29,6 @@ from hsdsl.sweep.schedule import Run, run_here
 
 if TYPE_CHECKING:
     from hsdsl.model import Model
-
-Progress = Callable[[int, int], None]
 
 
 def sweep(

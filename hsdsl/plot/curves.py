@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from hsdsl.execution import Execution, Samples
+from hsdsl.execution import Array, Execution, Samples
 from hsdsl.execution.sampling import evaluate
-
-Array = npt.NDArray[Any]
 
 POINTS = 4000  # that a curve should have at least, where its pieces are not straight
 CELLS = 3000  # of the picture's width and height: two points in one cell look like one

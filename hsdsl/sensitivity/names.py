@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hsdsl.errors import UsageError
+from hsdsl.names import INITIAL
 from hsdsl.parts import meant_alone, numbered
 from hsdsl.program import Program
-
-INITIAL = "initial."
 
 
 @dataclass(frozen=True)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.integrators.stepper import State
+from hsdsl.integrators.stepper import Flow, State
 
 MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
 JUMP_HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
-Flow = Callable[..., State]
 
 
 @dataclass

@@ -12,13 +12,12 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from hsdsl.errors import UsageError
+from hsdsl.execution import Array
 from hsdsl.integrators import METHODS, ButcherTableau
 from hsdsl.model import Model
 
-Array = npt.NDArray[Any]
 STEPS = 400  # on a logarithmic scale, before the interval of the limit is halved
 HALVINGS = 40
 ROUNDING = 1e-12  # of |R|, and of an eigenvalue's real part beside its size

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hsdsl.bernstein import Array
 from hsdsl.execution import Execution, Transition
 
-Array = NDArray[np.float64]
 SAFE = 10  # margins below so many errors are named
 ERROR_UNITS = 64  # of the size of a state: no error is smaller
 

@@ -25,9 +25,9 @@ from functools import cache
 from math import comb, factorial, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hsdsl.bernstein import Array
+
 NODES, POWERS = 4, 6
 POLE = 1 / 5
 INSIDE = (6 - sqrt(6)) / 10  # where a polynomial by Radau IIA is held against the flow: `collocation`

@@ -15,11 +15,9 @@ from functools import reduce
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hsdsl.bernstein import Array
 from hsdsl.enclosures import Range, as_range
-
-Array = NDArray[np.float64]
 
 ORDER = 3
 EXPANSION_ROUNDOFF = 2.0**-48  # of all terms together: more than rounding makes of a coefficient

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.arithmetic import NOTHING
+from hsdsl.bernstein import Array
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.expanded import EXPANDED
@@ -24,7 +25,6 @@ from hsdsl.simulate.verdict.steps import MOST_PARTS, Parts, high, joined, low, s
 
 HALVINGS = 14
 SEEN = 0.5  # of a step: every method has stages on parts of such a width, and shows what is as smooth as they are long
-Array = NDArray[np.float64]
 
 
 def flows(run: RunView) -> tuple[list[Finding], list[str]]:

@@ -24,16 +24,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hsdsl.arithmetic import DOMAIN_ERRORS
+from hsdsl.bernstein import Array
 from hsdsl.execution import Execution
 from hsdsl.integrators import Method
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.verdict.agreement import Errors
 from hsdsl.simulate.verdict.shadow_run import Lost, ShadowRun
 
-Array = NDArray[np.float64]
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
 MOST_CORRECTED = 5  # order of methods whose steps leave out more than corrections of them
 

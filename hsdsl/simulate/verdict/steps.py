@@ -14,13 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.bernstein import around_middle, from_powers, halving
+from hsdsl.bernstein import Array, around_middle, from_powers, halving
 from hsdsl.enclosures import Range, as_range
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.verdict.expansions import Expansion, line, polynomial
 from hsdsl.simulate.verdict.run_view import RunView
 
-Array = NDArray[np.float64]
 MOST_PARTS = 1 << 15  # enclosed together
 COLUMNS = ("row", "start", "width", "time", "length", "bernstein", "error")  # one entry for each part
 CUTTING = 2.0**-48  # of the largest coefficient: what cutting and changing the basis may add
