@@ -541,11 +541,12 @@ class Model:
 
         Raises UsageError: an unknown name, a folder of another sweep, or a cluster that does not answer.
         """
-        from hsdsl.model.sweeps import sweep
+        from hsdsl.model.sweeps import Request, sweep
 
         with in_notebook() as show:
             progress = progress or counted(show, "rows")
-            return sweep(self, vary, out, random, seed, record, outputs, cluster, processes, chunk, progress, arguments)
+            request = Request(vary, random, seed, record, outputs, chunk, arguments)
+            return sweep(self, request, Path(out), cluster, processes, progress)
 
     @cached_property
     def sliding(self) -> Model:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -31,27 +30,28 @@ if TYPE_CHECKING:
     from hsdsl.model import Model
 
 
+@dataclass(frozen=True)
+class Request:
+    """What a sweep is to compute; see `Model.sweep`."""
+
+    vary: Sequence[str] | Mapping[str, Any]
+    random: int | None
+    seed: int
+    record: str | Sequence[str]
+    outputs: Sequence[str] | None
+    chunk: int | None
+    arguments: dict[str, Any]
+
+
 def sweep(
-    model: Model,
-    vary: Sequence[str] | Mapping[str, Any],
-    out: str | os.PathLike[str],
-    random: int | None,
-    seed: int,
-    record: str | Sequence[str],
-    outputs: Sequence[str] | None,
-    cluster: str | None,
-    processes: int | None,
-    chunk: int | None,
-    progress: Progress | None,
-    arguments: dict[str, Any],
+    model: Model, request: Request, folder: Path, cluster: str | None, processes: int | None, progress: Progress | None
 ) -> Sweep:
-    """Run a sweep, or what is missing of it; see `Model.sweep`."""
+    """Run a sweep, or what is missing of it."""
     library("pyarrow.parquet")
-    folder = Path(out)
-    model = model if outputs is None else model.only(outputs)
-    planned = _planned(model, vary, random, seed, record, outputs, chunk, arguments)
+    model = model if request.outputs is None else model.only(request.outputs)
+    planned = _planned(model, request)
     with _place(cluster, processes or cores()) as run:
-        work, missing = _begun(model, planned, folder, chunk, processes or cores(), cluster is None)
+        work, missing = _begun(model, planned, folder, request.chunk, processes or cores(), cluster is None)
         _fill(work, folder, missing, run, progress)
     return Sweep(folder, work.manifest)
 
@@ -90,27 +90,21 @@ def _fill(work: ChunkWork, folder: Path, missing: Sequence[int], run: Run, progr
         run(work, missing, write)
 
 
-def _planned(
-    model: Model,
-    vary: Sequence[str] | Mapping[str, Any],
-    random: int | None,
-    seed: int,
-    record: str | Sequence[str],
-    outputs: Sequence[str] | None,
-    chunk: int | None,
-    arguments: dict[str, Any],
-) -> Manifest:
+def _planned(model: Model, request: Request) -> Manifest:
     """The manifest of a sweep that is still to be measured."""
+    chunk, outputs = request.chunk, request.outputs
     given = {
         name: value
-        for name, value in arguments.items()
+        for name, value in request.arguments.items()
         if value not in (None, {}) and (name, value) != ("engine", "auto")
     }
     check_arguments(given, "a sweep", without=("samples", "precision"))
     fixed: dict[str, Mapping[str, Any]] = {group: given.get(group) or {} for group in ("parameters", "initial")}
     shared = overrides_of(given, "parameters", model.program)
     values = with_parameters(model.pipeline.values(FLOAT64), shared)
-    varied = variation.read(vary, random, seed, lambda value, where: float(values.number(value, where)))
+    varied = variation.read(
+        request.vary, request.random, request.seed, lambda value, where: float(values.number(value, where))
+    )
     _check_names(model, varied.names, fixed)
     if chunk is not None and chunk < 1:
         raise UsageError(f"--chunk: expected at least 1 row, got {chunk}")
@@ -123,7 +117,7 @@ def _planned(
         title=program.title,
         units=program.units,
         variation=varied,
-        recording=recording.read(record),
+        recording=recording.read(request.record),
         arguments={name: _plain(value) for name, value in given.items()},
         states=tuple(name for name in states if name in kept),
         outputs=tuple(name for name in program.outputs if name in kept),
