@@ -17,9 +17,11 @@ from hsdsl.model.call_cache import CallCache, call_key
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.pipeline import Pipeline
 from hsdsl.model.settings import arithmetic_of
-from hsdsl.model.values import Values, initial_layout, start_of_parts, with_parameters
+from hsdsl.model.values import Values, initial_layout, initial_state, start_of_parts, with_parameters
 from hsdsl.model.visible import visible_run
+from hsdsl.names import INITIAL
 from hsdsl.parts import Part, present
+from hsdsl.program import Program
 from hsdsl.sensitivity.names import Target, targets
 from hsdsl.sensitivity.result import Sensitivity, Setting, Slopes
 from hsdsl.sensitivity.state_names import ERROR, SPAN, UNIT
@@ -187,6 +189,28 @@ def with_mode_names(parts: Sequence[Part], initial: Mapping[str, Any]) -> dict[s
     modes = {part.name: part.modes for part in parts if part.name in initial}
     given = {f"{name}.mode": own[int(initial[name]) - 1] for name, own in modes.items()}
     return given | {name: value for name, value in initial.items() if name not in modes}
+
+
+def start_by(
+    wrt: str | Sequence[str] | None, arguments: Mapping[str, Any], values: Values
+) -> tuple[tuple[Target, ...], dict[str, float]]:
+    """What to vary, all initial states unless given, and the number of each in a run, by its label."""
+    program = values.program
+    _, states, x = initial_state(values, overrides_of(arguments, "initial", program))
+    known = dict(zip(program.parameters, values.parameters, strict=True))
+    known |= {f"{INITIAL}{name}": value for name, value in zip(states, x, strict=True)}
+    by = targets([f"{INITIAL}{name}" for name in states] if wrt is None else wrt, program, states)
+    return by, {target.label: float(known[target.label]) for target in by}
+
+
+def varied(
+    arguments: Mapping[str, Any], by: Sequence[Target], numbers: Mapping[str, float], program: Program
+) -> dict[str, Any]:
+    """The arguments of a run with these numbers for what varies, by labels."""
+    groups = {group: overrides_of(arguments, group, program) for group in ("parameters", "initial")}
+    for target in by:
+        groups["initial" if target.initial else "parameters"][target.name] = numbers[target.label]
+    return {**arguments, **groups}
 
 
 def located_arguments(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[str, Any]:

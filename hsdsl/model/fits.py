@@ -14,10 +14,11 @@ from hsdsl.execution import Array
 from hsdsl.fitting.data import Measurements, measurements
 from hsdsl.fitting.fit import Fit
 from hsdsl.fitting.least_squares import Objective, Progress, fitted
+from hsdsl.model.differentiate import start_by, varied
 from hsdsl.model.options import check_arguments, overrides_of
-from hsdsl.model.values import initial_state, with_parameters
+from hsdsl.model.values import with_parameters
 from hsdsl.names import counted, did_you_mean
-from hsdsl.sensitivity.names import Target, targets
+from hsdsl.sensitivity.names import Target
 from hsdsl.sensitivity.result import Sensitivity
 
 if TYPE_CHECKING:
@@ -41,13 +42,9 @@ def fit(
         raise UsageError("expected sigma or weights, got both", "a weight is one over a standard deviation")
     measured = measurements(data, model.columns)
     values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(arguments, "parameters", model.program))
-    _, states, x = initial_state(values, overrides_of(arguments, "initial", model.program))
-    by = targets(wrt, model.program, states)
+    by, start = start_by(wrt, arguments, values)
     if measured.count < len(by):
         raise UsageError(f"{counted(measured.count, 'measurement')} cannot determine {counted(len(by), 'value')}")
-    known = dict(zip(model.program.parameters, values.parameters, strict=True))
-    known |= {f"initial.{name}": value for name, value in zip(states, x, strict=True)}
-    start = {t.label: float(known[t.label]) for t in by}
     bounds = {t.label: _bounds(values, t) for t in by}
     objective = Objective(
         _evaluate(model, by, arguments),
@@ -64,11 +61,7 @@ def _evaluate(model: Model, by: Sequence[Target], arguments: Mapping[str, Any]) 
     labels = [t.label for t in by]
 
     def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:
-        call = dict(arguments) | {"until": until}
-        parameters, initial = (overrides_of(call, group, model.program) for group in ("parameters", "initial"))
-        for target in by:
-            (initial if target.initial else parameters)[target.name] = given[target.label]
-        return model.sensitivity(labels, **call | {"parameters": parameters, "initial": initial})
+        return model.sensitivity(labels, **varied({**arguments, "until": until}, by, given, model.program))
 
     return evaluate
 

@@ -12,14 +12,13 @@ import numpy as np
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
-from hsdsl.model.differentiate import located_arguments
+from hsdsl.model.differentiate import located_arguments, start_by, varied
 from hsdsl.model.distances import distance_of_runs
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.settings import whole
-from hsdsl.model.values import initial_state, with_parameters
+from hsdsl.model.values import with_parameters
 from hsdsl.names import called
 from hsdsl.orbits.sampling import OrbitalStability, directions, sampled
-from hsdsl.sensitivity.names import targets
 
 if TYPE_CHECKING:
     from hsdsl.model.model import Model
@@ -42,10 +41,7 @@ def orbital_stability(
         raise UsageError(f"expected at least two radii that fall, got {', '.join(map(str, radii))}")
     call = located_arguments(model.pipeline, arguments)
     values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters", model.program))
-    _, states, x = initial_state(values, overrides_of(call, "initial", model.program))
-    by = targets(wrt if wrt is not None else [f"initial.{name}" for name in states], model.program, states)
-    known: dict[str, float] = dict(zip(model.program.parameters, map(float, values.parameters), strict=True))
-    known |= {f"initial.{name}": float(value) for name, value in zip(states, x, strict=True)}
+    by, known = start_by(wrt, call, values)
     run = model.simulate(**call)
     scales = np.array([abs(known[t.label]) or _size(run, t.name) for t in by])
     ways = directions(len(by), whole(samples, "samples", 1), seed)
@@ -53,11 +49,8 @@ def orbital_stability(
 
     def look(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
         nonlocal done
-        parameters, initial = (overrides_of(call, group, model.program) for group in ("parameters", "initial"))
-        for target in by:
-            (initial if target.initial else parameters)[target.name] = known[target.label] + shift[target.label]
-        moved: dict[str, Any] = {**call, "parameters": parameters, "initial": initial}
-        other = model.simulate(**moved)
+        moved = {label: number + shift[label] for label, number in known.items()}
+        other = model.simulate(**varied(call, by, moved, model.program))
         found = _distance(run, other, model)
         done += 1
         if progress is not None:
