@@ -91,7 +91,7 @@ def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
 
 def output_scope(symbols: SymbolTable) -> Scope:
     """The names that can be used in an output of the whole model."""
-    inner: Meanings = {name: state(name) for name in symbols.inner_lets}
+    inner: Meanings = symbols.recorded | {name: state(name) for name in symbols.inner_lets}
     return symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "", inner)
 
 

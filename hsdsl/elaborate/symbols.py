@@ -150,10 +150,19 @@ class SymbolTable:
         return frozenset(str(key) for mode in self.document.modes.values() for key in mode.let)
 
     @cached_property
+    def recorded(self) -> Meanings:
+        """Refusals of outputs, which no expression has."""
+        hint = "define it under `let`, and write outputs: {{{0}: {0}}}"
+        message = "'{}' is an output, and expressions have none"
+        own = (name for name in self.all_outputs if name not in self.names)
+        return {name: Refusal("HS117", message.format(name), hint.format(name)) for name in own}
+
+    @cached_property
     def elsewhere(self) -> Meanings:
-        """Refusals of those names for modes that do not define them."""
+        """Refusals of outputs, and of those names for modes that do not define them."""
         hint = "give it to this mode too, or define it once in the `let` of the whole model"
-        return {name: Refusal("HS111", f"'{name}' is a `let` name of other modes", hint) for name in self.inner_lets}
+        inner = {name: Refusal("HS111", f"'{name}' is a `let` name of other modes", hint) for name in self.inner_lets}
+        return self.recorded | inner
 
     def without_states(self, mode: ModeDocument) -> bool:
         """Whether a mode has the states it is entered with, and none of its own."""
