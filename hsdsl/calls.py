@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import wraps
 from types import FunctionType
 from typing import ParamSpec, TypeVar, cast
@@ -14,13 +14,15 @@ P = ParamSpec("P")
 R = TypeVar("R")
 C = TypeVar("C", bound=type)
 TAKES_ANY = 0x08  # a flag of code: `**options`, which it hands on
-NOWHERE: Mapping[str, str] = {}
+Elsewhere = Callable[..., str | None]  # of a method's object and the name: the hint, where there is one
 
 
-def checks_arguments(
-    function: Callable[P, R], name: str = "", elsewhere: Mapping[str, str] = NOWHERE
-) -> Callable[P, R]:
-    """Let a function raise UsageError for an argument that it does not have; ``elsewhere`` has hints for some."""
+def nowhere(*_: object) -> None:
+    """No hint."""
+
+
+def checks_arguments(function: Callable[P, R], name: str = "", elsewhere: Elsewhere = nowhere) -> Callable[P, R]:
+    """Let a function raise UsageError for an argument that it does not have; ``elsewhere`` may have a hint."""
     code = cast(FunctionType, function).__code__
     if code.co_flags & TAKES_ANY:
         return function
@@ -32,14 +34,15 @@ def checks_arguments(
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
         for key in kwargs:
             if key not in own:
-                hint = elsewhere.get(key) or did_you_mean(key, others) or f"its arguments are {', '.join(others)}"
+                hint = (elsewhere(args[0], key) if args else None) or did_you_mean(key, others)
+                hint = hint or f"its arguments are {', '.join(others)}"
                 raise UsageError(f"{name} has no argument '{key}'", hint)
         return function(*args, **kwargs)
 
     return checked
 
 
-def checks_methods(kind: C, elsewhere: Mapping[str, str] = NOWHERE) -> C:
+def checks_methods(kind: C, elsewhere: Elsewhere = nowhere) -> C:
     """Let a class and its methods raise UsageError for arguments that are none of theirs."""
     for key, value in list(vars(kind).items()):
         if isinstance(value, FunctionType) and (key == "__init__" or not key.startswith("_")):

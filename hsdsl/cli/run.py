@@ -33,7 +33,11 @@ DRAW = "Draw it: .png, .svg, or .html, an interactive page; with --outputs only 
 FILM = "Write the model's scene as a film: .gif, or .mp4 where ffmpeg is there. It is of a second, equal run."
 SPEED = "Of the film: time of the run by seconds; else 1 where the film then lasts 4 to 20 s."
 EVERY_ALONE = "--every streams to --out FILE.csv, without --plot, --animate, --estimate or --precision"
-OUT_SUFFIXES, PLOT_SUFFIXES = (".csv", ".parquet", ".npz"), (".png", ".svg", ".html")
+WRITES = {  # the suffixes of the files that options write
+    "--out": (".csv", ".parquet", ".npz"),
+    "--plot": (".png", ".svg", ".html"),
+    "--animate": (".gif", ".mp4"),
+}
 
 
 def run(
@@ -92,11 +96,11 @@ def _leave(stop: Stop, answer: Answer) -> None:
 
 def _check_files(out: Path | None, plot: Path | None, animate: Path | None, outputs: str | None) -> None:
     """Refuse files that could not be written."""
-    check_target(out, "--out", OUT_SUFFIXES)
+    given = {"--out": out, "--plot": plot, "--animate": animate}
+    for name, path in given.items():
+        check_target(path, name, WRITES[name], WRITES)
     if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
         raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
-    check_target(plot, "--plot", PLOT_SUFFIXES)
-    check_target(animate, "--animate", (".gif", ".mp4"))
 
 
 def _load(path: Path, text: bytes, engine: str, precision: int | None, scheme: str | None) -> LoadedModel:

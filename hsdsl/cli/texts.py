@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from hsdsl.errors import UsageError
@@ -64,13 +65,19 @@ def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, s
     return pairs or None
 
 
-def check_target(path: Path | None, option: str, suffixes: Sequence[str]) -> None:
-    """Refuse a file that could not be written before a long run, not after it."""
+def check_target(
+    path: Path | None, option: str, suffixes: Sequence[str], others: Mapping[str, Sequence[str]] = MappingProxyType({})
+) -> None:
+    """Refuse a file that could not be written before a long run, not after it.
+
+    ``others`` has the suffixes of the files that other options of the verb write.
+    """
     if path is None:
         return
     if path.suffix.lower() not in suffixes:
         known = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
-        raise UsageError(f"{option} {path}: the name must end in {known}")
+        meant = next((name for name, own in others.items() if path.suffix.lower() in own), None)
+        raise UsageError(f"{option} {path}: the name must end in {known}", meant and f"{meant} {path} writes that")
     if not path.parent.is_dir():
         raise UsageError(f"{option} {path}: there is no folder {path.parent}")
     if path.suffix.lower() == ".parquet":

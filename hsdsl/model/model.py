@@ -76,7 +76,16 @@ ELSEWHERE = {
 }
 
 
-@partial(checks_methods, elsewhere=ELSEWHERE)
+def _elsewhere(model: Model, name: str) -> str | None:
+    """Where to give what is no argument of a method."""
+    if name in model.program.parameters:
+        return f"it is a parameter: parameters={{'{name}': ...}}"
+    if name in model.program.all_states:
+        return f"it is a state: initial={{'{name}': ...}}"
+    return ELSEWHERE.get(name)
+
+
+@partial(checks_methods, elsewhere=_elsewhere)
 class Model:
     """A checked model. ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` holds both.
 

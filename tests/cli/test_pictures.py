@@ -160,3 +160,8 @@ def test_a_film_is_written(command, model, tmp_path):
     assert answer.code == 0 and (tmp_path / "ball.gif").read_bytes().startswith(b"GIF89a")
     none = command("run", model(BALL.replace("scene:", "# scene:")), *ENGINE, "--animate", tmp_path / "none.gif")
     assert none.code == 2 and "no scene to animate" in none.err and not (tmp_path / "none.gif").exists()
+
+
+def test_a_suffix_of_another_option_is_named(command, model, tmp_path):
+    answer = command("run", model(BALL), "--plot", tmp_path / "ball.gif")
+    assert answer.code == 2 and f"--animate {tmp_path / 'ball.gif'} writes that" in answer.err

@@ -154,7 +154,17 @@ def test_an_argument_that_does_not_exist_is_a_usage_error(name):
         CALLS[name](not_one=1)
 
 
-def test_what_stands_in_the_file_is_no_argument():
+@pytest.mark.parametrize(
+    ("argument", "hint"),
+    [
+        ("inputs", "in the file"),
+        ("e", "parameters={'e': ...}"),
+        ("h", "initial={'h': ...}"),
+        ("tolerence", "'tolerance'"),
+    ],
+)
+def test_the_hint_says_where_it_belongs(argument, hint):
+    model = hsdsl.load(BALL)
     with pytest.raises(UsageError) as raised:
-        hsdsl.load(BALL).simulate(inputs={"u": 1})
-    assert "in the file" in str(raised.value.hint)
+        model.simulate(**{argument: 1})
+    assert hint in str(raised.value.hint)
