@@ -74,7 +74,7 @@ reference:
 
 
 def documents():
-    for samples in ("xm + xs", "[xm + xs, xm - xs]"):
+    for samples in ("xm + xs", "[xm + xs, xm - xs]", "{every: xm + xs}"):
         findings = Findings("whole.yaml")
         text = decode("whole.yaml", WHOLE.replace("SAMPLES", samples).encode())
         yield schema.read(compose(text, findings), findings)
