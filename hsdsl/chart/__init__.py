@@ -27,7 +27,7 @@ from hsdsl.chart.plan import ENGINES, SCHEMES, TOLERANCES, own_runs, peer_runs
 from hsdsl.chart.result import Attempt, Refused, Result
 from hsdsl.chart.rows import Row
 from hsdsl.chart.scene import Scene
-from hsdsl.chart.stopwatch import race
+from hsdsl.chart.stopwatch import Deadline, race
 
 __all__ = ["ENGINES", "PEERS", "SCHEMES", "TOLERANCES", "Judgement", "Refused", "Row", "Scene", "work_precision"]
 
@@ -62,7 +62,7 @@ def work_precision(
         Timed turns; one before them warms everything and is judged.
     patience : float
         Seconds; a run that takes longer is ended, and the same tool at tighter settings is left out. A search for rho
-        may take as long.
+        has half of that time, and is ended after all of it.
     with_rho : bool
         Also compute rho (of our own runs; a peer's samples are no execution).
     watch : callable
@@ -84,7 +84,8 @@ def work_precision(
         judgement = judge(scene, result)
         if with_rho and result.execution is not None:
             watch(f"rho of {attempt.tool.label} {attempt.setting}")
-            judgement = judgement.with_rho(rho(scene, result.execution, patience))
+            with Deadline(patience):  # the search itself looks at the time between its parts only
+                judgement = judgement.with_rho(rho(scene, result.execution, patience / 2))
         return judgement
 
     done = race(attempts, judged, rounds, patience, watch)

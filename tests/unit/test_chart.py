@@ -167,6 +167,14 @@ def test_turns_alternate_and_the_slow_are_ended():
     assert calls.made.count("b1") >= 3
 
 
+def test_a_search_for_rho_is_ended(ball, monkeypatch):
+    monkeypatch.setattr("hsdsl.chart.rho", lambda *_: time.sleep(60))
+    (row,), _ = work_precision(
+        ball, schemes=["located"], methods=["taylor"], engines=["python"], tolerances=[1e-6], patience=0.5, rounds=1
+    )
+    assert (row.judgement.verdict, row.judgement.rho) == ("right", None)
+
+
 def test_ctrl_c_ends_a_race():
     with pytest.raises(KeyboardInterrupt):
         list(race([Calls(interrupted=True).attempt("a", "a1")], lambda *_: None, 1, 10, lambda _: None))
