@@ -59,6 +59,7 @@ class Values:
 
     def _evaluate(self, value: Any, where: str) -> Number:
         arithmetic = self.kernel.arithmetic
+        value = value.tolist() if hasattr(value, "tolist") else value  # those of NumPy
         if isinstance(value, str) and not _NUMBER.fullmatch(value.strip()):
             return self.routine(value, where, len(self.parameters))(*self.parameters)[0]
         if isinstance(value, bool) or value is None:

@@ -50,6 +50,14 @@ def test_recorded_as_written(path, engine):
     assert "with c = 1/3, wall = 0.75, initial.v = 3/2" in summary(run)
 
 
+@pytest.mark.parametrize("value", [np.float32(0.75), np.int8(3), np.array(0.75)])
+def test_numbers_of_numpy_are_numbers(path, value):
+    model, number = hsdsl.load(path), value.tolist()
+    run = model.simulate(until=value, parameters={"c": value}, initial={"v": value})
+    assert run == model.simulate(until=number, parameters={"c": number}, initial={"v": number})
+    assert run.overrides == {"c": number, "initial.v": number, "experiment.until": number}
+
+
 @pytest.mark.parametrize("value", ["0.1", 3, 0.25, mp.mpf("0.3")])
 def test_kept_in_files(path, tmp_path, value):
     run = hsdsl.load(path).simulate(parameters={"c": value}, precision=30 if isinstance(value, mp.mpf) else None)
