@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from hsdsl.cli.console import say
-from hsdsl.cli.options import AllowPath, Limit, Model, answering, option
+from hsdsl.cli.console import print_json, say
+from hsdsl.cli.options import Answer, Model, option
 from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
@@ -18,12 +18,12 @@ NOTHING = (
 
 def complete(
     model: Model,
+    *,
     out: Annotated[Path | None, option("FILE", "Write it there (.yaml) rather than to standard output.")] = None,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Write a model with a mode for each motion along a guard, and for each surface that two modes press on."""
-    with answering(False, allow_path, limit):
+    with answer.reporting():
         from hsdsl.model import load
         from hsdsl.store.atomic import replacing
 
@@ -33,9 +33,12 @@ def complete(
         text = load(model).completed()
         if text is None:
             raise UsageError(NOTHING)
-        if out is None:
+        if out is not None:
+            with replacing(out) as file:
+                file.write(text.encode())
+        if answer.json:
+            print_json({"model": str(model)} | ({"text": text} if out is None else {"files": [str(out)]}))
+        elif out is None:
             print(text, end="")
-            return
-        with replacing(out) as file:
-            file.write(text.encode())
-        say(f"wrote {out}")
+        elif not answer.quiet:
+            say(f"wrote {out}")

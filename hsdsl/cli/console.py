@@ -105,11 +105,15 @@ def print_errors(errors: Sequence[Diagnostic]) -> None:
     say_lines(f"\n{counted(len(errors), 'error')}")
 
 
+def usage_entry(error: UsageError, path: str | None = None) -> dict[str, Any]:
+    """What is wrong with a request, as an error of ``--json``."""
+    return {"code": None, "path": path, "line": None, "column": None, "message": str(error), "hint": error.hint}
+
+
 def report_usage(error: UsageError, json: bool) -> None:
     """Print what is wrong with a request."""
     if json:
-        empty = {"code": None, "path": None, "line": None, "column": None}
-        print_json({"errors": [{**empty, "message": str(error), "hint": error.hint}]})
+        print_json({"errors": [usage_entry(error)]})
     say_lines(f"hsdsl: {visible(str(error))}" + (f"\n  hint: {visible(error.hint)}" if error.hint else ""))
 
 

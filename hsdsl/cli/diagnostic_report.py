@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from typer import Exit
 
 from hsdsl import __version__
-from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, print_errors, print_json, report_usage
+from hsdsl.cli.console import MODEL_ERRORS, WRONG_USAGE, print_errors, print_json, report_usage, usage_entry
 from hsdsl.cli.options import Format
 from hsdsl.diagnose import as_annotation, as_sarif, finding, measured, render
 from hsdsl.errors import Diagnostic, ModelError, UsageError
@@ -33,6 +33,7 @@ class DiagnosticReport:
     notes: bool = True  # whether text shows notes in full
     entries: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])
     errors: list[Diagnostic] = field(default_factory=list[Diagnostic])
+    refused: list[dict[str, Any]] = field(default_factory=list[dict[str, Any]])  # what is no error of a model
     findings: list[Diagnostic] = field(default_factory=list[Diagnostic])
     ignored: list[Ignored] = field(default_factory=list["Ignored"])
     code: int = 0
@@ -54,6 +55,7 @@ class DiagnosticReport:
             except UsageError as error:
                 report_usage(error, json=False)
                 entry["message"] = str(error)
+                self.refused.append({**usage_entry(error, str(path)), "length": None})
                 self.code = WRONG_USAGE
             else:
                 entry |= result
@@ -87,7 +89,8 @@ class DiagnosticReport:
             print(f"{counted(len(hidden), 'note')}{about}: hsdsl lint --notes")
 
     def _json(self) -> None:
-        content: dict[str, Any] = {"models": self.entries, "errors": [measured(error) for error in self.errors]}
+        errors = [*map(measured, self.errors), *self.refused]
+        content: dict[str, Any] = {"models": self.entries, "errors": errors}
         if self.success == "clean":
             content["findings"] = [finding(diagnostic) for diagnostic in self.findings]
             content["ignored"] = [{**finding(i.diagnostic), "reason": i.reason} for i in self.ignored]

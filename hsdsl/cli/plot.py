@@ -8,8 +8,8 @@ from typing import Annotated, Any
 from typer import Argument, Option
 
 from hsdsl.cli.completion import model_files
-from hsdsl.cli.console import say
-from hsdsl.cli.options import AllowPath, Limit, Phases, answering, option
+from hsdsl.cli.console import print_json, say
+from hsdsl.cli.options import Answer, Phases, option
 from hsdsl.cli.saved import drawn
 from hsdsl.cli.texts import check_target, names_of, pairs_of
 from hsdsl.errors import UsageError
@@ -24,17 +24,17 @@ TITLE = "The title; else that of the model."
 
 def plot(
     runs: Annotated[list[Path], Argument(metavar="RUN...", help=RUNS, autocompletion=model_files)],
+    *,
     out: Annotated[Path, option("FILE", OUT)],
     outputs: Annotated[str | None, option("A,B", OUTPUTS)] = None,
     phase: Phases = None,
     labels: Annotated[list[str] | None, Option("--label", metavar="TEXT", help=LABEL)] = None,
     title: Annotated[str | None, option("TEXT", TITLE)] = None,
     model: Annotated[Path | None, option("MODEL", MODEL, complete=model_files)] = None,
-    allow_path: AllowPath = None,
-    limit: Limit = None,
+    answer: Answer,
 ) -> None:
     """Draw runs in one picture."""
-    with answering(False, allow_path, limit):
+    with answer.reporting():
         check_target(out, "--out", (".png", ".svg", ".html"))
         if labels and len(labels) != len(runs):
             raise UsageError(f"--label: expected {len(runs)}, one for each run, got {len(labels)}")
@@ -56,7 +56,10 @@ def plot(
             "title": title,
         }
         plot(executions, out, **options)
-        say(f"wrote {out}")
+        if answer.json:
+            print_json({"files": [str(out)], "runs": options["labels"]})
+        elif not answer.quiet:
+            say(f"wrote {out}")
 
 
 def _loaded(path: Path) -> Any:

@@ -1,10 +1,14 @@
 """``hsdsl schema``: the JSON Schema of model files, for editors."""
 
+from __future__ import annotations
 
-def schema() -> None:
-    """Print the JSON Schema of the language (draft 7)."""
-    import json
+from hsdsl.cli.options import Json
+
+
+def schema(json: Json = False) -> None:
+    """Print the JSON Schema of the language (draft 7), which is one JSON object as it is."""
+    from json import dumps
 
     from hsdsl.schema import json_schema
 
-    print(json.dumps(json_schema(), indent=2))
+    print(dumps(json_schema(), indent=2))

@@ -71,7 +71,8 @@ def test_saved_runs_and_models_share_a_picture(command, model, tmp_path):
     shown, runs = data_of(page)
     assert [run["label"] for run in runs] == ["saved", "model"] and shown["shown"] == ["h"]
     assert shown["units"] == {"h": "m"} and shown["guards"] and "<title>Both</title>" in page.read_text("utf-8")
-    assert command("plot", saved, saved, "--out", tmp_path / "same.svg").code == 0
+    same = command("plot", saved, saved, "--out", tmp_path / "same.svg", "--json")
+    assert same.json == {"files": [str(tmp_path / "same.svg")], "runs": [str(saved)] * 2}
 
 
 WAVES = """

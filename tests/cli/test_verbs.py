@@ -15,6 +15,14 @@ from shipped import MODELS
 import hsdsl
 from hsdsl.cli.verbs import VERBS
 
+SLIDING = """hsdsl: 1
+modes:
+  right: {flow: {x: -1}, transitions: [{when: x <= 0, to: left}]}
+  left: {flow: {x: 2}, transitions: [{when: x >= 0, to: right}]}
+initial: {mode: right, x: 0.7}
+experiment: {until: 3}
+"""
+
 
 def test_all_models_are_valid(command):
     models = sorted(MODELS.glob("*.yaml"))
@@ -32,12 +40,33 @@ def test_validate_names_every_error_of_every_file(command, model):
     assert [error["line"] for error in answer.json["errors"]] == [2, 3]
 
 
-def test_validate_unreadable(command, tmp_path):
-    assert command("validate", tmp_path / "no.yaml").code == 2
+@pytest.mark.parametrize("verb", ["validate", "lint"])
+def test_an_unreadable_file_is_among_the_errors_of_all(command, verb, model, tmp_path):
+    bad = model("hsdsl: 1\nmodes: {a: {flow: {x: y}}}\ninitial: {mode: a, x: 1}\nexperiment: {until: 1}\n")
+    answer = command(verb, tmp_path / "no.yaml", bad, "--json")
+    assert answer.code == 2
+    errors = [(error["code"], error["path"], error["line"]) for error in answer.json["errors"]]
+    assert errors == [("HS111", str(bad), 2), (None, str(tmp_path / "no.yaml"), None)]
+
+
+def test_complete_answers_in_json(command, model, tmp_path):
+    file, out = model(SLIDING), tmp_path / "complete.yaml"
+    printed = command("complete", file)
+    assert command("complete", file, "--json").json == {"model": str(file), "text": printed.out}
+    assert command("complete", file, "--out", out, "--json").json == {"model": str(file), "files": [str(out)]}
+    assert out.read_text() == printed.out != ""
+    quiet = command("complete", file, "--out", out, "-q")
+    assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_can_answer_in_json(command, verb):
+    assert " --json " in command(verb, "--help").out
 
 
 def test_schema_is_the_file(command):
     printed = json.loads(command("schema").out)
+    assert command("schema", "--json").json == printed
     assert printed == json.loads((MODELS.parent / "schemas" / "model.schema.json").read_text())
 
 
