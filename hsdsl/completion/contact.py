@@ -47,7 +47,8 @@ class Contact:
     does; ``kept`` has those of its inequalities that motion along the guard keeps at their limits. ``push`` is the
     derivative of ``last`` along the flow. That is the guard where ``order`` is 1, or else, where the guard's own
     derivative ``rate`` is zero on it, that rate. ``landing`` is the state to which repeated resets lead from a state
-    near the guard. ``counts`` are the states that they count with, which keep their values.
+    near the guard. ``counts`` are the states that they count with, which keep their values. ``along`` is the direction
+    of a reset that takes all of ``last`` back, None of another one.
     """
 
     edge: int
@@ -64,6 +65,7 @@ class Contact:
     near: Nearby
     counts: tuple[int, ...] = ()
     kept: tuple[Relational, ...] = ()
+    along: dict[sp.Symbol, sp.Expr] | None = None
 
     @property
     def last(self) -> sp.Expr:
@@ -108,9 +110,11 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
     kept = tuple(atom for atom in atoms if _is_kept(_falling(atom), near, rows, push, at))
     further, ends = _ends_of_condition(release, edge.condition, [atom for atom in atoms if atom not in kept])
     rate = cancelled(near.along(near.guard))
+    along = _direction(near, near.guard if order == 1 else rate, projection, at)
     return Contact(
-        k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts, kept
-    )
+        k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts, kept,
+        along,
+    )  # fmt: skip
 
 
 def _constrained(near: Nearby):
@@ -135,7 +139,8 @@ def _constrained(near: Nearby):
     rows: dict[int, sp.Expr] = {}
     part, away = product(part, slopes), product(part, moved)
     for i, correction in zip(near.changed, product(part, sp.Matrix(list(map(near.flow, among)))), strict=True):
-        rows[i] = cancelled(near.flow(near.states[i]) - correction / size)
+        flow = near.flow(near.states[i])
+        rows[i] = flow if is_zero(correction, at) else cancelled(flow - correction / size)
     projection: dict[int, dict[sp.Symbol, sp.Expr]] = {}
     for i, shares in zip(near.changed, part.tolist(), strict=True):
         found = {x: cancelled(share / size) for x, share in zip(among, shares, strict=True)}
@@ -144,6 +149,27 @@ def _constrained(near: Nearby):
     for i, correction in zip(near.changed, away, strict=True):
         landing[i] = cancelled(landing[i] - correction / size)
     return rows, projection, tuple(landing), at
+
+
+def _direction(near: Nearby, last: sp.Expr, projection: dict[int, dict[sp.Symbol, sp.Expr]], at: Point):
+    """The direction of a reset that keeps the states where ``last`` is zero: by a state with a constant slope in that.
+
+    It is short where the projection is long, and divides by nothing that parameters may make zero.
+    """
+    slopes = {x: derivative(last, x) for x in near.among(last)}
+    if (x := next((x for x in near.own if x in slopes and slopes[x].is_Number and slopes[x] != 0), None)) is None:
+        return None
+    found = {y: derivative(change, x) for y, change in zip(near.own, near.moved, strict=True)}
+    found = {y: sp.Mul.make_args(u) for y, u in found.items() if not is_zero(u, at)}
+    common = set.intersection(*map(set, found.values()))
+    along = {y: sp.Mul(*(factor for factor in u if factor not in common)) for y, u in found.items()}
+    whole = sp.Add(*(u * slopes[y] for y, u in along.items() if y in slopes))
+    for i, y in zip(near.changed, near.own, strict=True):
+        for z in {**slopes, **projection[i]}:
+            share = along.get(y, sp.S.Zero) * slopes.get(z, sp.S.Zero)
+            if not is_zero(projection[i].get(z, sp.S.Zero) * whole - share, at):
+                return None
+    return along
 
 
 def _push(near: Nearby, at: Point):

@@ -14,6 +14,7 @@ import sympy as sp
 
 from hsdsl.completion.contact import Contact
 from hsdsl.completion.nearby import MOST_NODES, cancelled, size
+from hsdsl.expression.derivatives import derivative
 from hsdsl.system import TIME
 
 MOST_SETS = 64  # of contacts that are connected: further ones of such contacts hold only one at a time
@@ -79,7 +80,10 @@ def coupled_flow(contacts: Sequence[Contact], pairs: dict[int, Pairs]) -> dict[i
 
 
 def _split(found: Contact):
-    """The pairs of a direction and a row whose products add up to a contact's projection."""
+    """The pairs of a direction and a row whose products add up to a contact's projection, but for factors."""
+    if found.along is not None:
+        yield found.along, {x: derivative(found.last, x) for x in found.near.among(found.last)}
+        return
     names = dict(zip(found.near.changed, found.near.own, strict=True))
     left = {names[i]: dict(shares) for i, shares in found.projection.items()}
     while rest := {x: shares for x, shares in left.items() if shares}:

@@ -31,9 +31,17 @@ def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
         return here
     kept = keeping(run, here, sorted(here.surfaces.active))
     holding = pressing(run, here, kept) if kept else []
-    if holding is None:
+    if holding is None or (len(holding) > 1 and not flows(here, in_contact(run, here, holding))):
         return run.diagnostics.coupled(here.mode.edges[kept[0]].name, here.t)
     return in_contact(run, here, holding) if holding else here
+
+
+def flows(here: ModeState, held: ModeState) -> bool:
+    """Whether guards that hold the state together have a flow."""
+    try:
+        return not any(f != f for f in held.kernel.flow(here.t, *here.x))
+    except DOMAIN_ERRORS:
+        return True
 
 
 def keeping(run: Run, here: ModeState, surfaces: Iterable[int]) -> list[int]:
@@ -95,11 +103,11 @@ def lifts_next(run: Run, looked: ModeState, k: int) -> bool:
     """Whether the push on a guard, zero now, is first negative where the flow makes it differ from zero."""
     t, x, after = looked.t, looked.x, run.arithmetic.unit * run.settings.until
     try:
-        slope = looked.kernel.flow(t, *x)
-        while t + after < looked.segment.end:
-            time, later = t + after, tuple(a + after * f for a, f in zip(x, slope, strict=True))
-            r = looked.kernel.surfaces(time, *later)[k]
-            if abs(r) > looked.surfaces.roundoff_bound(k, time, later):
+        while looked.t + after < looked.segment.end:
+            slope, time = looked.kernel.flow(t, *x), looked.t + after
+            t, x = time, tuple(a + (time - t) * f for a, f in zip(x, slope, strict=True))
+            r = looked.kernel.surfaces(t, *x)[k]
+            if abs(r) > looked.surfaces.roundoff_bound(k, t, x):
                 return r > 0
             after = after * FURTHER
     except DOMAIN_ERRORS:

@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import partial, reduce
 from itertools import pairwise
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, NOTHING, Number
 from hsdsl.execution import Stop, Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.simulate.contact import (
@@ -35,6 +35,7 @@ from hsdsl.simulate.run import ModeState, Run
 LEAST_FLIGHTS = 3
 MOST_CORRECTIONS_TO_GUARD = 4  # of a point towards a guard
 MOST_ROUNDS = 60  # of acceleration towards a fixed point
+MOST_LEAP = 16  # times a step
 
 
 def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
@@ -221,16 +222,24 @@ def fixed_point(run: Run, here: ModeState, k: int, t: Number, x: State) -> State
 
 
 def limit(step: Callable[[State], State], x: State) -> State:
-    """The point that repeated steps run to (Aitken's acceleration, by component)."""
+    """The point that repeated steps run to: by Aitken's acceleration of each state, if the step after it is shorter."""
     for _ in range(MOST_ROUNDS):
         one = step(x)
         if one == x:
             break
         two = step(one)
-        x = tuple(map(_accelerated, x, one, two))
+        leap = tuple(map(_accelerated, x, one, two))
+        after = step(leap)
+        x = after if all(map(_shorter, leap, after, one, two)) else two
+        x = tuple(a if abs(a) > NOTHING else a - a for a in x)
     return x
 
 
 def _accelerated(a: Number, b: Number, c: Number) -> Number:
     bend = c - 2 * b + a
-    return a - (b - a) * (b - a) / bend if bend != 0 and abs(c - b) <= abs(b - a) else c
+    slow = bend != 0 and abs(c - b) <= abs(b - a) and abs(c - b) <= MOST_LEAP * abs(bend)
+    return a - (b - a) / bend * (b - a) if slow else c
+
+
+def _shorter(a: Number, b: Number, c: Number, d: Number) -> bool:
+    return abs(b - a) <= abs(d - c)

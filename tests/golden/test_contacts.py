@@ -13,6 +13,8 @@ import pytest
 from engines import assert_engines_agree
 
 import hsdsl
+from hsdsl.completion.nearby import size
+from hsdsl.completion.overlay import overlay
 
 ENGINES = ["python", "c"]
 TOWER = """
@@ -402,3 +404,92 @@ experiment: {until: 4}
     run = hsdsl.loads(text).simulate(engine=engine)
     assert run.stop.reason == "until"
     assert not any(made.entry for made in run.transitions)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_impacts_in_a_wedge_dissipate_all_energy(engine: str) -> None:
+    """The energy has a limit, too, where tails along both walls end at the vertex, and no flow depends on it."""
+    text = """
+hsdsl: 1
+parameters: {a: 0.83, b: 0.47, e: 0.38, f: 0.29, g: 5.4}
+let: {right: w - a*v, left: w + b*v}
+modes:
+  fall:
+    flow: {x: v, y: w, v: 0, w: -g, lost: 0, n: 0}
+    transitions:
+      - when: y <= a*x
+        if: right < 0
+        to: fall
+        reset:
+          v: v + (1 + e)*a*right/(1 + a**2)
+          w: w - (1 + e)*right/(1 + a**2)
+          lost: lost + (1 - e**2)*right**2/(1 + a**2)/2
+          n: n + 1
+      - when: y + b*x <= 0
+        if: left < 0
+        to: fall
+        reset:
+          v: v - (1 + f)*b*left/(1 + b**2)
+          w: w - (1 + f)*left/(1 + b**2)
+          lost: lost + (1 - f**2)*left**2/(1 + b**2)/2
+          n: n + 1
+initial: {mode: fall, x: 0.13, y: 0.9, v: -0.6, w: 0.2, lost: 0, n: 0}
+experiment: {until: 5}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.stop.reason == "until"
+    state = run.final.state
+    assert state["lost"] == pytest.approx(5.4 * 0.9 + (0.6**2 + 0.2**2) / 2, abs=1e-8)
+    assert [state[name] for name in "xyvw"] == pytest.approx([0] * 4, abs=1e-12)
+
+
+def test_bodies_on_springs_between_stops_have_a_flow_in_little_time() -> None:
+    """Rows of flows along several guards stay short, also where impacts add up what they dissipate."""
+    text = """
+hsdsl: 1
+parameters: {m: 1.7, k: 3.1, d: 0.4, e: 0.2, f: 0.35}
+modes:
+  a:
+    flow: {x: u, y: w, u: -k*x/m + 5*sin(2*t)/m, w: 4*cos(t), lost: 0}
+    transitions:
+      - when: y - x <= -d
+        to: a
+        reset: {u: u + (1 + e)*(w - u)/(1 + m), w: w - m*(1 + e)*(w - u)/(1 + m),
+                lost: lost + m*(1 - e**2)*(w - u)**2/(1 + m)/2}
+      - when: y - x >= d
+        to: a
+        reset: {u: u + (1 + e)*(w - u)/(1 + m), w: w - m*(1 + e)*(w - u)/(1 + m),
+                lost: lost + m*(1 - e**2)*(w - u)**2/(1 + m)/2}
+      - {when: x <= -2*d, to: a, reset: {u: -f*u, lost: lost + m*(1 - f**2)*u**2/2}}
+initial: {mode: a, x: 0, y: 0.1, u: 0, w: 0, lost: 0}
+experiment: {until: 1}
+"""
+    system = hsdsl.loads(text).system
+    both = overlay(system.modes[0])
+    assert both is not None and size(both.mode.flow) < 1000
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_guards_without_a_push_let_go_by_what_the_flow_makes_of_them(engine: str) -> None:
+    """Three bodies are pressed to a ceiling; once the lowest leaves, the forces on the middle one only begin to differ.
+
+    The values are those of an event-driven run whose forces are solved as a linear complementarity problem.
+    """
+    text = """
+hsdsl: 1
+parameters: {k: 3.6, e: 0.2}
+modes:
+  a:
+    flow:
+      {x: u, y: v, z: w, u: k*(y - x - 1) + 10.5*sin(2.4*t), v: k*(x + z - 2*y), w: k*(y + 1 - z) + 2.9}
+    transitions:
+      - {when: y - x <= 1/2, to: a, reset: {u: (u + v)/2, v: (u + v)/2}}
+      - {when: z - y <= 1/2, to: a, reset: {v: (v + w)/2 + e*(w - v)/2, w: (v + w)/2 - e*(w - v)/2}}
+      - {when: z >= 3, to: a, reset: {w: -e*w}}
+initial: {mode: a, x: 0, y: 1, z: 2, u: 0, v: 0, w: 0}
+experiment: {until: 3}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.stop.reason == "until"
+    right = [-3.93197457, -1.30619058, 2.64396088, 0.29974392, -4.81019493, -2.07344044]
+    assert [run.final.state[name] for name in "xyzuvw"] == pytest.approx(right, abs=1e-6)

@@ -201,12 +201,16 @@ static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
 
 /* Whether the push on the guard of edge k, which is looked at and zero now, is first negative where the flow makes it
    differ from zero. */
-static int lifts_next(hs_run *run, hs_time t, const hs_real *x, int k) {
-  hs_real r, noise;
-  if (run->here.table->flow(run->here.p, t, x, run->at)) return 0;
-  for (hs_real after = HS_UNIT * run->until; t + after < segment_end(run); after = after * FURTHER) {
-    for (int s = 0; s < run->here.dimension; s++) run->after[s] = x[s] + after * run->at[s];
-    if (surface(run, k, t + after, run->after, &r) || roundoff_bound(run, k, t + after, run->after, 0, &noise)) return 0;
+static int lifts_next(hs_run *run, hs_time from, const hs_real *x, int k) {
+  hs_real r, noise, *const y = run->after;
+  hs_time t = from;
+  copy(y, x, run->here.dimension);
+  for (hs_real after = HS_UNIT * run->until; from + after < segment_end(run); after = after * FURTHER) {
+    const hs_time time = from + after;
+    if (run->here.table->flow(run->here.p, t, y, run->at)) return 0;
+    for (int s = 0; s < run->here.dimension; s++) y[s] = y[s] + (time - t) * run->at[s];
+    t = time;
+    if (surface(run, k, t, y, &r) || roundoff_bound(run, k, t, y, 0, &noise)) return 0;
     if (fabs(r) > noise) return r > 0;
   }
   return 0;
@@ -265,6 +269,16 @@ static void in_contact(hs_run *run, const int *held) {
   count_active(run);
 }
 
+/* Whether the guards of the edges `held`, which hold the state together, have a flow. */
+static int flows(hs_run *run, const int *held) {
+  int is = 1;
+  bind_contacts(run, held, held);
+  if (!run->here.table->flow(run->here.p, run->here.t, run->x, run->at))
+    for (int s = 0; s < run->here.dimension; s++) is &= run->at[s] == run->at[s];
+  bind_mode(run);
+  return is;
+}
+
 /* Be in contact with every guard that holds the state: GOES_ON, or a stop where they have no one motion. */
 static int contact_at(hs_run *run) {
   hs_mode_state *const here = &run->here;
@@ -274,12 +288,13 @@ static int contact_at(hs_run *run) {
   for (int k = 0; k < own->edges; k++) kept[k] = run->active_surfaces[k];
   const int count = keeping(run, here->t, run->x, kept);
   if (!count) return GOES_ON;
-  if (!pressing(run, here->t, run->x, kept, count, held, run->beyond)) {
+  const int one = pressing(run, here->t, run->x, kept, count, held, run->beyond);
+  for (int k = 0; k < own->edges; k++) any += held[k] != 0;
+  if (!one || (any > 1 && !flows(run, held))) {
     for (int k = own->edges; k-- > 0;) first = kept[k] ? k : first;
     note(run, HS_COUPLED, first, 0, here->t, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
   }
-  for (int k = 0; k < own->edges; k++) any |= held[k];
   if (any) in_contact(run, held);
   return GOES_ON;
 }

@@ -6,6 +6,7 @@
 #define LEAST_FLIGHTS 3
 #define MOST_CORRECTIONS_TO_GUARD 4
 #define MOST_ROUNDS 60
+#define MOST_LEAP 16
 
 /* Transition `back` before the last one. */
 static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
@@ -32,19 +33,35 @@ static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) {
 
 static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
   const hs_real bend = c - 2 * b + a;
-  return bend != 0 && fabs(c - b) <= fabs(b - a) ? a - (b - a) * (b - a) / bend : c;
+  const int slow = bend != 0 && fabs(c - b) <= fabs(b - a) && fabs(c - b) <= MOST_LEAP * fabs(bend);
+  return slow ? a - (b - a) / bend * (b - a) : c;
+}
+
+/* Whether each state moves no further from a to b than from c to d. */
+static int shorter(const hs_real *a, const hs_real *b, const hs_real *c, const hs_real *d, int n) {
+  for (int s = 0; s < n; s++)
+    if (!(fabs(b[s] - a[s]) <= fabs(d[s] - c[s]))) return 0;
+  return 1;
+}
+
+/* Let what has no digits left be zero. */
+static void without_nothing(hs_real *x, int n) {
+  for (int s = 0; s < n; s++) x[s] = fabs(x[s]) > HS_NOTHING ? x[s] : x[s] - x[s];
 }
 
 /* The point that repeated resets of edge k run to from run->z, to run->z. */
 static int fixed_point(hs_run *run, int k, hs_time t) {
   const hs_mode_state *here = &run->here;
   const int n = here->dimension;
-  hs_real *const x = run->z, *const one = run->after, *const two = run->at;
+  hs_real *const x = run->z, *const one = run->after, *const two = run->at, *const after = run->near;
   for (int i = 0; i < MOST_ROUNDS; i++) {
     if (reset_but_counts(run, k, t, x, one)) return RAISED;
     if (same_state(one, x, n)) break;
     if (reset_but_counts(run, k, t, one, two)) return RAISED;
     for (int s = 0; s < n; s++) x[s] = accelerated(x[s], one[s], two[s]);
+    if (reset_but_counts(run, k, t, x, after)) return RAISED;
+    copy(x, shorter(x, after, one, two, n) ? after : two, n);
+    without_nothing(x, n);
   }
   return 0;
 }
@@ -80,7 +97,8 @@ static int by_each(hs_run *run, int (*taken)(hs_run *, int, hs_time), hs_time t)
    them keeps. */
 static int in_turn(hs_run *run, int (*taken)(hs_run *, int, hs_time), int count, hs_time t) {
   const int n = run->here.dimension;
-  hs_real *const x = run->z, *const first = run->turn, *const one = run->turn + n;
+  hs_real *const x = run->z, *const first = run->turn, *const one = first + n;
+  hs_real *const two = run->nearby;
   if (count == 1) return by_each(run, taken, t);
   for (int i = 0; i < MOST_ROUNDS; i++) {
     copy(first, x, n);
@@ -88,7 +106,11 @@ static int in_turn(hs_run *run, int (*taken)(hs_run *, int, hs_time), int count,
     if (same_state(first, x, n)) break;
     copy(one, x, n);
     if (by_each(run, taken, t)) return RAISED;
-    for (int s = 0; s < n; s++) x[s] = accelerated(first[s], one[s], x[s]);
+    copy(two, x, n);
+    for (int s = 0; s < n; s++) x[s] = first[s] = accelerated(first[s], one[s], two[s]);
+    if (by_each(run, taken, t)) return RAISED;
+    if (!shorter(first, x, one, two, n)) copy(x, two, n);
+    without_nothing(x, n);
   }
   return 0;
 }
