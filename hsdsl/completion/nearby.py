@@ -238,7 +238,7 @@ def _evaluated(expr: sp.Basic, numbers: Sequence[Number]) -> Number:
             return NUMBERS.constant(Fraction(int(expr.p), int(expr.q)))
         if expr.is_Pow:
             return NUMBERS.functions["pow"](*numbers)
-        made = expr.func(*map(as_float, numbers)) if numbers else expr
+        made = getattr(expr.func, "fold", expr.func)(*map(as_float, numbers)) if numbers else expr
         found = made.evalf(NUMBERS.digits) if isinstance(made, sp.Expr) else made
         if not found.is_Number or not found.is_real:
             return NAN

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
@@ -10,8 +10,8 @@ from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.tableau import ButcherTableau
 from hsdsl.integrators.taylor import NoSeries, terms
-from hsdsl.program import ModeProgram
-from hsdsl.simulate.chatter import jump_between
+from hsdsl.program import HELD, ModeProgram
+from hsdsl.simulate.chatter import Flow, jump_between
 from hsdsl.simulate.input_segments import Segment
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.run import ModeState, Run
@@ -123,16 +123,27 @@ class Standstill:
         return found
 
     def _jump_near(self, slope: State) -> str | None:
-        """Name a component of the flow that jumps a few steps ahead or behind, and the place."""
-        flow = self.problem.kernel.bind(self.index, self.segment.data).flow
+        """Name a component of a flow that jumps a few steps ahead or behind, and the place."""
         for step in (way * self.h * 2**n for n in range(-NEAR, NEAR + 1) for way in (1, -1)):
             t1, z = self.t + step, tuple(a + step * f for a, f in zip(self.x, slope, strict=True))
-            for k, (state, text) in enumerate(zip(self.mode.states, self.mode.flow_texts, strict=True)):
-                if jump := jump_between(flow, k, self.t, self.x, t1, z):
-                    point, before, behind = jump
-                    values = f"from {show(before)} to {show(behind)}"
-                    return f"the flow of {state}, {text}, jumps {values} at {self._state(point)}"
+            for flow, texts in self._flows():
+                for k, (state, text) in enumerate(zip(self.mode.states, texts, strict=True)):
+                    if jump := jump_between(flow, k, self.t, self.x, t1, z):
+                        point, before, behind = jump
+                        values = f"from {show(before)} to {show(behind)}"
+                        return f"the flow of {state}{text} jumps {values} at {self._state(point)}"
         return None
+
+    def _flows(self) -> Iterator[tuple[Flow, Sequence[str]]]:
+        """The mode's flow, and those along each of its guards alone, with what to call their components."""
+        kernel, data, mode = self.problem.kernel, self.segment.data, self.mode
+        yield kernel.bind(self.index, data).flow, [f", {text}," for text in mode.flow_texts]
+        if mode.held is None:
+            return
+        contacts = {edge.contact: edge.name for edge in mode.edges if edge.contact is not None}
+        for i, name in contacts.items():
+            numbers = (self.problem.arithmetic.zero + (HELD if j == i else 0) for j in sorted(contacts))
+            yield kernel.bind(mode.held, (*data, *numbers)).flow, [f" along the guard of {name}"] * len(mode.states)
 
     def _has_no_series(self) -> bool:
         """Whether the method is Taylor's and cannot expand the flow here."""

@@ -493,3 +493,32 @@ experiment: {until: 3}
     assert run.stop.reason == "until"
     right = [-3.93197457, -1.30619058, 2.64396088, 0.29974392, -4.81019493, -2.07344044]
     assert [run.final.state[name] for name in "xyzuvw"] == pytest.approx(right, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "reset",
+    [
+        "sign(u)*max(abs(u) + mu*(1 + e)*v, 0)",
+        "u + max(-abs(u), mu*(1 + e)*v)*sign(u)",
+        "select(abs(u) + mu*(1 + e)*v, u + sign(u)*mu*(1 + e)*v, 0)",
+    ],
+)
+def test_a_body_slides_by_the_friction_of_its_impacts_until_that_jumps(reset: str) -> None:
+    """Impulses take as much of the speed along the floor as friction in the same time."""
+    text = f"""
+hsdsl: 1
+parameters: {{mu: 0.3, e: 0.4}}
+modes:
+  a:
+    flow: {{x: u, y: v, u: 0, v: -7}}
+    transitions: [{{name: floor, when: y <= 0, to: a, reset: {{v: -e*v, u: "{reset}"}}}}]
+initial: {{mode: a, x: 0, y: 0.2, u: -2.5, v: 0}}
+experiment: {{until: 2}}
+"""
+    model = hsdsl.loads(text)
+    run = assert_engines_agree(model, until=1)
+    assert run.stop.reason == "until"
+    assert (run.final.state["u"], run.final.state["v"]) == pytest.approx((0.3 * 7 - 2.5, 0), abs=1e-9)
+    run = assert_engines_agree(model)
+    assert run.stop.reason == "step_underflow" and run.stop.time == pytest.approx(2.5 / (0.3 * 7), abs=1e-3)
+    assert "the flow of u along the guard of floor jumps" in run.stop.message
