@@ -158,10 +158,12 @@ def looks(count: int) -> list[Look]:
 
 
 def colours(modes: Sequence[str]) -> dict[str, str]:
-    """Give each mode a colour; after seven modes they begin again, darker."""
+    """Give each mode a colour; after seven modes they begin again, darker and lighter in turn, and never near black."""
     chosen: dict[str, str] = {}
     for i, mode in enumerate(mode for mode in modes if mode != SEVERAL):
-        chosen[mode] = _mixed(PALETTE[i % len(PALETTE)], 0.55 ** (i // len(PALETTE)), "#000000")
+        time = i // len(PALETTE)
+        share = 0.4 + 0.4 / ((time + 1) // 2 + 1) if time else 1.0
+        chosen[mode] = _mixed(PALETTE[i % len(PALETTE)], share, "#000000" if time % 2 else "#ffffff")
     return chosen | {mode: "#7a7a7a" for mode in modes if mode == SEVERAL}
 
 

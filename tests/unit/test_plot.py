@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 import hand_made
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 
 import hsdsl
 from hsdsl import decimals
@@ -393,3 +394,9 @@ experiment: {until: 4}
     (rows,) = [row for row in names if row[0] == "lamp[1]"]
     assert rows == ["lamp[1]", "lamp[2]", "lamp[3]", "lamp[4]"]
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["off", "lit"]
+
+
+def test_colours_of_many_modes_differ_and_are_no_black():
+    chosen = [np.array(to_rgb(colour)) for colour in colours([f"m{k}" for k in range(60)]).values()]
+    assert len({tuple(colour) for colour in chosen}) == 60
+    assert min(colour.max() for colour in chosen) > 0.25
