@@ -16,6 +16,7 @@ from hsdsl.cli.verbs import VERBS, command
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
 ROOM = str(ROOT / "models" / "thermostat.yaml")
+BALL = str(ROOT / "models" / "bouncing-ball.yaml")
 SPACEEX = str(ROOT / "tests" / "import" / "heater.xml")
 CALLS = [
     ["run", ROOM, "--estimate"],
@@ -31,6 +32,9 @@ CALLS = [
     ["fit", ROOM, "data.csv", "--wrt", "rate"],
     ["chart", ROOM, "--methods", "rk4", "--engines", "python", "--schemes", "located", "--steps", "0.1"],
     ["stability", ROOM, "--map", "rate=0.1:0.2:2,tolerance=1e-6:1e-5:2", "--processes", "1", "--no-rho"],
+    ["plot", ROOM, "--out", "room.svg"],
+    ["complete", BALL, "--out", "complete.yaml"],
+    ["complete", BALL],
     ["export", ROOM, "--to", "mermaid", "--out", "graph"],
     ["export", ROOM, "--to", "mermaid"],
     ["import", SPACEEX, "--out", "heater.yaml"],
@@ -69,7 +73,7 @@ def known(field: str, table: dict[str, str]) -> bool:
 
 def test_every_verb_with_json_is_called():
     verbs = {name for name in VERBS if any("--json" in parameter.opts for parameter in command(name).params)}
-    assert verbs == {call[0] for call in CALLS}
+    assert verbs - {"schema"} == {call[0] for call in CALLS}  # its fields are those of JSON Schema
 
 
 @pytest.mark.parametrize("call", CALLS, ids=lambda call: " ".join(Path(word).name for word in call[:3]))
