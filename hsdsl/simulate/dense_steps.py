@@ -134,6 +134,8 @@ class TableSteps:
                 if not self._ratio <= 1:
                     return TOO_WRONG
             piece = method.piece(flow, t, h, x, z, stages, slope, end)
+            if not all(self.run.arithmetic.isfinite(c) for power in piece for c in power):
+                return NOT_FINITE  # it may overflow where its end does not
             curves = curves_along(self.run, self.here, t, h, x, z, piece)
             ends = self.here.kernel.surfaces(t1, *z)
             if method.landing is not None and control.tolerance is not None and method.error is not None:

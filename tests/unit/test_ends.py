@@ -122,3 +122,10 @@ def test_a_run_too_long_for_its_steps_says_so(engine):
 def test_a_flow_without_a_value_along_a_guard_is_named(engine):
     stop = hsdsl.loads(HELD).simulate(engine=engine).stop
     assert stop.message.startswith("the flow of s, sqrt(1 - w), has no finite value at t = 1 ")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_steps_whose_interpolant_overflows_are_not_made(engine):
+    model = hsdsl.load(Path(__file__).parents[2] / "models" / "stiff-switch.yaml")
+    run = model.simulate(method="dop853", tolerance=1e-4, max_transitions=100, engine=engine)
+    assert run.stop.reason == "transition_limit"  # a wrong run, of an explicit method, but one that ends

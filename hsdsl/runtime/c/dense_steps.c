@@ -114,7 +114,10 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time
     span->largest[s] = fabs(run->k[0][s]);
     for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->k[i][s]));
   }
-  if (method_piece(run, span->t, h, &span->piece) || curves_along(run)) return HS_NOT_FINITE;
+  if (method_piece(run, span->t, h, &span->piece)) return HS_NOT_FINITE;
+  for (int m = 0; m < span->piece.degree; m++) /* it may overflow where its end does not */
+    if (!all_finite(span->piece.c + m * run->width, n)) return HS_NOT_FINITE;
+  if (curves_along(run)) return HS_NOT_FINITE;
   if (mode->values(p, t1, run->z, run->ends)) return HS_NOT_FINITE;
   const int blurred = run->control.implicit && run->control.tolerance > 0;
   return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
