@@ -149,6 +149,10 @@ class _Table:
             message = f"expected the columns `time` and `{name}`, got {present}"
             self.fault(1, 1, len(header) if self.lines else 1, message, _hint(name, columns, file))
             return
+        twice = next((column for column in ("time", name) if columns.count(column) > 1), None)
+        if twice is not None:
+            self.fault(1, 1, len(header), f"expected a column once, got '{shown(twice)}' twice")
+            return
         for number, line in enumerate(self.lines[1:], start=2):
             if line.strip() and len(self.faults) < _MOST_FAULTS:
                 self.row(number, line, len(columns), columns.index("time"), columns.index(name))

@@ -344,6 +344,8 @@ def test_ways_to_write_a_file(before, line_end, end):
         ("time\tu", "separated by commas"),
         ("t,u", "called `time`"),
         ("time,v", "column: ..."),
+        ("time,u,u", "got 'u' twice"),
+        ("time,u, time", "got 'time' twice"),
     ],
 )
 def test_a_header_of_samples_is_told_what_it_should_be(tmp_path, header, hint):
