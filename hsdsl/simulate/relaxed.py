@@ -99,7 +99,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
             control.accept(h, ratio)
         if found or end is None:
             crossing, alternatives = choose(here, found, run)
-            return Event(crossing, alternatives, t1, sizes(x, z if crossing.theta > 0 else x, here))
+            return Event(crossing, alternatives, t1, sizes(x, z if crossing.theta > 0 else x, here, crossing.edge))
         if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, failure, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
         if estimate and chatter.across(here.kernel.flow, t, x, slope, t1, z, end):
@@ -234,15 +234,16 @@ def stuck(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Even
     shrunk = failure.kind in ("wall", "deep", "flat", "inward", "not finite", "unsolved")
     if shrunk and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
-        return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here))
+        return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here, chosen.edge))
     return standstill(run, here).stuck(failure, slope)
 
 
-def sizes(x: State, z: State, here: ModeState) -> State:
+def sizes(x: State, z: State, here: ModeState, k: int | None = None) -> State:
     """Return the sizes of the numbers that a point between x and z is computed from.
 
-    A state that has not moved since the mode was entered still carries the sizes that it came in with.
+    A state that has not moved since the mode was entered still carries the sizes that it came in with. So does one on
+    the guard of edge k that it has not left: it is off that by the round-off of these.
     """
-    entered = zip(here.arc.values[0], here.surfaces.scale, strict=True)
-    still = [s if b == first else abs(b) for b, (first, s) in zip(z, entered, strict=True)]
+    entered, stays = zip(here.arc.values[0], here.surfaces.scale, strict=True), k in here.surfaces.active
+    still = [s if stays or b == first else abs(b) for b, (first, s) in zip(z, entered, strict=True)]
     return tuple(max(abs(a), abs(b), s) for a, b, s in zip(x, z, still, strict=True))

@@ -109,6 +109,7 @@ class ModelText:
         yield "edge_names", cell(strings(edge.name for edge in mode.edges) for mode in modes)
         yield "edge_target", cell(vector(1 + edge.target for edge in mode.edges) for mode in modes)
         yield "edge_priority", cell(vector(edge.priority for edge in mode.edges) for mode in modes)
+        yield "edge_changes", cell(cell(vector(1 + i for i in edge.changes) for edge in mode.edges) for mode in modes)
         yield "edge_counts", cell(cell(vector(1 + i for i in edge.counts) for edge in mode.edges) for mode in modes)
         yield "edge_conditional", cell(f"{vector(int(e.conditional) for e in mode.edges)} == 1" for mode in modes)
 

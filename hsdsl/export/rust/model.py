@@ -26,7 +26,13 @@ def model_text(source: Source, table: ButcherTableau) -> str:
     """The text of ``model.rs``."""
     program = source.problem.program
     heading = "".join(f"// {line}\n" for line in source.heading)
-    parts = [heading + _HEAD, _sizes(program, table), *_functions(program), _modes(program), _method(table)]
+    parts = [
+        heading + _HEAD,
+        _sizes(program, table),
+        *_functions(program, source.problem.mode),
+        _modes(program),
+        _method(table),
+    ]
     return "\n".join([*parts, _segments(source), _values(source), _settings(source)])
 
 
@@ -38,6 +44,7 @@ def _sizes(program: Program, table: ButcherTableau) -> str:
         "E": (max(len(mode.edges) for mode in program.modes), "edges of the mode with most"),
         "P": (len(program.parameters), "parameters"),
         "D": (3 * len(program.inputs) + len(program.switches), "numbers of a segment of inputs"),
+        "CONTACTS": (program.contact_count, "motions along guards"),
         "STATES": (len(program.all_states), "states of all modes"),
         "OUTPUTS": (len(program.outputs), "outputs"),
         "STAGES": (found.stages + 1 + found.extra, "stages of a step"),
@@ -46,11 +53,21 @@ def _sizes(program: Program, table: ButcherTableau) -> str:
     return "".join(f"/// {why}\npub const {name}: usize = {size};\n" for name, (size, why) in sizes.items())
 
 
-def _functions(program: Program) -> Iterable[str]:
+def _functions(program: Program, start: int) -> Iterable[str]:
     data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
     for j, mode in enumerate(program.modes):
         for name, definition in mode_definitions(mode, terms=True).items():
             yield function(f"mode_{j}_{name}", definition, data)
+        if mode.held is not None:
+            yield function(f"mode_{j}_held", mode_definitions(program.flows[mode.held])["flow"], data)
+    held = program.modes[start].held is not None
+    jacobian = program.modes[start].jacobian
+    if held:
+        yield function("start_jacobian", definitions(jacobian.routines)["jacobian"], data)
+    places = array(map(str, jacobian.places if held else ()))
+    yield "/// The derivatives of the flow of the initial mode, if it has motion along guards, and their places.\n"
+    yield f"pub static JACOBIAN: Option<Routine> = {'Some(start_jacobian)' if held else 'None'};\n"
+    yield f"pub static JACOBIAN_PLACES: &[usize] = &{places};\n"
 
 
 def _modes(program: Program) -> str:
@@ -68,23 +85,27 @@ def _mode(j: int, mode: ModeProgram, states: tuple[str, ...]) -> str:
     gradients, rates = (array(f"mode_{j}_{kind}_{k}" for k in surfaces) for kind in ("gradient", "rate"))
     places = array(str(states.index(name)) for name in mode.states)
     terms = f"Some(mode_{j}_terms)" if mode.terms else "None"
+    held = "None" if mode.held is None else f"Some(mode_{j}_held)"
     return (
         f"    Mode {{\n        name: {string(mode.name)},\n        dimension: {len(mode.states)},\n"
         f"        edges: &[{edges}],\n        surfaces: {len(surfaces)},\n        is_final: {_truth(mode.final)},\n"
         f"        flow: {flow},\n        values: {values},\n        magnitudes: {magnitudes},\n"
         f"        outputs: {outputs},\n        gradients: &{gradients},\n        rates: &{rates},\n"
-        f"        terms: {terms},\n        states: &{places},\n    }},\n"
+        f"        terms: {terms},\n        held: {held},\n        states: &{places},\n    }},\n"
     )
 
 
 def _edge(j: int, k: int, mode: ModeProgram) -> str:
     edge = mode.edges[k]
     parts = array(f"mode_{j}_{name}" for name in mode.routines.names if name.startswith(f"condition_{k}_"))
+    changes = array(map(str, edge.changes))
+    contact = "None" if edge.contact is None else f"Some({edge.contact})"
     return (
         f"Edge {{\n            name: {string(edge.name)},\n            target: {edge.target},\n"
         f"            dimension: {len(edge.target_states)},\n            conditional: {_truth(edge.conditional)},\n"
         f"            priority: {edge.priority},\n            condition: &{parts},\n"
-        f"            reset: mode_{j}_reset_{k},\n            spread: mode_{j}_spread_{k},\n        }}, "
+        f"            reset: mode_{j}_reset_{k},\n            spread: mode_{j}_spread_{k},\n"
+        f"            changes: &{changes}, contact: {contact},\n        }}, "
     )
 
 

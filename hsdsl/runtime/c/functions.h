@@ -182,7 +182,7 @@ static int slides(hs_run *run, int mode, int k);
 HS_INLINE int chatters(hs_run *run, const int n, hs_time t1);
 
 /* relaxed.c */
-static void sizes(hs_run *run, const hs_real *x, const hs_real *z);
+static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int k);
 static int standing_on(hs_run *run);
 static int interrupted(hs_run *run);
 static int in_strip(hs_run *run, hs_reason reason, hs_time t);

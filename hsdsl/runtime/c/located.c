@@ -97,7 +97,7 @@ static int largest(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
   const int stood = stands(run, crossing);
   if (stood == RAISED) return RAISED;
-  sizes(run, run->x, crossing->state);
+  sizes(run, run->x, crossing->state, -1);
   for (int s = 0; s < run->here.table->own; s++) {
     hs_real *const found = &run->landed[s];
     *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
@@ -207,7 +207,7 @@ static int located_stuck(hs_run *run, hs_step_failure kind) {
   const int count = kind == HS_NOT_FINITE || kind == HS_UNSOLVED ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
-    sizes(run, run->x, run->x);
+    sizes(run, run->x, run->x, -1);
     return LANDED;
   }
   if (run->here.table->flow(run->here.p, run->here.t, run->x, run->task->stop.slope))
@@ -402,7 +402,7 @@ static int located_at_boundary(hs_run *run) {
   const int count = contact_at(run) == GOES_ON ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
-    sizes(run, run->x, run->x);
+    sizes(run, run->x, run->x, -1);
   }
   if (run->here.table != own) after_contact(run);
   return count ? jump(run) : (int)stopped(run, HS_UNTIL, t);

@@ -108,9 +108,9 @@ def relaxed_crossing(model, config, p, lane):
         lane = lane._replace(h=jnp.where(goes & (lane.halvings == 0), grown(config, lane, trial, ratio), lane.h))
     verdict = Verdict(jnp.asarray(False), failed, kind, blocked, jnp.asarray(False), ratio)
 
-    def sizes(first, state):  # those of the entry count for what has not moved since
+    def sizes(first, state):  # those of the entry count for what has not moved since, and on a guard not left
         between = sizes_of(still, trial.x, trial.z)
-        return jnp.where(state == still.entered_x, jnp.maximum(between, still.scale), between)
+        return jnp.where((state == still.entered_x) | still.active[first], jnp.maximum(between, still.scale), between)
 
     crossing = Crossing(
         goes, *points, trial.t1, depth, still.trial, trial, jnp.asarray(False), trial.t, sizes,

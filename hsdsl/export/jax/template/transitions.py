@@ -25,6 +25,7 @@ from .lane import (
     contraction,
     recorded,
     sampled,
+    scales_here,
     stopped,
 )
 from .model import Bound
@@ -144,6 +145,9 @@ def transit(model, config, p, lane, record, event):
     after = bound.routines.reset(edge, bound.p, event.t, x)
     spread = bound.routines.spread(edge, bound.p, frozen(event.t), frozen(x), event.sizes)
     scale = frozen(jnp.where(jnp.isfinite(spread).all(), spread, jnp.abs(after)))
+    changes = model.of(model.loops, lane.mode)[event.k] & (after != x)
+    most = (lane.count + 1) * jnp.maximum(jnp.abs(after), scales_here(model, lane))  # round-off adds up over resets
+    scale = frozen(jnp.where(changes, jnp.minimum(scale, most), scale))
     if config.scheme == "relaxed":
         resumed = event.landed + (config.relaxation - event.depth)
     else:

@@ -131,6 +131,10 @@ function [w, after, scale] = reset(w, here, k, t, x, sizes)
   scale = w.m.spread{q}{k}(t, x, w.p, d, sizes);
   if ~all(isfinite(scale))
     scale = abs(after);
+  elseif w.m.edge_target{q}(k) == q % resets that lose energy add round-off up, they do not magnify it
+    changes = w.m.edge_changes{q}{k};
+    had = w.sizes(w.m.state_index{q}(changes));
+    scale(changes) = min(scale(changes), (w.count + 1) * max(abs(after(changes)), had));
   end
   if ~all(isfinite(after))
     w = ended(w, 'not_finite', sprintf('the reset of %s has no value at t = %.10g', w.m.edge_names{q}{k}, t));
@@ -1050,7 +1054,7 @@ function [w, event] = stuck(w, here, wall)
   if ~isempty(found)
     [unused, best] = max(w.m.edge_priority{here.q}(found));
     event = struct('k', found(best), 't', here.t, 'x', here.x, 'depth', 0, 't1', here.t, ...
-                   'sizes', sizes_along(here, here.x, here.x));
+                   'sizes', strip_sizes(here, here.x, here.x, found(best)));
   elseif wall > 0
     w = left(w, here.q, wall, here.t);
   else
@@ -1070,6 +1074,14 @@ function w = underflow(w, here, finite)
   end
 end
 
+function sizes = strip_sizes(here, x, z, k)
+% Those of a point on the guard of edge k: one that the state has not left it is off by the round-off of what it came with.
+  sizes = sizes_along(here, x, z);
+  if here.active(k)
+    sizes = max(sizes, here.scale);
+  end
+end
+
 function event = choose(w, here, found, t1, z)
 % Of several crossings the earliest; of tied ones the highest priority, then the file's order.
   [time, first] = min([found.t]);
@@ -1086,7 +1098,7 @@ function event = choose(w, here, found, t1, z)
     z = here.x;
   end
   event = struct('k', k, 't', time, 'x', found(first).x, 'depth', depth, 't1', t1, ...
-                 'sizes', sizes_along(here, here.x, z));
+                 'sizes', strip_sizes(here, here.x, z, k));
 end
 
 function [inside, found, wall] = judge(w, here, t, h, t1, x, k1, z, K, d)

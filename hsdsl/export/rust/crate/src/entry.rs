@@ -17,6 +17,15 @@ pub(crate) struct Arrival {
     pub inside: Option<[bool; M]>,
     /// When the state was reset, before it waited in a strip.
     pub reset_at: f64,
+    /// How far off each surface a state is that stood on it: no further off it still does.
+    pub stood: [f64; M],
+}
+
+impl Arrival {
+    /// One at once.
+    pub fn at(t: f64, mode: usize, dimension: usize) -> Arrival {
+        Arrival { mode, dimension, t, inside: None, reset_at: t, stood: [0.0; M] }
+    }
 }
 
 impl<S> Run<'_, S> {
@@ -30,7 +39,7 @@ impl<S> Run<'_, S> {
         }
         for k in 0..self.here().surfaces {
             let r = values[k];
-            let noise = self.roundoff(k, t, &x, true)?;
+            let noise = max(self.roundoff(k, t, &x, true)?, size(arrival.stood[k]));
             if r > noise && !(then[k] > noise) {
                 self.active[k] = true;
                 self.emerging[k] = self.rate(k, t, &x)? < 0.0;
@@ -53,6 +62,18 @@ impl<S> Run<'_, S> {
             inside[k] = !edge.conditional && values[k] < -self.roundoff(k, t, &self.x, false)?;
         }
         Some(inside)
+    }
+
+    /// How far off the surfaces that it stands on the state is.
+    pub(crate) fn off(&self) -> Option<[f64; M]> {
+        let (mut values, mut off) = ([0.0; M], [0.0; M]);
+        if self.values(self.t, &self.x, &mut values) {
+            return None;
+        }
+        for k in 0..self.here().surfaces {
+            off[k] = if self.active[k] && !self.emerging[k] { values[k] } else { 0.0 };
+        }
+        Some(off)
     }
 }
 
@@ -117,7 +138,7 @@ impl<S: Sink> Run<'_, S> {
             self.x = after;
             self.scale = scale;
             let edge = &edges[k];
-            arrival = Arrival { mode: edge.target, dimension: edge.dimension, t, inside: None, reset_at: t };
+            arrival = Arrival::at(t, edge.target, edge.dimension);
         }
     }
 }

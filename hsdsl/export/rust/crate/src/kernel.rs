@@ -17,6 +17,10 @@ pub struct Edge {
     pub condition: &'static [Routine],
     pub reset: Routine,
     pub spread: Routine,
+    /// States that the reset changes.
+    pub changes: &'static [usize],
+    /// The number of the motion along its guard.
+    pub contact: Option<usize>,
 }
 
 pub struct Mode {
@@ -34,6 +38,8 @@ pub struct Mode {
     pub rates: &'static [Routine],
     /// The sizes of the terms of a flow that jumps.
     pub terms: Option<Routine>,
+    /// The flow with motions along guards.
+    pub held: Option<Routine>,
     /// For each state its number among those of all modes.
     pub states: &'static [usize],
 }

@@ -26,8 +26,7 @@ enum Outcome {
 impl<S: Sink> Run<'_, S> {
     /// Follow the relaxed execution until it stops.
     pub(crate) fn relaxed(&mut self) -> Stop {
-        let start = Arrival { mode: self.mode, dimension: self.dimension, t: 0.0, inside: None, reset_at: 0.0 };
-        let mut outcome = self.enter(start);
+        let mut outcome = self.enter(Arrival::at(0.0, self.mode, self.dimension));
         loop {
             if let Err(stop) = outcome {
                 return stop;
@@ -93,7 +92,8 @@ impl<S: Sink> Run<'_, S> {
             if found.count > 0 || !self.trial.ends {
                 let (crossing, tied) = self.choose(&found.crossings[..found.count]);
                 let end = if crossing.theta > 0.0 { self.z } else { self.x };
-                return Ok(Outcome::Landed(Event { crossing, tied, t1, sizes: self.sizes(&self.x, &end) }));
+                let sizes = self.sizes(&self.x, &end, crossing.edge);
+                return Ok(Outcome::Landed(Event { crossing, tied, t1, sizes }));
             }
             if halvings > 0 || !(t1 > self.t) {
                 if let Some(failure) = self.stalls(halvings, last, t1) {
@@ -158,11 +158,11 @@ impl<S: Sink> Run<'_, S> {
         }
     }
 
-    /// The sizes of the numbers that a point between x and z is computed from.
-    fn sizes(&self, x: &State, z: &State) -> State {
+    /// The sizes of the numbers that a point between x and z, on the guard of edge k, is computed from.
+    fn sizes(&self, x: &State, z: &State, k: usize) -> State {
         let mut found = [0.0; W];
         for s in 0..self.dimension {
-            let still = if z[s] == self.entered[s] { self.scale[s] } else { size(z[s]) };
+            let still = if self.active[k] || z[s] == self.entered[s] { self.scale[s] } else { size(z[s]) };
             found[s] = max(max(size(x[s]), size(z[s])), still);
         }
         found
@@ -187,7 +187,8 @@ impl<S: Sink> Run<'_, S> {
         let (crossings, count) = self.standing_on();
         if may && count > 0 {
             let (crossing, tied) = self.choose(&crossings[..count]);
-            return Ok(Event { crossing, tied, t1: self.t, sizes: self.sizes(&self.x, &self.x) });
+            let sizes = self.sizes(&self.x, &self.x, crossing.edge);
+            return Ok(Event { crossing, tied, t1: self.t, sizes });
         }
         let instant = crate::math::root(crate::run::UNIT) * self.t;
         let fast = (0..self.dimension).any(|s| {
@@ -241,7 +242,7 @@ impl<S: Sink> Run<'_, S> {
         let edge = &self.here().edges[crossing.edge];
         self.x = after;
         self.scale = scale;
-        self.enter(Arrival { mode: edge.target, dimension: edge.dimension, t: resumed, inside: None, reset_at: t })?;
+        self.enter(Arrival { reset_at: t, ..Arrival::at(resumed, edge.target, edge.dimension) })?;
         let (here, x, n) = (self.mode, self.x, self.dimension);
         if !self.cascade.returns(flowed, here, &x, n) {
             return Ok(());
@@ -290,9 +291,11 @@ impl<S: Sink> Run<'_, S> {
         let (t, mode, dimension) = (self.t, self.mode, self.dimension);
         let next = SEGMENTS.iter().rposition(|segment| segment.start <= t).unwrap_or(0);
         if SEGMENTS[next].jump {
-            return match self.mark_inside() {
-                None => Err(self.stop(StopReason::NotFinite, t)),
-                inside => self.enter(Arrival { mode, dimension, t, inside, reset_at: t }),
+            return match (self.mark_inside(), self.off()) {
+                (Some(inside), Some(stood)) => {
+                    self.enter(Arrival { inside: Some(inside), stood, ..Arrival::at(t, mode, dimension) })
+                }
+                _ => Err(self.stop(StopReason::NotFinite, t)),
             };
         }
         let (active, emerging) = (self.active, self.emerging);

@@ -1,8 +1,8 @@
 //! A run under way: entering a mode, choosing among crossings, resets.
 
-use crate::kernel::{bound, Mode, Settings, Sink, State, Stop, StopReason, Transition};
-use crate::math::{finite, max, size};
-use crate::model::{D, E, M, MODES, P, SEGMENTS, STAGES, STATES, W};
+use crate::kernel::{bound, Edge, Mode, Settings, Sink, State, Stop, StopReason, Transition};
+use crate::math::{finite, max, min, root, size};
+use crate::model::{D, E, JACOBIAN, JACOBIAN_PLACES, M, MODES, P, SEGMENTS, STAGES, STATES, W};
 use crate::table::Piece;
 
 pub const UNIT: f64 = 1.0 / 9007199254740992.0;
@@ -153,6 +153,7 @@ pub fn simulate<S: Sink>(
         cascade: Chain::NEW,
         made: 0,
     };
+    run.scale = run.start_sizes();
     run.relaxed()
 }
 
@@ -231,6 +232,42 @@ impl<S> Run<'_, S> {
         }
     }
 
+    /// Whether an edge leads back to the state's mode and its states.
+    pub(crate) fn returns(&self, edge: &Edge) -> bool {
+        let own = self.here().dimension;
+        edge.target == self.mode && edge.dimension == own && self.dimension == own
+    }
+
+    /// The sizes that the flow gives the states within the run, in a mode with motion along guards; else zero.
+    fn start_sizes(&self) -> State {
+        self.flow_sizes().filter(|found| found[..self.dimension].iter().all(|v| finite(*v))).unwrap_or([0.0; W])
+    }
+
+    fn flow_sizes(&self) -> Option<State> {
+        let (n, x, until) = (self.dimension, &self.x, self.settings.until);
+        let (jacobian, p) = (JACOBIAN?, bound(&self.parameters, &SEGMENTS[segment_at(0.0)]));
+        let (mut slope, mut entries, mut rows) = ([0.0; W], [0.0; W * W], [[0.0; W]; W]);
+        if (self.here().flow)(&p, 0.0, x, &mut slope) || jacobian(&p, 0.0, x, &mut entries) {
+            return None;
+        }
+        for (&place, d) in JACOBIAN_PLACES.iter().zip(entries) {
+            rows[place / n][place % n] = size(d);
+        }
+        let mut back: f64 = 0.0;
+        for i in 0..n {
+            back = max(back, (0..n).fold(0.0, |sum, k| sum + rows[i][k] * rows[k][i]));
+        }
+        let time = until / (1.0 + until * root(back)); // in which motion turns back
+        let (mut first, mut found) = ([0.0; W], [0.0; W]);
+        for s in 0..n {
+            first[s] = max(size(x[s]), time * size(slope[s]));
+        }
+        for i in 0..n {
+            found[i] = max(first[i], time * (0..n).fold(0.0, |sum, k| sum + rows[i][k] * first[k]));
+        }
+        Some(found)
+    }
+
     /// The state behind a transition and the sizes of the numbers it came from; none where it has no finite value.
     pub(crate) fn reset(&self, crossing: &Crossing, sizes: &State) -> Option<(State, State)> {
         let edge = &self.here().edges[crossing.edge];
@@ -246,6 +283,11 @@ impl<S> Run<'_, S> {
         if bad || !spread[..to].iter().all(|v| finite(*v)) {
             for i in 0..to {
                 spread[i] = size(after[i]);
+            }
+        } else if self.returns(edge) {
+            for &s in edge.changes {
+                // resets that lose energy add round-off up, they do not magnify it
+                spread[s] = min(spread[s], (self.made as f64 + 1.0) * max(size(after[s]), self.scale_of(s)));
             }
         }
         Some((after, spread))

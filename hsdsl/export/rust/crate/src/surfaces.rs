@@ -4,10 +4,13 @@
 
 use crate::kernel::State;
 use crate::math::{finite, max, min, root, size};
-use crate::model::{E, M, W};
+use crate::model::{CONTACTS, D, E, M, P, W};
 use crate::run::{Crossing, Run, UNIT};
 use crate::table::Piece;
 
+const ROUNDOFF_UNITS: f64 = 32.0;
+const ZERO_UNITS: f64 = 16.0;
+const HELD: f64 = 2.0;
 const SCAN: usize = 8;
 const ROOT_ITERATIONS: usize = 200;
 
@@ -90,7 +93,7 @@ impl<S> Run<'_, S> {
                 }
             }
         }
-        Some(32.0 * UNIT * total)
+        Some(ROUNDOFF_UNITS * UNIT * total)
     }
 
     /// Whether the `if` of edge k holds. A part that is false decides, even if another has no value.
@@ -119,11 +122,24 @@ impl<S> Run<'_, S> {
     fn stands(&self, k: usize, t: f64, x: &State, since: f64) -> Option<bool> {
         let (r, rate) = (self.surface(k, t, x)?, self.rate(k, t, x)?);
         let near = size(r) <= max(self.roundoff(k, t, x, false)?, rate * since);
-        if near && rate > 0.0 {
+        if near && self.points_out(k, t, x, rate)? {
             self.condition(k, t, x)
         } else {
             Some(false)
         }
+    }
+
+    /// Whether the flow points out of surface k, beyond the round-off of its rate.
+    fn points_out(&self, k: usize, t: f64, x: &State, rate: f64) -> Option<bool> {
+        if !(rate > 0.0) {
+            return Some(false);
+        }
+        let (g, mut slope) = (self.gradient(k, t, x)?, [0.0; W]);
+        if self.flow(t, x, &mut slope) {
+            return None;
+        }
+        let terms = (0..self.dimension).fold(size(g[0]), |sum, s| sum + size(g[s + 1]) * size(slope[s]));
+        Some(rate > ROUNDOFF_UNITS * UNIT * terms)
     }
 
     /// Forget the surfaces that the state was on and has left.
@@ -287,7 +303,10 @@ impl<S> Run<'_, S> {
             return Some(Err(Failure::Inward(k)));
         }
         if !self.condition(k, crossing.time, &crossing.state)? {
-            return Some(Ok(None));
+            let on = crossing.theta == 0.0 || self.active[k];
+            if !(on && self.holds_after_hop(&piece, k, &crossing, value)?) {
+                return Some(Ok(None));
+            }
         }
         if let Some(failure) = self.too_deep(k, value)? {
             return Some(Err(failure));
@@ -306,6 +325,64 @@ impl<S> Run<'_, S> {
     fn inward(&self, k: usize, crossing: &Crossing) -> Option<f64> {
         let back = -self.rate(k, crossing.time, &crossing.state)? * self.trial.h;
         Some(if back > self.noise[k] { back } else { 0.0 })
+    }
+
+    /// Whether the `if` of edge k holds next, on whose surface the state is, after a hop that round-off hides: where the
+    /// flow comes back to the surface, which is at `end` at the step's end.
+    fn holds_after_hop(&self, piece: &Piece, k: usize, crossing: &Crossing, end: f64) -> Option<bool> {
+        let back = -self.rate(k, crossing.time, &crossing.state)? * self.trial.h;
+        if !(back > 0.0) {
+            return Some(self.holds_next(k, crossing.time, &crossing.state));
+        }
+        let s = crossing.theta + (1.0 - crossing.theta) * (back / (back + end));
+        let point = piece.at(&self.x, self.dimension, s);
+        Some(self.holds_next(k, self.trial.t + s * self.trial.h, &point))
+    }
+
+    /// Whether the `if` of an edge that leads back holds at a point, or next along the flow.
+    fn holds_next(&self, k: usize, t: f64, x: &State) -> bool {
+        let edge = &self.here().edges[k];
+        if !self.returns(edge) {
+            return false;
+        }
+        match self.condition(k, t, x) {
+            Some(false) if edge.conditional => {
+                self.pressed(k, t, x).map_or(false, |next| self.condition(k, t, &next) == Some(true))
+            }
+            holds => holds == Some(true),
+        }
+    }
+
+    /// Where the flow presses a state, by what guard k would take away of it: off by round-off where its reset changes it.
+    fn pressed(&self, k: usize, t: f64, x: &State) -> Option<State> {
+        let (edge, mut slope, mut after, mut next) = (&self.here().edges[k], [0.0; W], 0.0, *x);
+        if self.flow(t, x, &mut slope) {
+            return None;
+        }
+        if let (Some(contact), Some(held)) = (edge.contact, self.here().held) {
+            let (mut p, mut left) = ([0.0; P + D + CONTACTS], [0.0; W]);
+            p[..P + D].copy_from_slice(&self.p);
+            p[P + D + contact] = HELD;
+            if held(&p, t, x, &mut left) {
+                return None;
+            }
+            for s in 0..self.dimension {
+                slope[s] -= left[s];
+            }
+        }
+        for &s in edge.changes {
+            if slope[s] != 0.0 {
+                let sized = max(self.scale_of(s), self.scale[s]);
+                after = max(after, ZERO_UNITS * UNIT * sized / size(slope[s]));
+            }
+        }
+        if !(after > 0.0) {
+            after = UNIT * self.settings.until; // where these states have been zero only
+        }
+        for s in 0..self.dimension {
+            next[s] = x[s] + after * slope[s];
+        }
+        Some(next)
     }
 
     /// Where surface k was last crossed upwards on an interpolant; none if it was beyond all along.
