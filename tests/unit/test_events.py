@@ -167,15 +167,6 @@ def test_random_events_against_a_grid():
         assert times(run, "e") == pytest.approx(rises, abs=3e-5)
 
 
-@pytest.mark.parametrize("target", ["latex"])
-def test_exports_that_cannot_keep_events_refuse(target):
-    from hsdsl.export import files_of, source_of
-
-    made = model("x: 1", "{name: e, event: x >= 1, reset: {x: 0}}", "x: 0")
-    with pytest.raises(UsageError, match="events"):
-        files_of(source_of(made, {}), target)
-
-
 MADE = {  # flow, transitions, initial values, and the transitions that are made until t = 2
     # one of two opposite comparisons holds everywhere, and both nowhere
     "always": ("x: 1", "{name: e, event: x <= 1/2 or x > 1/2, reset: {x: 0}}", "x: 0", []),
