@@ -122,6 +122,12 @@ def test_located_runs_are_right_and_hold(name: str) -> None:
     assert found.error <= 1e-4
 
 
+def test_impacts_at_one_instant_hold_behind_strips() -> None:
+    """The third lands on the surface of another one, which the order of the first two decides as well."""
+    found = run(SCENES["three-spheres"], Setting("hsdsl c", "relaxed", "taylor", tolerance=1e-9))
+    assert (found.word, found.verdict) == ("right", "holds"), found
+
+
 def as_result(entry: Entry, **changed: Any) -> Result:
     scene = entry.scene
     values, modes = changed.get("values", scene.exact_values), changed.get("modes", scene.exact_modes)

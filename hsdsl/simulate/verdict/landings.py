@@ -84,12 +84,14 @@ def _soon(run: RunView, place: Place, row: int) -> State:
 
 
 def _tied(run: RunView, made: Transition) -> bool:
-    """Whether a transition follows one at the same instant that others were tied with: `choices` decides these."""
+    """Whether a transition follows, with no flow between, one that others were tied with: `choices` decides these."""
+    following = made
     for before in reversed(run.transitions[: made.index]):
-        if before.resumed is None or made.time - before.resumed > run.tie(made.time):
+        if before.resumed is None or following.time - before.resumed > run.tie(following.time):
             return False
         if before.alternatives:
             return True
+        following = before
     return False
 
 
