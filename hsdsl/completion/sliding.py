@@ -131,13 +131,25 @@ def _where(edge: Edge, condition: sp.Basic) -> Edge:
 
 
 def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:
-    """The further edges of both modes, those of the first one first; one of two on the same surface."""
+    """The further edges of both modes, those of the first one first; one of two that do the same."""
     found: list[Edge] = []
+    seen: list[Edge] = []
     for mode, own in ((a, out), (b, back)):
         for edge in mode.edges:
-            if edge is own or any(sp.expand(e.surface.residual - edge.surface.residual) == 0 for e in found):
+            if edge is own or any(_same(e, edge) for e in seen):
                 continue
+            seen.append(edge)
             taken = {e.name for e in found}
             label = edge.name if edge.name not in taken else f"{edge.name}_{mode.name}"
             found.append(replace(edge, name=label, source=name))
     return found
+
+
+def _same(one: Edge, other: Edge) -> bool:
+    """Whether two edges do the same: of two that lead back to their own modes the first counts."""
+
+    def does(edge: Edge) -> tuple:
+        end = None if edge.target == edge.source else edge.target
+        return end, edge.condition, edge.priority, edge.target_states, edge.reset
+
+    return does(one) == does(other) and sp.expand(one.surface.residual - other.surface.residual) == 0

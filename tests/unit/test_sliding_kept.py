@@ -62,3 +62,31 @@ def test_switches_slide_stop_or_chatter(scheme):
         assert chatters.stop.complete and len(chatters.transitions) > 0.5 / width
         waited = sum(made.resumed - made.time for made in chatters.transitions)
         assert abs(chatters.final["y"] - slides.final["y"]) < 3 * (width + waited)
+
+
+SHARED = """hsdsl: 1
+modes:
+  a:
+    flow: {x: 1, n: 0, c: 1}
+    transitions:
+      - {when: x >= 0, to: b}
+      - {name: early, when: c >= 2, if: n > 0.5, to: a, reset: {n: 0, c: 0, x: -1}}
+      - {name: late, when: c >= 2, if: n < 0.5, to: a, reset: {n: 1, c: 0, x: -1.5}}
+  b:
+    flow: {x: -1, n: 0, c: 1}
+    transitions:
+      - {when: x <= 0, to: a}
+      - {name: early, when: c >= 2, if: n > 0.5, to: b, reset: {n: 0, c: 0, x: -1}}
+      - {name: late, when: c >= 2, if: n < 0.5, to: b, reset: {n: 1, c: 0, x: 1.5}}
+initial: {mode: a, x: -0.5, n: 0, c: 0}
+experiment: {until: 5, completion: auto}
+"""
+
+
+def test_transitions_that_share_a_surface_are_all_made_while_sliding():
+    """One of two that do the same is left out, and no other: 'late' differs between the modes, 'early' does not."""
+    made = [tr for tr in hsdsl.loads(SHARED).simulate().transitions if tr.source == "sliding_a_b"]
+    assert [(tr.edge, round(tr.time, 12), tr.alternatives) for tr in made] == [
+        ("late", 2, ("late_b",)),
+        ("early", 4, ()),
+    ]
