@@ -1,8 +1,8 @@
-"""A model that is elaborated and lowered in another process, while this one loads what runs it.
+"""A model that is elaborated, lowered and compiled in another process, while this one loads what runs it.
 
 The other process is a copy of this one from before anything large was loaded. It answers with the program or with the
-errors of the model; where it ends without an answer, this process does the work itself. Large
-models are lowered in two processes.
+errors of the model; where it ends without an answer, this process does the work itself. Large models are lowered in
+two processes. Compiled code is left in the cache; the other process makes it even where this one ends before.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Generic, NoReturn, TypeVar
+from typing import Generic, NamedTuple, NoReturn, TypeVar
 
 from hsdsl import interrupts, program_cache
 from hsdsl.errors import ModelError, UsageError
@@ -27,9 +27,19 @@ from hsdsl.program import Program
 First = TypeVar("First")
 Second = TypeVar("Second")
 Result = TypeVar("Result")
-Lowered = tuple[Program, Program | None, ModelFiles]  # as it is, with modes of sliding where it has them, its bytes
+
+
+class Lowered(NamedTuple):
+    """The program of a model, the one with modes of sliding where it has them, and all bytes they were made from."""
+
+    program: Program
+    sliding: Program | None
+    files: ModelFiles
+
+
 Answer = Lowered | ModelError | None
 LARGE = 0.03  # seconds to elaborate a model, from which on a copy takes less time than half of the lowering
+NICE = 5  # the run that needs no compiled code goes first
 # what pydantic and SymPy load where they first look for plugins and tensors, of which no model has any: for nothing
 _UNUSED: dict[str, dict[str, type]] = {
     "pydantic.plugin._loader": {"get_plugins": tuple},
@@ -43,6 +53,7 @@ class _Copy(Generic[Result]):
 
     process: int
     answer: int
+    goes_on: bool  # when it has answered
 
     def wait(self) -> Result | None:
         """Its answer; None where it ends without one."""
@@ -65,18 +76,32 @@ class _Copy(Generic[Result]):
             os.waitpid(self.process, 0)
 
 
+@dataclass(frozen=True)
+class Compilation:
+    """A process that compiles a program for the cache, whether or not this one waits for it."""
+
+    process: int
+
+    def ended(self) -> bool:
+        """Whether it has ended, which it does without compiled code where there is no compiler."""
+        try:
+            return os.waitpid(self.process, os.WNOHANG)[0] != 0
+        except ChildProcessError:
+            return True
+
+
 _begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
 _seen: list[ModelFiles] = []
 
 
-def begin(files: ModelFiles) -> None:
-    """Begin to lower a model in another process, where that saves time: see :func:`taken`."""
+def begin(files: ModelFiles, compiled: bool = True) -> None:
+    """Begin to lower a model in another process, where that saves time, and to compile it: see :func:`taken`."""
     if files in _seen:
         return
     _seen.append(files)
     if _saves_time() and not program_cache.is_kept(files):
         with suppress(OSError):  # there may be no more processes
-            _begun.append((files, _copy(lambda: _lowered(files))))
+            _begun.append((files, _copy(lambda: _lowered(files), _compile if compiled else None)))
 
 
 def begin_run(words: list[str]) -> None:
@@ -99,8 +124,8 @@ def _saves_time() -> bool:
     )
 
 
-def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
-    """The programs of a model that was begun, and all bytes that they were made from; None where there is none.
+def taken(files: ModelFiles, needed: Sequence[str] = ()) -> tuple[Lowered, Compilation | None] | None:
+    """The programs of a model that was begun, and who compiles the one that runs; None where there is none.
 
     Modules that are needed afterwards are imported while the other process works.
 
@@ -111,15 +136,18 @@ def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
             import_module(name)
         answer = begun[1].wait()
         _begun.remove(begun)
+        if isinstance(answer, Lowered) and begun[1].goes_on:
+            os.close(begun[1].answer)
+            return answer, Compilation(begun[1].process)
         begun[1].end()
         if isinstance(answer, ModelError):
             raise answer
-        return answer
+        return None if answer is None else (answer, None)
     return None
 
 
-def _copy(work: Callable[[], Result]) -> _Copy[Result]:
-    """Begin some work in a copy of this process.
+def _copy(work: Callable[[], Result], then: Callable[[Result], object] | None = None) -> _Copy[Result]:
+    """Begin some work in a copy of this process, which may go on by itself when it has answered.
 
     Raises OSError: there may be no more processes.
     """
@@ -132,14 +160,14 @@ def _copy(work: Callable[[], Result]) -> _Copy[Result]:
     else:
         if process == 0:
             os.close(answer)  # else a large answer is waited with for ever where the reader has ended
-            _work(work, to_answer)
-        return _Copy(process, answer)
+            _work(work, to_answer, then)
+        return _Copy(process, answer, then is not None)
     finally:
         os.close(to_answer)
 
 
-def _work(work: Callable[[], object], to_answer: int) -> NoReturn:
-    """Answer, and end this process without what its copy does at its end."""
+def _work(work: Callable[[], Result], to_answer: int, then: Callable[[Result], object] | None) -> NoReturn:
+    """Answer, go on, and end this process without what its copy does at its end."""
     import ctypes
     import pickle
     import signal
@@ -147,11 +175,25 @@ def _work(work: Callable[[], object], to_answer: int) -> NoReturn:
     try:
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: nobody reads what it answers then
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # the other one says that it was interrupted
-        content = pickle.dumps(work())
+        answer = work()
+        content = pickle.dumps(answer)
         with open(to_answer, "wb") as stream:
             stream.write(content)
+        if then is not None:
+            ctypes.CDLL(None).prctl(1, 0)
+            _leave_terminal()
+            then(answer)
     finally:
         os._exit(0)
+
+
+def _leave_terminal() -> None:
+    """Keep no stream open whose other end waits for it to be closed, get no Ctrl-C, and let others work first."""
+    os.setpgid(0, 0)
+    os.nice(NICE)
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(nothing, stream)
 
 
 def _both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
@@ -199,9 +241,20 @@ def _lowered(files: ModelFiles) -> Answer:
                 sliding = None
             elif (slides := with_sliding(system)) is not system:
                 sliding = lower(slides, both)
-            return program, sliding, files.with_data(system.files)
+            return Lowered(program, sliding, files.with_data(system.files))
     except ModelError as error:
         return error
+
+
+def _compile(lowered: Answer) -> None:
+    """Compile the program that runs, for the cache."""
+    from hsdsl.runtime.library import NoCompiler, loop
+    from hsdsl.runtime.programs import compiled
+
+    if isinstance(lowered, Lowered):
+        with applied(lowered.files.limits), suppress(NoCompiler):  # the run that needs it reports the failure
+            compiled(lowered.sliding or lowered.program)
+            loop()
 
 
 @atexit.register

@@ -62,7 +62,7 @@ def run(
         _check_files(out, plot, animate, outputs)
         text = read_bytes(model)
         if outputs is None and plot is None and animate is None and experiment.in_numbers():
-            ahead.begin(ModelFiles.read(model, None, text))
+            ahead.begin(ModelFiles.read(model, None, text), engine != "python" and precision is None)
         loaded = _load(model, text, engine, precision, experiment.scheme)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns)

@@ -39,7 +39,7 @@ from hsdsl.execution import Array
 from hsdsl.integrators import AUTO, METHODS, ButcherTableau, Method
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
-from hsdsl.simulate import Prepared, Settings, prepare
+from hsdsl.simulate import Prepared, Settings
 from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.review import BecomesStiff
 
@@ -151,7 +151,7 @@ def instead(prepared: Prepared, found: BecomesStiff) -> Prepared:
     settings = prepared.settings
     method = METHODS["radau"].for_tolerance(settings.tolerance, prepared.arithmetic)
     settings = replace(settings, method=method, method_chosen=f"{method.name}: {found}")
-    return prepare(prepared.with_settings(settings), prepared.plan and prepared.plan.compiled)
+    return prepared.prepared_with(settings)
 
 
 def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]) -> bool:

@@ -1,7 +1,7 @@
 """The choice of the loop that runs a model.
 
 ======== ==========================================================================
-auto     ``c`` where it can serve, ``python`` where it cannot
+auto     ``c`` where it can serve, ``python`` where it cannot or has ended before the model is compiled
 c        the compiled loop, or a refusal that says why not
 python   the readable one
 ======== ==========================================================================
@@ -34,6 +34,11 @@ def begin(engine: str, precision: int | None, scheme: str | None) -> None:
     """Compile the runtime while a model is read, where the run may need it."""
     if engine != "python" and precision is None and (scheme or SCHEMES[0]) in SCHEMES:
         kernel.begin()
+
+
+def serves(settings: Settings, precision: int | None) -> bool:
+    """Whether the compiled loop can run it."""
+    return _refusal(settings, precision) is None
 
 
 def choose(

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl import ahead, program_cache
@@ -28,12 +28,15 @@ from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, Problem, prepare
 from hsdsl.simulate.input_segments import Timeline, UnorderedTimes, make_timeline
+from hsdsl.simulate.plan import Pending
 
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
 # what compiles, runs and reports a model
 _RUNNING = ("pickle", "hsdsl.backends.c", "hsdsl.runtime.process", "hsdsl.simulate.verdict", "hsdsl.report")
+
+_OF_THIS_PROCESS = ("system", "sliding", "compilation", "_compiled", "kernels")
 
 
 def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Pipeline:
@@ -45,12 +48,13 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
         program, files = cached
         return Pipeline(None, time.perf_counter() - began, files, program)
     lowered = ahead.taken(files, _RUNNING)
-    if lowered is not None and _method_exists(lowered[0]):
-        program, sliding, files = lowered
+    if lowered is not None and _method_exists(lowered[0].program):
+        (program, sliding, files), compilation = lowered
         made = Pipeline(None, time.perf_counter() - began, files, program)
         made.keep(program)
         if sliding is not None:
             made.keep(sliding, (SLIDING,))
+        (made if sliding is None else made.sliding).compilation = compilation
         return made
     system = _elaborated(files)
     return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
@@ -88,6 +92,7 @@ class Pipeline:
         if program is not None:
             self.program = program
         self._files, self._part, self._left_out = files, part, left_out
+        self.compilation: ahead.Compilation | None = None  # of the program, by another process
         self.seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
@@ -95,12 +100,14 @@ class Pipeline:
     def __getstate__(self) -> dict[str, Any]:
         program = self.program  # needed first by whoever gets it, and costly
         state = {
-            key: value for key, value in vars(self).items() if key not in ("system", "sliding", "_compiled", "kernels")
+            key: value
+            for key, value in vars(self).items()
+            if key not in ("system", "sliding", "compilation", "_compiled", "kernels")
         }
         return state | {"program": program} | ({"system": self.system} if self._files is None else {})
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, _compiled=None, kernels={})
+        self.__dict__.update(state, compilation=None, _compiled=None, kernels={})
 
     @property
     def files(self) -> ModelFiles | None:
@@ -229,8 +236,12 @@ class Pipeline:
         if options.automatic:
             settings = automatic.chosen(settings, self.program, values.kernel, timeline, mode, x)
         settings = following_digits(settings, options, values.kernel.arithmetic)
-        compiled = engines.choose(engine, settings, precision, self._compile)
-        return prepare(Problem(self.program, values.kernel, settings, timeline, mode, states, x), compiled)
+        problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x)
+        take = partial(engines.choose, engine, settings, precision, self._compile)
+        compilation = self.compilation if engine == "auto" and engines.serves(settings, precision) else None
+        if compilation is None or compilation.ended():
+            return prepare(problem, take())
+        return prepare(problem, None, Pending(compilation.ended, take, self.seconds["load"]))
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """The inputs over time."""

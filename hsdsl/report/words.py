@@ -47,7 +47,7 @@ def heading(execution: Execution) -> str:
 
 
 def settings(execution: Execution) -> list[str]:
-    """List the scheme, the method and the settings of a run."""
+    """List the scheme, the method and the settings of a run, which has equal bits by either engine."""
     chosen = [f"{execution.scheme} {execution.method}"]
     shown = {"scheme", "method", "engine", "method_chosen"}
     for name, value in execution.settings.items():
@@ -55,7 +55,7 @@ def settings(execution: Execution) -> list[str]:
             chosen.append(f"{name} {number(value)}")
     if execution.digits is not None and "precision" not in execution.settings:
         chosen.append(f"{execution.digits} digits{_kept(execution)}")
-    return [*chosen, f"engine {execution.engine}"]
+    return chosen
 
 
 def _kept(execution: Execution) -> str:

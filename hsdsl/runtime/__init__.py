@@ -3,6 +3,7 @@
 ============  ====================================================================================
 `compiler`    which C compiler there is
 `library`     C text to a loaded library, compiled once and kept
+`programs`    that of a program
 `kernel`      a program's routines, compiled, as a `Kernel` like any other
 ============  ====================================================================================
 """

@@ -10,13 +10,11 @@ from functools import cache
 from threading import Lock, Thread
 from typing import Any
 
-from hsdsl import limits
 from hsdsl.program import Program
 from hsdsl.runtime import structures
-from hsdsl.runtime.compiler import NoCompiler, TooSlow
-from hsdsl.runtime.library import LOOP, is_kept, load, loop
-
-SYMBOL = "hs_the_model"
+from hsdsl.runtime.compiler import NoCompiler
+from hsdsl.runtime.library import LOOP, is_kept, loop
+from hsdsl.runtime.programs import SYMBOL, compiled
 
 _loading = Lock()
 
@@ -61,12 +59,7 @@ class CompiledModel:
     """
 
     def __init__(self, program: Program) -> None:
-        data = len(program.parameters), len(program.inputs), len(program.switches)
-        content = repr(((*data, len(program.outputs), program.initial_states), program.flows))
-        try:
-            self._library = load(content, SYMBOL, lambda: _source(program))
-        except TooSlow as error:
-            raise NoCompiler(f"{error}; {_longest(program)}") from None
+        self._library = compiled(program)
         self.table = structures.Model.in_dll(self._library, SYMBOL)
         self._shared: dict[Hashable, Any] = {}
 
@@ -82,21 +75,3 @@ class CompiledModel:
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made on first use."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
-
-
-def _longest(program: Program) -> str:
-    """Say where most of the work of a model is."""
-    flows = (
-        (text, f"the flow of {state} in mode {mode.name}")
-        for mode in program.modes
-        for state, text in zip(mode.states, mode.flow_texts, strict=True)
-    )
-    guards = ((edge.text, f"the guard of {edge.name}") for mode in program.modes for edge in mode.edges)
-    text, where = max((*flows, *guards), key=lambda pair: len(pair[0]), default=("", "none"))
-    return f"the longest expression is {where}, with {len(text):,} characters"
-
-
-def _source(program: Program) -> list[str]:
-    from hsdsl.backends.c import model_parts  # what is compiled already needs none
-
-    return model_parts(program, limits.cores())

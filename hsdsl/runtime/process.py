@@ -80,7 +80,7 @@ def _begin(command: Sequence[str], folder: Path) -> _Begun:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         env={**os.environ, "TMPDIR": str(folder), "LC_ALL": "C"},  # what they say is read: `error` in English
-        start_new_session=True,
+        process_group=0,
     )
     _running[process] = folder
     printed: list[bytes] = []

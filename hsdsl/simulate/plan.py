@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from hsdsl.execution import Array, Execution, Stop
@@ -15,11 +15,12 @@ from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.output_buffers import Sink
 from hsdsl.simulate.problem import Problem
-from hsdsl.simulate.recorder import OutOfRoom, Progress, Recorder, Room
+from hsdsl.simulate.recorder import OutOfRoom, Overtaken, Progress, Recorder, Room
 from hsdsl.simulate.refinement import finer_settings
 from hsdsl.simulate.result import about, from_recorder, written
 from hsdsl.simulate.review import Judge, Review
 from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.stops import interrupted, memory
 
 
@@ -48,13 +49,36 @@ SCHEMES: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
     "paoli-schatzman": _paoli_schatzman,
 }
 Watch = Callable[[Progress], None]
+EARLY = 0.1  # of the time that a run is worth: how long it will take is not judged before
+
+
+@dataclass(frozen=True)
+class Pending:
+    """Compiled code that another process makes; ``take`` waits for it and may find that there is none.
+
+    ``worth`` is how many seconds a run may take that does not wait.
+    """
+
+    ended: Callable[[], bool]
+    take: Callable[[], CompiledModel | None]
+    worth: float
+
+    def overtakes(self, began: float, run: Progress) -> bool:
+        """Whether the code is there, or a run that began then is expected to take longer than it is worth."""
+        passed = time.perf_counter() - began
+        late = passed > EARLY * self.worth and passed * float(run.until) > self.worth * float(run.now)
+        return late or self.ended()
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared(Problem):
-    """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it."""
+    """A problem ready to run any number of times.
+
+    ``plan`` is given where the compiled loop runs it, ``pending`` where the Python loop does until that can.
+    """
 
     plan: CompiledPlan | None
+    pending: Pending | None = None
     judges: list[Judge] = field(default_factory=list[Judge])  # of the method, until a run has passed
     finer: dict[int, Prepared] = field(default_factory=dict[int, "Prepared"])  # by the rows of the run
 
@@ -67,10 +91,16 @@ class Prepared(Problem):
         Raises BecomesStiff: by the judge.
         """
         spent = dict(seconds or {})
-        if self.plan is not None:
-            execution = self._by_compiled_loop(self.plan, watch, spent)
-        else:
-            execution = self._by_python_loop(self._fresh(), watch, spent)
+        try:
+            if self.plan is not None:
+                execution = self._by_compiled_loop(self.plan, watch, spent)
+            else:
+                execution = self._by_python_loop(self._fresh(), watch, spent)
+        except Overtaken:
+            assert self.pending is not None
+            faster = prepare(self.with_settings(self.settings), self.pending.take())
+            faster.judges.extend(self.judges)
+            return faster.simulate(watch, spent)
         self.judges.clear()
         return execution
 
@@ -90,9 +120,12 @@ class Prepared(Problem):
         """Make the same run finer."""
         rows = len(execution.times)  # fewer where a run was interrupted
         if rows not in self.finer:
-            problem = self.with_settings(finer_settings(self.settings, execution, self.arithmetic))
-            self.finer[rows] = prepare(problem, self.plan and self.plan.compiled)
+            self.finer[rows] = self.prepared_with(finer_settings(self.settings, execution, self.arithmetic))
         return self.finer[rows].simulate()
+
+    def prepared_with(self, settings: Settings) -> Prepared:
+        """Prepare the same problem with other settings."""
+        return prepare(self.with_settings(settings), self.plan and self.plan.compiled, self.pending)
 
     @cached_property
     def _about(self) -> dict[str, Any]:
@@ -112,6 +145,7 @@ class Prepared(Problem):
         recorder = Recorder(
             arithmetic, settings.until, degree, outputs, room,
             scales=dict(settings.scale), modes=modes, review=self._review(),
+            overtaken=self.pending and partial(self.pending.overtakes, time.perf_counter()),
         )  # fmt: skip
         problem = vars(self.with_settings(settings))
         return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder)
@@ -148,6 +182,8 @@ class Prepared(Problem):
         return written(self._about, under_way, whole, stop, spent, self.again)
 
 
-def prepare(problem: Problem, compiled: CompiledModel | None = None) -> Prepared:
-    """Prepare a run, by the compiled loop where ``compiled`` is given."""
-    return Prepared(**vars(problem), plan=None if compiled is None else CompiledPlan(problem, compiled))
+def prepare(problem: Problem, compiled: CompiledModel | None = None, pending: Pending | None = None) -> Prepared:
+    """Prepare a run, by the compiled loop where ``compiled`` is given or, if it is sooner there, ``pending``."""
+    return Prepared(
+        **vars(problem), plan=None if compiled is None else CompiledPlan(problem, compiled), pending=pending
+    )

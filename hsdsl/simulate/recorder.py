@@ -25,6 +25,10 @@ class OutOfRoom(Exception):
     """The run keeps as many rows as it may."""
 
 
+class Overtaken(Exception):
+    """Compiled code makes the run in less time."""
+
+
 @dataclass
 class Room:
     """How many more rows a run may keep; it says once that there is none.
@@ -123,16 +127,22 @@ class Recorder:
     scales: dict[str, Number] = field(default_factory=dict[str, Number])  # of states in the arcs before the last
     modes: tuple[str, ...] = ()  # of the model, in order
     review: Review | None = None
+    overtaken: Callable[[Progress], bool] | None = None  # by compiled code: looked at with every row
 
     def __post_init__(self) -> None:
-        if self.review is not None:
-            self.room.due, self.room.look = self.review.due, self._look
+        self.room.due, self.room.look = self._due(), self._look
+
+    def _due(self) -> float:
+        reviewed = inf if self.review is None else self.review.due
+        return reviewed if self.overtaken is None else min(reviewed, self.room.taken + 1)
 
     def _look(self) -> float:
-        assert self.review is not None
-        arc = self.arcs[-1]
-        self.review.look(self.modes.index(arc.mode), arc.times[-1], arc.values[-1])
-        return self.review.due
+        if self.overtaken is not None and self.overtaken(self):
+            raise Overtaken
+        if self.review is not None and self.room.taken == self.review.due:
+            arc = self.arcs[-1]
+            self.review.look(self.modes.index(arc.mode), arc.times[-1], arc.values[-1])
+        return self._due()
 
     @property
     def now(self) -> Number:

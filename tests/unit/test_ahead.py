@@ -7,17 +7,26 @@ import select
 import signal
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from shipped import MODELS
 
+import hsdsl
 from hsdsl import ahead
 from hsdsl.elaborate import elaborate_files
 from hsdsl.errors import ModelError
 from hsdsl.files import ModelFiles
 from hsdsl.lower import lower
 from hsdsl.model.pipeline import pipeline_of
+from hsdsl.runtime.compiler import NoCompiler
 
+ROBERTSON = """\
+hsdsl: 1
+modes: {m: {flow: {a: -0.04*a + 1e4*b*c, b: 0.04*a - 1e4*b*c - 3e7*b**2, c: 3e7*b**2}}}
+initial: {mode: m, a: 1, b: 0, c: 0}
+experiment: {until: 400, tolerance: 1e-6}
+"""
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="there is no other process elsewhere")
 
 
@@ -34,8 +43,9 @@ def loaded(monkeypatch, tmp_path):
 def test_the_program_and_its_files_are_those_made_here(name, large, monkeypatch):
     monkeypatch.setattr(ahead, "LARGE", large)
     files = ModelFiles.read(MODELS / f"{name}.yaml")
-    ahead.begin(files)
-    program, sliding, complete = ahead.taken(files) or pytest.fail("no answer")
+    ahead.begin(files, compiled=False)
+    (program, sliding, complete), compilation = ahead.taken(files) or pytest.fail("no answer")
+    assert compilation is None
     system = elaborate_files(files).system
     assert program == lower(system) and sliding is None
     assert complete == files.with_data(system.files)
@@ -105,15 +115,46 @@ def test_another_model_is_not_taken_for_it_and_nothing_is_left():
 
 
 @pytest.mark.parametrize("options", [[], ["--json"], ["-q", "--json"]])
-def test_a_plain_run_begins_before_its_words_are_read(options):
+def test_a_plain_run_begins_before_its_words_are_read(options, monkeypatch):
+    compiled = SimpleNamespace(loop=lambda: None, NoCompiler=NoCompiler)  # which takes seconds
+    monkeypatch.setitem(sys.modules, "hsdsl.runtime.library", compiled)
     model = str(MODELS / "thermostat.yaml")
     ahead.begin_run(["run", model, *options])
     ahead.begin(ModelFiles.read(Path(model)))  # as the command does
     ((_, other),) = ahead._begun
-    assert ahead.taken(ModelFiles.read(Path(model))) is not None
-    assert not ahead._begun
-    with pytest.raises(ProcessLookupError):
-        os.kill(other.process, 0)
+    _, compilation = ahead.taken(ModelFiles.read(Path(model))) or pytest.fail("no answer")
+    assert not ahead._begun and compilation == ahead.Compilation(other.process)
+    os.waitpid(other.process, 0)
+    assert compilation.ended()
+    assert len([*Path(os.environ["XDG_CACHE_HOME"]).glob("hsdsl/compiled/*/*.so")]) == 1
+
+
+class Compilation:
+    """A process that has ended when it was looked at so many times."""
+
+    def __init__(self, looks: float):
+        self.looks = looks
+
+    def ended(self):
+        self.looks -= 1
+        return self.looks < 0
+
+
+@pytest.mark.parametrize(("looks", "seconds", "engine"), [(1e9, 1e9, "python"), (7, 1e9, "c"), (1e9, 0.0, "c")])
+@pytest.mark.parametrize("name", ["bouncing-ball", "thermostat", "robertson"])
+def test_a_run_does_not_wait_for_the_compiler_unless_it_takes_long(name, looks, seconds, engine, tmp_path, monkeypatch):
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    path = MODELS / f"{name}.yaml"
+    if name == "robertson":  # the method is chosen anew under way
+        path = tmp_path / "robertson.yaml"
+        path.write_text(ROBERTSON)
+    expected = hsdsl.load(path).simulate(engine="c")
+    model = hsdsl.load(path)
+    model.pipeline.compilation, model.pipeline.seconds["load"] = Compilation(looks), seconds
+    run = model.simulate()
+    assert (run.engine, run.method, expected.engine) == (engine, expected.method, "c")
+    assert run.times.tobytes() == expected.times.tobytes() and run.values.tobytes() == expected.values.tobytes()
+    assert (run.stop, run.transitions, run.verdict) == (expected.stop, expected.transitions, expected.verdict)
 
 
 @pytest.mark.parametrize("words", [[], ["run"], ["lint", "m.yaml"], ["run", "m.yaml", "--until", "1"], ["run", "none"]])

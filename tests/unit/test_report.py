@@ -160,7 +160,7 @@ def test_summary_to_the_letter():
     assert summary(hand_made.bouncing_ball(wait=0.125, bounces=2)).splitlines() == [
         "Bouncing ball",
         "models/hand-made.yaml",
-        "relaxed midpoint, until 5.25, step 0.001, relaxation 1e-06, engine python",
+        "relaxed midpoint, until 5.25, step 0.001, relaxation 1e-06",
         "",
         "#         time     delay  edge    from -> to  state",
         "0  2.000000000  1.25e-01  bounce  fly -> fly  v: -2 -> 1",

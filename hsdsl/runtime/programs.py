@@ -1,0 +1,43 @@
+"""The library that a program is compiled to."""
+
+from __future__ import annotations
+
+import ctypes
+
+from hsdsl import limits
+from hsdsl.program import Program
+from hsdsl.runtime.compiler import NoCompiler, TooSlow
+from hsdsl.runtime.library import load
+
+SYMBOL = "hs_the_model"
+
+
+def compiled(program: Program) -> ctypes.CDLL:
+    """The library of a program, from the cache or compiled for it.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    data = len(program.parameters), len(program.inputs), len(program.switches)
+    content = repr(((*data, len(program.outputs), program.initial_states), program.flows))
+    try:
+        return load(content, SYMBOL, lambda: _source(program))
+    except TooSlow as error:
+        raise NoCompiler(f"{error}; {_longest(program)}") from None
+
+
+def _longest(program: Program) -> str:
+    """Say where most of the work of a model is."""
+    flows = (
+        (text, f"the flow of {state} in mode {mode.name}")
+        for mode in program.modes
+        for state, text in zip(mode.states, mode.flow_texts, strict=True)
+    )
+    guards = ((edge.text, f"the guard of {edge.name}") for mode in program.modes for edge in mode.edges)
+    text, where = max((*flows, *guards), key=lambda pair: len(pair[0]), default=("", "none"))
+    return f"the longest expression is {where}, with {len(text):,} characters"
+
+
+def _source(program: Program) -> list[str]:
+    from hsdsl.backends.c import model_parts  # what is compiled already needs none
+
+    return model_parts(program, limits.cores())
