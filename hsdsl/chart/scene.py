@@ -58,7 +58,7 @@ class Scene:
         block: int = 0,
         states: Sequence[str] = (),
         samples: int = 2000,
-        clearance: float = 1e-4,
+        clearance: float | None = None,
         digits: int = DIGITS,
         exact: Execution | None = None,
         until: float | None = None,
@@ -73,8 +73,8 @@ class Scene:
             The states whose error is taken; all unless given.
         samples : int
             The number of sample times.
-        clearance : float
-            Samples nearer than this to an exact jump are left out of the error, in the unit of time.
+        clearance : float, optional
+            Samples nearer than this to an exact jump are left out of the error; 1e-4, or 1e-4 of a run shorter than 1.
         digits : int
             Of a refined reference, 4 to 14; errors below its last digit mean nothing.
         exact : Execution, optional
@@ -82,7 +82,7 @@ class Scene:
         until : float, optional
             The end of the samples, where it is not the exact execution's own: one may end before a run is to end.
 
-        Raises UsageError: an unknown state, fewer than two samples, or no reference.
+        Raises UsageError: an unknown state, fewer than two samples, none clear of jumps, or no reference.
         """
         if samples < 2:
             raise UsageError(f"a chart takes at least 2 samples, not {samples}")
@@ -98,6 +98,10 @@ class Scene:
         grid = np.linspace(start, end, samples)
         jumps = np.array([tr.time for tr in exact.transitions], dtype=float)
         near = np.abs(grid[:, None] - jumps[None, :]).min(axis=1) if len(jumps) else np.full(samples, np.inf)
+        clearance = 1e-4 * min(1.0, end) if clearance is None else clearance
+        clear = (near > clearance) & (grid <= end - clearance)
+        if not clear.any():
+            raise UsageError(f"no sample is farther than {clearance:g} from a jump and the end", "lower --clearance")
         values, modes = sampled(exact, grid, chosen)
         return Scene(
             Path(model.program.path).stem + (f"-{block}" if block else ""),
@@ -106,7 +110,7 @@ class Scene:
             exact,
             chosen,
             grid,
-            (near > clearance) & (grid <= end - clearance),
+            clear,
             values,
             modes(),
             _countable(exact, jumps, end - clearance),

@@ -32,7 +32,10 @@ def chart(
     against: Annotated[str | None, option("A,B", PEERS_HELP)] = None,
     states: Annotated[str | None, option("A,B", "Take the error of these states only.")] = None,
     samples: Annotated[int, option("N", "At how many samples the error is taken.")] = 2000,
-    clearance: Annotated[float, option("DT", "Samples nearer than this to an exact jump do not count.")] = 1e-4,
+    clearance: Annotated[
+        float | None,
+        option("DT", "Samples nearer than this to an exact jump do not count; else 1e-4, or 1e-4 of a run below 1."),
+    ] = None,
     digits: Annotated[int, option("N", "Digits of the reference where no exact execution is known.")] = 8,
     rounds: Annotated[int, option("N", "Timed turns, after one that warms up.")] = 5,
     patience: Annotated[

@@ -51,6 +51,7 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
         called(sweep.manifest.title, sweep.manifest.model),
         sweep.manifest.units.get(column.rpartition(".")[2]),
     )
+    unit = sweep.manifest.units.get("t") if column.endswith(".time") else unit
     label = f"{column} [{unit}]" if unit else column
     axes = [_axis(sweep, name) for name in names]
     if over:
@@ -58,6 +59,9 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
         return
     if listed:
         values, where = _dots(sweep, column, tail)
+        if not len(values):
+            hint = "draw whole runs with --tail 1" if tail < 1 else ""
+            raise UsageError(f"--of {column}: there is none in the last {tail:g} of each run", hint)
         plots.plot_dots(path, axes[0], plots.Quantity(label, values), where, title)
         return
     quantity = plots.Quantity(label, _numbers(sweep, column))

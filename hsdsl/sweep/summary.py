@@ -38,7 +38,8 @@ def summary(sweep: Sweep) -> str:
     share += "" if sweep.complete else "; the command that made it goes on"
     stops = "stops  " + ", ".join(f"{count:,} {reason}" for reason, count in sweep.reasons.items())
     title = visible(called(manifest.title, manifest.model))
-    return "\n".join([title, *(f"  {text}" for text in _described(manifest)), share, stops, *_ranges(sweep)])
+    described = (f"  {text}" for text in _described(manifest))
+    return "\n".join([title, *described, share, stops, *_failures(sweep), *_ranges(sweep)])
 
 
 def _described(manifest: Manifest) -> Iterator[str]:
@@ -49,6 +50,18 @@ def _described(manifest: Manifest) -> Iterator[str]:
         yield f"{each.name}: {each.distribution}({', '.join(f'{a:.6g}' for a in each.arguments)})"
     if variation.draws:
         yield f"{variation.random:,} draws with seed {variation.seed}"
+
+
+def _failures(sweep: Sweep) -> Iterator[str]:
+    """The first message of each reason why runs did not get to their end."""
+    messages: dict[str, str] = {}
+    for table in sweep.batches(["stop", "message"]):
+        for reason, message in zip(*(table.column(k).to_pylist() for k in range(2)), strict=True):
+            if message is not None:
+                messages.setdefault(reason, message)
+    for reason, message in messages.items():
+        more = ", the first of them" if sweep.reasons[reason] > 1 else ""
+        yield f"  {reason}{more}: {visible(message)}"
 
 
 def _ranges(sweep: Sweep) -> Iterator[str]:

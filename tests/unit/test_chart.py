@@ -23,6 +23,7 @@ from hsdsl.chart.result import Attempt, Result, Tool
 from hsdsl.chart.rows import COLUMNS, as_csv
 from hsdsl.chart.stopwatch import race
 from hsdsl.chart.translation import as_function, in_floats, translate
+from hsdsl.errors import UsageError
 from hsdsl.functions import FUNCTIONS
 
 MODELS = Path(hsdsl.__file__).parent.parent / "models"
@@ -101,6 +102,23 @@ def test_another_mode_is_wrong():
     modes = scene.exact_modes.copy()
     modes[modes == "D3"] = "D0"
     assert judge(scene, exactly(scene, modes=modes)).why.startswith("another mode at")
+
+
+FAST = """hsdsl: 1
+modes: {a: {flow: {x: 1}, transitions: [{when: x >= 1e-5, to: b}]}, b: {flow: {x: -1}}}
+initial: {mode: a, x: 0}
+experiment: {until: 3e-5}
+"""
+
+
+def test_runs_of_microseconds_have_samples_clear_of_jumps():
+    """The time around jumps that does not count is a part of a short run."""
+    model = hsdsl.loads(FAST)
+    exact = model.simulate()
+    scene = Scene.of(model, exact=exact, samples=101)
+    assert scene.clear.sum() == 100 and judge(scene, scene.result(exact)).verdict == "right"
+    with pytest.raises(UsageError, match=r"no sample is farther than 0.0001 from a jump and the end"):
+        Scene.of(model, exact=exact, clearance=1e-4)
 
 
 def test_past_a_zeno_point_transitions_are_not_counted():

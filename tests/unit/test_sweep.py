@@ -242,6 +242,7 @@ def test_failures_are_rows_with_their_reason(model, tmp_path, engine):
     assert rows[3]["sample.time"] == [0.0] and rows[0]["initial.v"] == 5
     limit = model.simulate(parameters={"stop": 5}, max_transitions=2).stop.message
     assert rows[4]["message"] == limit and len(rows[4]["transition.time"]) == rows[4]["transitions"] == 2
+    assert "  refused, the first of them: parameter g = -1 is beyond its minimum 0" in found.summary
     assert found.reasons == {"refused": 2, "until": 2, "left_domain": 1, "transition_limit": 1}
 
 
@@ -347,6 +348,10 @@ def test_pictures_that_cannot_be_drawn_are_refused(model, tmp_path):
     ):
         with pytest.raises(UsageError, match=sentence):
             found.plot(tmp_path / "p.png", of, tail=tail)
+    with pytest.raises(UsageError, match=r"--of before.x: there is none in the last 0.001 of each run"):
+        model.sweep({"c": [0.8]}, tmp_path / "t", processes=1, record="transitions").plot(
+            tmp_path / "p.png", "before.x", tail=0.001
+        )
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ RULES: dict[str, Rule] = {
     "HS515": Rule("not-lipschitz", regularity.not_lipschitz),
     "HS517": Rule("degenerate-surface", tangency.degenerate_surface),
     "HS601": Rule("unknown-unit", units.unknown_unit),
-    "HS602": Rule("inconsistent-units", units.misfits("sum")),
+    "HS602": Rule("inconsistent-units", units.misfits("sum", units.CONVERT)),
     "HS603": Rule("argument-units", units.misfits("argument", units.PLAIN)),
     "HS604": Rule("flow-units", units.flow_units),
     "HS605": Rule("value-units", units.value_units),

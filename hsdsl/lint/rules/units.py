@@ -9,6 +9,7 @@ from hsdsl.lint.subject import Subject
 from hsdsl.lint.units.unit import Unit, names_like
 from hsdsl.names import closest, shown
 
+CONVERT = "correct it, or give a factor that converts a name and a unit"
 PLAIN = "divide by something in the same unit, or give the factor a name and its unit"
 _VALUES = {
     "reset": "the new value of '{}'",

@@ -1,7 +1,8 @@
 """The unit of an expression, from those of its names, and what does not fit on the way.
 
 A number by itself takes the expected unit: `x >= 14` is right in metres. In a product it is a plain factor: `2*x` is in
-metres too. A name without a unit has an unknown one, and so has every expression with it.
+metres too. A name without a unit has an unknown one, and so has every expression with it. Zero has any unit, also as a
+factor.
 """
 
 from __future__ import annotations
@@ -59,7 +60,7 @@ class Walk:
         """The unit of a number, or of the sides of a condition."""
         match tree:
             case Number():
-                return "any"
+                return "any" if tree.value else "unknown"
             case Name():
                 return "any" if tree.name in CONSTANTS else self.unit_of(tree.name)
             case Negative():
