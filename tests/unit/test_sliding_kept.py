@@ -90,3 +90,10 @@ def test_transitions_that_share_a_surface_are_all_made_while_sliding():
         ("late", 2, ("late_b",)),
         ("early", 4, ()),
     ]
+
+
+def test_a_kink_of_an_input_does_not_divide_sliding():
+    inputs = "inputs: {u: {times: [0, 1, 2], values: [0, 0.1, 0], hold: linear}}\n"
+    text = SWITCHED.replace("modes:", inputs + "modes:").replace("x: k + 0.5", "x: k + 0.5 + u")
+    run = hsdsl.loads(text).simulate(completion="auto")
+    assert run.verdict.reasons == ("sliding between down and up from t = 0.6 to t = 3",)

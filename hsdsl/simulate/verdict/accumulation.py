@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import accumulate, pairwise
 
+from hsdsl.arithmetic import Number
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.run_view import RunView
@@ -17,10 +18,15 @@ from hsdsl.simulate.verdict.run_view import RunView
 def slidings(run: RunView) -> Iterator[str]:
     """Say where the run slid on a surface that two modes press on: the theorem knows no such motion."""
     modes = {mode.name: mode.slides for mode in run.problem.program.modes if mode.slides}
+    spans: list[tuple[str, Number, Number]] = []
     for arc in run.flows if modes else ():
         if arc.mode in modes:
-            between, start, end = " and ".join(modes[arc.mode]), run.times[arc.first], run.times[arc.last]
-            yield f"sliding between {between} from t = {show(start)} to t = {show(end)}"
+            start, end = run.times[arc.first], run.times[arc.last]
+            if spans and spans[-1][::2] == (arc.mode, start):  # a jump or a kink of an input ended the arc before
+                start = spans.pop()[1]
+            spans.append((arc.mode, start, end))
+    for mode, start, end in spans:
+        yield f"sliding between {' and '.join(modes[mode])} from t = {show(start)} to t = {show(end)}"
 
 
 def accumulations(run: RunView) -> Iterator[str]:
