@@ -147,9 +147,9 @@ def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:
 
 def _same(one: Edge, other: Edge) -> bool:
     """Whether two edges do the same: of two that lead back to their own modes the first counts."""
-
-    def does(edge: Edge) -> tuple:
-        end = None if edge.target == edge.source else edge.target
-        return end, edge.condition, edge.priority, edge.target_states, edge.reset
-
-    return does(one) == does(other) and sp.expand(one.surface.residual - other.surface.residual) == 0
+    back = one.target == one.source and other.target == other.source
+    keys = ("condition", "priority", "target_states", "reset")
+    alike = all(getattr(one, key) == getattr(other, key) for key in keys)
+    if not alike or not (back or one.target == other.target):
+        return False
+    return sp.expand(one.surface.residual - other.surface.residual) == 0

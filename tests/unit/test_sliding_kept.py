@@ -76,7 +76,7 @@ modes:
     flow: {x: -1, n: 0, c: 1}
     transitions:
       - {when: x <= 0, to: a}
-      - {name: early, when: c >= 2, if: n > 0.5, to: b, reset: {n: 0, c: 0, x: -1}}
+      - {name: early, when: c >= 2, if: n > 0.5, to: a, reset: {n: 0, c: 0, x: -1}}
       - {name: late, when: c >= 2, if: n < 0.5, to: b, reset: {n: 1, c: 0, x: 1.5}}
 initial: {mode: a, x: -0.5, n: 0, c: 0}
 experiment: {until: 5, completion: auto}
