@@ -81,7 +81,7 @@ def define_lets(symbols: SymbolTable) -> None:
     base = symbols.scope(("time", "parameters", "inputs", "states", "unknowns"), "").values
     refused: Meanings = {}
     earlier: Meanings = {}
-    scope = Scope(ChainMap(refused, earlier, base, symbols.recorded))  # pyright: ignore[reportArgumentType]
+    scope = Scope(ChainMap(refused, earlier, base, symbols.above))  # pyright: ignore[reportArgumentType]
     for name in definition_order(symbols.document.let, "`let` names", refused):
         symbols.values[name] = earlier[name] = symbols.number(symbols.document.let[name], scope)
     if solve is not None:

@@ -161,8 +161,16 @@ class SymbolTable:
     def elsewhere(self) -> Meanings:
         """Refusals of outputs, and of those names for modes that do not define them."""
         hint = "give it to this mode too, or define it once in the `let` of the whole model"
-        inner = {name: Refusal("HS111", f"'{name}' is a `let` name of other modes", hint) for name in self.inner_lets}
-        return self.recorded | inner
+        return self.recorded | self._of_modes("'{}' is a `let` name of other modes", hint)
+
+    @cached_property
+    def above(self) -> Meanings:
+        """Refusals of outputs, and of those names for what all modes share."""
+        message = "'{}' is a `let` name of modes, and what all modes share cannot use it"
+        return self.recorded | self._of_modes(message, "write this in those modes")
+
+    def _of_modes(self, message: str, hint: str) -> Meanings:
+        return {name: Refusal("HS111", message.format(name), hint) for name in self.inner_lets}
 
     def without_states(self, mode: ModeDocument) -> bool:
         """Whether a mode has the states it is entered with, and none of its own."""

@@ -178,6 +178,8 @@ class Scope:
             return unit(name)
         if name in NAMES:
             return NAMES[name]
+        if owned := [n for n in known if n.rpartition(".")[2] == name and n != name]:
+            return f"write {' or '.join(owned[:2])}: names of parts have the part in front"
         near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS])
         more = "; a unit belongs under `units`" if unit(name) else ""
         return (near or "define it, under `parameters`, `inputs` or `let`") + more

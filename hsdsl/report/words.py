@@ -138,7 +138,8 @@ def times(values: Sequence[Any], digits: int) -> list[str]:
     largest = max((abs(t) for t in finite), default=0.0)
     if largest >= 1e9 or 0.0 < largest < 1e-3:
         return [f"{float(t):.{digits}g}" for t in values]
-    places = max(0, digits - len(str(int(largest))))
+    zeros = max(0, -math.floor(math.log10(largest)) - 1) if largest else 0  # behind the point, before its digits
+    places = max(0, digits - len(str(int(largest)))) + zeros
     return [f"{float(t):.{places}f}" for t in values]
 
 

@@ -116,6 +116,10 @@ def test_a_let_of_another_mode():
     (fault,) = raised.value.diagnostics
     assert fault.message == "'p' is a `let` name of other modes" and "`let` of the whole model" in str(fault.hint)
     assert str(raised.value) == f"m.yaml:6:15: error HS111: {fault.message} ({fault.hint})"
+    with pytest.raises(ModelError) as raised:
+        model("  B: {flow: {y: 1}, let: {p: y}}\n", "let: {q: 2*p}\noutputs: {p: p}\n")
+    (fault,) = raised.value.diagnostics
+    assert fault.message == "'p' is a `let` name of modes, and what all modes share cannot use it"
 
 
 def test_a_misspelt_let_of_a_mode_in_an_output():

@@ -310,6 +310,14 @@ def test_what_is_refused(what):
     assert len(error.value.diagnostics) == 1
 
 
+def test_connections_name_states_by_their_part():
+    text = "automata: {a: {inputs: [u], modes: {m: {flow: {x: u}}}}}\n"
+    text += "system: {p: {automaton: a, initial: {x: 0}, inputs: {u: -x}}}"
+    with pytest.raises(hsdsl.ModelError) as error:
+        hsdsl.loads(HEAD + text)
+    assert error.value.diagnostics[0].hint == "write p.x: names of parts have the part in front"
+
+
 def test_an_automaton_of_one_instance_may_listen_to_its_other_instances():
     text = (
         "automata: {a: {modes: {m: {flow: {x: 1}, transitions: [{on: a.go, reset: {x: -1}}, "

@@ -18,6 +18,7 @@ from hsdsl.execution import Verdict
 from hsdsl.report.alike import condensed
 from hsdsl.report.html import html
 from hsdsl.report.summary import summary
+from hsdsl.report.words import times
 
 FIFTY = decimals.context_of(50)
 
@@ -224,6 +225,8 @@ def test_summary_fits_its_width_in_ascii(make, width):
 def test_times_of_very_different_size_keep_their_digits():
     run = hand_made.bouncing_ball(height=5e-12)
     assert [line.split()[1] for line in _shown(run)[5:7]] == [f"{t.time:.10g}" for t in run.transitions[:2]]
+    assert times([0.05, 0.000123456789123, 0.0023], 10) == ["0.0500000000", "0.0001234568", "0.0023000000"]
+    assert times([0.000123456789123, 0.0023], 10) == ["0.00012345679", "0.00230000000"]
 
 
 def test_html_escapes_and_lists():

@@ -63,7 +63,7 @@ def unused_state(subject: Subject) -> Iterator[Finding]:
         one = len(unused) == 1
         message = f"nothing depends on the state{'s' * (not one)} {listed(unused)}"
         pronoun, purpose = ("it", "a purpose") if one else ("them", "purposes")
-        hint = f"remove {pronoun}, use {pronoun}, or give {pronoun} {purpose} under `outputs`"
+        hint = f"remove {pronoun}, use {pronoun}, or give {pronoun} {purpose} under `outputs`, by another name"
         yield Finding(unused[0].place.span, message, hint)
 
 

@@ -23,7 +23,7 @@ def idle_state(subject: Subject) -> Iterator[Finding]:
     for name, key in subject.states.items() if influence.observed else ():
         if name in influence.read and name not in influence.needed:
             message = f"the state '{name}' influences no guard, condition, wall or output"
-            yield Finding(key.place.span, message, "remove it, or give it a purpose under `outputs`")
+            yield Finding(key.place.span, message, "remove it, or give it a purpose under `outputs`, by another name")
 
 
 def idle_parameter(subject: Subject) -> Iterator[Finding]:
