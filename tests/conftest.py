@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import sys
 import threading
@@ -12,10 +13,18 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
+from hsdsl import cache
+
 ROOM = 4 << 30  # bytes of addresses that a test may take, and each process that it starts; memory in use is far less
 
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
+cache.MOST_ENTRIES = 1 << 20  # tests make thousands: to look for the oldest of 500 takes longer than to write one
+
+
+def pytest_collection_finish() -> None:
+    """Spare the collector of garbage what stays: thousands of tests and the libraries that they import."""
+    gc.freeze()
 
 
 def pytest_runtest_setup() -> None:
@@ -56,14 +65,12 @@ def compiled_loop() -> Path | None:
 
 @pytest.fixture
 def with_loop(compiled_loop: Path | None) -> Callable[[], None]:
-    """Put the compiled loop into the cache that the test has."""
+    """Put the compiled loop into the cache that the test has, as if the compiler of the test had made it."""
 
     def put() -> None:
-        from hsdsl.cache import keep
         from hsdsl.runtime import library
 
         if compiled_loop is not None:
-            content = compiled_loop.read_bytes()
-            keep(library.KIND, compiled_loop.parent.name, ".so", lambda target: target.write_bytes(content) and None)
+            library._keep(library._key(library.LOOP[0], library.find_compiler()), compiled_loop)
 
     return put

@@ -57,13 +57,21 @@ def _run(command: list[str]) -> None:
     assert not done.stderr
 
 
-def built(folder: Path, compiler: list[str], *options: str, main: str = "main.c") -> Path:
-    """Compile an export with all warnings as errors."""
-    program, command = folder / "model", [*compiler, "-O1", *WARNINGS, *EXACT_FLAGS, *options]
-    sources = [str(folder / name) for name in (main, *COMPILED) if name != "runtime/hs.c"]
-    includes = (f"-I{folder}", f"-I{folder / 'runtime'}")
+def objects(folder: Path, compiler: list[str], *options: str, main: str = "") -> list[Path]:
+    """Compile the files of an export, and a main one where it is named, with all warnings as errors."""
+    command = [*compiler, "-O1", *WARNINGS, *EXACT_FLAGS, *options]
+    sources = [name for name in (main, *COMPILED) if name not in ("", "runtime/hs.c")]
     assert all(path.read_bytes() == (RUNTIME / path.name).read_bytes() for path in (folder / "runtime").iterdir())
-    _run([*command, *includes, "-o", str(program), *sources, runtime_object(tuple(command)), "-lm"])
+    made = [(folder / name).with_suffix(".o") for name in sources]
+    for name, target in zip(sources, made, strict=True):
+        _run([*command, f"-I{folder}", f"-I{folder / 'runtime'}", "-c", "-o", str(target), str(folder / name)])
+    return [*made, Path(runtime_object(tuple(command)))]
+
+
+def built(folder: Path, compiler: list[str], *options: str, main: str = "main.c") -> Path:
+    """Compile and link an export."""
+    program = folder / "model"
+    _run([*compiler, "-o", str(program), *map(str, objects(folder, compiler, *options, main=main)), "-lm"])
     return program
 
 

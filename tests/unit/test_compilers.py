@@ -50,9 +50,9 @@ WRONG = {
 
 @pytest.fixture(autouse=True)
 def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Nothing is compiled, nothing has been printed, and a compiler has a second."""
+    """Nothing is compiled, nothing has been printed, and a compiler has the fifth of a second."""
     kernel._runtime.cache_clear()
-    monkeypatch.setattr(process, "PATIENCE", 1.0)
+    monkeypatch.setattr(process, "PATIENCE", 0.2)
     monkeypatch.setattr(compiler, "TRIAL", 60.0)  # what compiles may take long where much else runs
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
@@ -90,7 +90,7 @@ def assert_python_runs_with_one_remark(printed: str, capsys: pytest.CaptureFixtu
 def test_a_faulty_compiler(fault: str, use, capsys, monkeypatch, tmp_path: Path) -> None:
     script, printed = FAULTY[fault]
     if printed == "does not end":
-        monkeypatch.setattr(compiler, "TRIAL", 1.0)
+        monkeypatch.setattr(compiler, "TRIAL", 0.3)
     use(script)
     assert_python_runs_with_one_remark(printed, capsys)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith("hsdsl-")]
@@ -109,7 +109,7 @@ def test_a_file_that_is_no_program(use, capsys) -> None:
 
 
 def test_all_that_a_compiler_started_ends_with_it(use, monkeypatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(compiler, "TRIAL", 1.0)
+    monkeypatch.setattr(compiler, "TRIAL", 0.3)
     use(f"sleep 600 & echo $! >> {tmp_path}/children; wait")
     assert hsdsl.load(MODEL).simulate().engine == "python"
     for child in (tmp_path / "children").read_text().split():
@@ -122,21 +122,23 @@ def test_all_that_a_compiler_started_ends_with_it(use, monkeypatch, tmp_path: Pa
 
 
 @needs_compiler
-def test_arguments_and_blanks_in_cc(use, monkeypatch, tmp_path: Path) -> None:
+def test_arguments_and_blanks_in_cc(with_loop, monkeypatch, tmp_path: Path) -> None:
     folder = tmp_path / "my tools"
     folder.mkdir()
     real = shutil.which(" ".join(compiler.find_compiler().command))
     (folder / "my cc").symlink_to(str(real))
     for text in (str(folder / "my cc"), f"'{folder}/my cc' -O1 '-DA=\"a b\"'"):
         monkeypatch.setenv("CC", text)
+        with_loop()
         assert hsdsl.load(MODEL).simulate(until=0.1).engine == "c"
 
 
 @needs_compiler
-def test_a_compiler_that_is_only_slow_is_waited_for(use, monkeypatch) -> None:
+def test_a_compiler_that_is_only_slow_is_waited_for(use, with_loop, monkeypatch) -> None:
     real = compiler.find_compiler().command[0]
     monkeypatch.setattr(process, "PATIENCE", 0.4)
     use(f'case "$*" in *model.c*) sleep 1;; esac\nexec {real} "$@"')
+    with_loop()
     assert hsdsl.load(MODEL).simulate(until=0.1).engine == "c"
 
 
@@ -144,13 +146,13 @@ def test_a_compiler_that_is_only_slow_is_waited_for(use, monkeypatch) -> None:
 def test_a_compiler_has_so_much_time(use, capsys) -> None:
     real = compiler.find_compiler().command[0]
     use(f'case "$*" in *model.c*) sleep 600;; esac\nexec {real} "$@"')
-    assert hsdsl.load(MODEL, limits=Limits(compile=2)).simulate(until=0.1).engine == "python"
+    assert hsdsl.load(MODEL, limits=Limits(compile=0.5)).simulate(until=0.1).engine == "python"
     printed = capsys.readouterr().err
-    assert "--limit compile=20" in printed and "the longest expression is the flow of T in mode" in printed
+    assert "--limit compile=5 " in printed and "the longest expression is the flow of T in mode" in printed
 
 
 @needs_compiler
-def test_what_takes_too_long_is_tried_once(use, capsys, tmp_path: Path) -> None:
+def test_what_takes_too_long_is_tried_once(use, with_loop, capsys, tmp_path: Path) -> None:
     """It is tried again with more time, by another compiler, and where it is to be forgotten."""
     real, tried = compiler.find_compiler().command[0], tmp_path / "tried"
     slow = f'if grep -qs hs_the_model -- "$@"; then echo once >> {tried}; sleep 600; fi\nexec {real} "$@"'
@@ -159,19 +161,20 @@ def test_what_takes_too_long_is_tried_once(use, capsys, tmp_path: Path) -> None:
     def runs(seconds: float) -> int:
         """How often the compiler has been tried, after another run."""
         engines._warn_once.cache_clear()
+        with_loop()
         assert hsdsl.load(MODEL, limits=Limits(compile=seconds)).simulate(until=0.1).engine == "python"
         return len(tried.read_text().split())
 
-    assert [runs(2), runs(2), runs(1.5), runs(2.5), runs(2)] == [1, 1, 1, 2, 2]
+    assert [runs(0.6), runs(0.6), runs(0.5), runs(0.7), runs(0.6)] == [1, 1, 1, 2, 2]
     printed = capsys.readouterr().err.splitlines()
-    assert len(printed) == 5 and "took more than 2 s before" in printed[1]
-    assert "--limit compile=20" in printed[1] and "hsdsl doctor --forget" in printed[1]
+    assert len(printed) == 5 and "took more than 0.6 s before" in printed[1]
+    assert "--limit compile=6 " in printed[1] and "hsdsl doctor --forget" in printed[1]
     assert obey(["doctor", "--json"]) == 0
     assert '"given_up": 1' in capsys.readouterr().out
     assert obey(["doctor", "--forget"]) == 0
-    assert runs(2) == 3
+    assert runs(0.6) == 3
     use(slow + "\n# another one")
-    assert runs(2) == 4
+    assert runs(0.6) == 4
 
 
 @needs_compiler
