@@ -20,7 +20,7 @@ experiment: {until: 1.5}
 KINKED = SPIN.replace("y: -x}", "y: '-max(x, -5)'}")
 
 
-@pytest.mark.parametrize("digits", [16, 30, 50, 400])
+@pytest.mark.parametrize("digits", [16, 30, 100])
 def test_the_default_tolerance_follows(digits):
     run = hsdsl.loads(SPIN).simulate(precision=digits)
     with mp.workdps(digits + 10):
