@@ -116,10 +116,11 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     parameters = define_parameters(symbols)
     inputs = define_inputs(symbols)
     parts: tuple[Part, ...] = ()
+    of_parts: dict[str, str] = {}
     if isinstance(document, SystemDocument) and (document.system or document.automata):
         whole = Parts(symbols, document)
         parameters, parts = parameters + whole.parameters, whole.parts
-        modes, scene, initial = whole.modes, whole.scene, whole.initial
+        modes, scene, initial, of_parts = whole.modes, whole.scene, whole.initial, whole.units
     else:
         define_lets(symbols)
         outputs = elaborate_outputs(symbols)
@@ -128,7 +129,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
         initial = elaborate_initial(symbols)
     experiment = elaborate_experiment(symbols)
-    units = elaborate_units(symbols)
+    units = of_parts | elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)
     symbols.resolver.findings.raise_if_any()
     return HybridSystem(
@@ -136,7 +137,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         digest=symbols.files.with_data(symbols.data).digest,
         title=symbols.text(document.title),
         source=symbols.text(document.source),
-        parameters=parameters,
+        parameters=tuple(replace(parameter, unit=units.get(parameter.name)) for parameter in parameters),
         inputs=inputs,
         modes=modes,
         outputs=symbols.all_outputs,

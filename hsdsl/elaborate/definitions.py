@@ -10,7 +10,7 @@ from hsdsl.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.expression.scope import Scope, Value, symbol
 from hsdsl.names import did_you_mean, shown
-from hsdsl.schema import ModelDocument, ParameterEntry
+from hsdsl.schema import AutomatonDocument, ModelDocument, ParameterEntry
 from hsdsl.source import Scalar
 from hsdsl.system import Definition, Parameter
 
@@ -41,7 +41,7 @@ def define_parameter(
 ) -> tuple[Value | None, Parameter | None]:
     """What the name of a parameter means, and the parameter; ``override`` is its value, read in the scope ``outside``.
 
-    Both are None where its value is broken.
+    Both are None where its value is broken. The parameter has no unit yet.
     """
     entry = given if isinstance(given, ParameterEntry) else ParameterEntry.model_construct(value=given)
     scalar = entry.value if override is None else override
@@ -51,8 +51,7 @@ def define_parameter(
         return None, None
     _check_bounds(symbols, name, scalar, value, *bounds)
     least, most = (None if bound is None else bound.expr for bound in bounds)
-    unit = symbols.text(entry.unit) or symbols.text(symbols.document.units.get(name))  # pyright: ignore[reportArgumentType]
-    parameter = Parameter(name, value.expr, scalar.value, unit, least, most, symbols.text(entry.about))
+    parameter = Parameter(name, value.expr, scalar.value, None, least, most, symbols.text(entry.about))
     return Value(symbol(name), value.number), parameter
 
 
@@ -104,16 +103,20 @@ _OF_TIME: dict[str, str] = dict.fromkeys(("time", "tau"), "the time is t: write 
 def elaborate_units(symbols: SymbolTable) -> dict[str, str]:
     """The unit of each name that has one."""
     known = [name for name, kind in symbols.names.items() if kind not in ("let", "functions")]
-    known += [*symbols.all_outputs, "t"]
+    return units_of(symbols, symbols.document, [*known, *symbols.all_outputs, "t"])
+
+
+def units_of(symbols: SymbolTable, document: ModelDocument | AutomatonDocument, known: list[str]) -> dict[str, str]:
+    """The units of names of a model or of an automaton, which has those ``known``."""
     units: dict[str, str] = {}
-    for key, scalar in symbols.document.units.items():
+    for key, scalar in document.units.items():
         if key not in known:
             message = f"'{shown(key)}' is neither a state nor a parameter, an input or an output"
             symbols.report(key.place, "HS313", message, _OF_TIME.get(key.lower()) or did_you_mean(key, known))
         unit = symbols.text(scalar)
         if unit is not None:
             units[str(key)] = unit
-    for key, entry in symbols.document.parameters.items():
+    for key, entry in document.parameters.items():
         unit = symbols.text(entry.unit) if isinstance(entry, ParameterEntry) else None
         if unit is None:
             continue

@@ -400,6 +400,7 @@ class AutomatonDocument(Document):
     inputs: Items[ArgumentName] = items("Names that each instance connects to an expression.", ["beside"])
     let: Table[Expression] = mapping("Named subexpressions.", {"gain": "wall*(beside - T)"})
     outputs: Table[Expression] = mapping("Name: expression, recorded as `instance.name`.", {"energy": "v**2/2"})
+    units: OpenTable[Text] = mapping("Unit of a state, parameter, input or output of the instances.", {"v": "m/s"})
     modes: ModeTable[PartModeDocument] = required("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
 
 

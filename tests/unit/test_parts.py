@@ -236,6 +236,9 @@ REFUSED = {
         "system: {p: {automaton: a, initial: {mode: m, x: 0}}}\n"
         "let: {total: sum(a.force)}"
     ),
+    "HS313 'v' is neither": "automata: {a: {modes: {m: {flow: {x: 1}}}, units: {v: m}}}\n" + ONE,
+    "HS316 has the unit": "automata: {a: {parameters: {k: {value: 1, unit: m}}, modes: {m: {flow: {x: 1}}}, "
+    "units: {k: s}}}\n" + ONE,
     "HS111 speed": "automata: {a: {modes: {m: {flow: {x: speed}}}}}\n" + ONE,
     "HS111 q.x": "automata: {a: {modes: {m: {flow: {x: q.x}}}}}\n" + ONE,
     "HS353 fire together": (
@@ -308,6 +311,30 @@ def test_what_is_refused(what):
     found = [d for d in error.value.diagnostics if d.code == code and words in d.message]
     assert found and found[0].span is not None
     assert len(error.value.diagnostics) == 1
+
+
+UNITS = """automata:
+  a:
+    parameters: {k: {value: 2, unit: 1/s}, m: 1}
+    inputs: [u]
+    outputs: {p: k*x}
+    modes: {m: {flow: {x: u, y: 1}}}
+    units: {x: m, m: kg, u: m/s, p: m/s}
+system:
+  one: {automaton: a, initial: {x: 0, y: 0}, inputs: {u: 1}}
+  other: {automaton: a, count: 2, initial: {x: 0, y: 0}, inputs: {u: 1}}
+units: {one.x: km}
+"""
+
+
+def test_instances_have_the_units_of_their_automaton():
+    model = hsdsl.loads(HEAD + UNITS)
+    assert model.program.units == {
+        f"{part}.{name}": unit
+        for part in ("one", "other[1]", "other[2]")
+        for name, unit in {"x": "m", "m": "kg", "u": "m/s", "p": "m/s", "k": "1/s"}.items()
+    } | {"one.x": "km"}
+    assert [(p.name, p.unit) for p in model.system.parameters][:2] == [("one.k", "1/s"), ("one.m", "kg")]
 
 
 def test_connections_name_states_by_their_part():

@@ -4,10 +4,11 @@
 from __future__ import annotations
 
 from collections import ChainMap
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from hsdsl.elaborate.definitions import define_parameter
+from hsdsl.elaborate.definitions import define_parameter, units_of
 from hsdsl.elaborate.parts.composition import FINAL, MODE, Composition
 from hsdsl.elaborate.parts.instances import Instance, roster_of
 from hsdsl.elaborate.parts.names import Board, Names, unknowns_of
@@ -36,6 +37,8 @@ class Parts:
     parts : tuple of Part
     modes : tuple of Mode
         None of them where something is wrong, which is reported.
+    units : dict
+        The units of names of instances that their automata give.
     """
 
     def __init__(self, symbols: SymbolTable, document: SystemDocument) -> None:
@@ -62,8 +65,18 @@ class Parts:
         self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
         self.parts = tuple(map(self._with_timer, self.parts))
         self.initial = self._initial()
+        self.units = dict(self._units())
         if not symbols.resolver.findings.diagnostics:  # else what reads them may not have been looked at
             self.board.check_ends()
+
+    def _units(self) -> Iterator[tuple[str, str]]:
+        for group in self.roster.automata.values():
+            kind = group[0].kind if group else None
+            if kind is not None:
+                outputs = (name for table in (kind, *kind.modes.values()) for name in table.outputs)
+                own = [*group[0].states, *map(str, (*kind.parameters, *kind.inputs, *outputs))]
+                units = units_of(self.symbols, kind, own)
+                yield from ((one.full(name), unit) for one in group for name, unit in units.items())
 
     def _solve(self, document: SystemDocument) -> None:
         """Solve the file's equations, in which definitions of parts have the unknowns as symbols of their own."""
