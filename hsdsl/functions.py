@@ -11,6 +11,9 @@ two sums of roots is larger can take SymPy for ever.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from typing import Any
+
 import sympy as sp
 
 
@@ -187,6 +190,28 @@ def power(base, exponent):
 def rebuilt(expr, arguments):
     """An expression with other arguments, made as :func:`power` makes powers."""
     return power(*arguments) if expr.is_Pow else expr.func(*arguments)
+
+
+def replaced(expr: Any, mapping: Mapping[Any, Any], done: dict[Any, Any]) -> Any:
+    """Replace symbols, visiting every shared part once; ``done`` is kept between calls with one mapping."""
+    if expr in mapping:
+        return mapping[expr]
+    if not expr.args:
+        return expr
+    if expr not in done:
+        args = tuple(replaced(a, mapping, done) for a in expr.args)
+        done[expr] = expr if args == expr.args else rebuilt(expr, args)
+    return done[expr]
+
+
+def rewritten(expr: Any, change: Callable[[Any], Any], done: dict[Any, Any]) -> Any:
+    """Change every part of an expression behind its own parts, each once; ``done`` is kept as in :func:`replaced`."""
+    if not expr.args:
+        return expr
+    if expr not in done:
+        args = tuple(rewritten(a, change, done) for a in expr.args)
+        done[expr] = change(expr if args == expr.args else rebuilt(expr, args))
+    return done[expr]
 
 
 # name in the language: (SymPy function, fewest arguments, most arguments; None: any number from the fewest up)

@@ -4,14 +4,15 @@
 This is Definition 7 of Burden, Gonzalez, Vasudevan, Bajcsy, Sastry (2013), (J, Gamma, D, U, F, G, R), as the
 language writes it down. `elaborate` makes it from a document; `lower` turns it into a SymPy-free `Program`.
 
-Every state, parameter and input is ``sympy.Symbol(name, real=True)`` with its plain name from the file, and time is
-:data:`TIME`. `let` names and expression inputs have been substituted; a sampled input stays as its symbol.
+The expressions of modes are SymPy objects. Every state, parameter and input is ``sympy.Symbol(name, real=True)`` with
+its plain name from the file, and time is :data:`TIME`. `let` names and expression inputs have been substituted; a
+sampled input stays as its symbol.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Literal
 
@@ -87,6 +88,10 @@ class Surface:
     residual: sp.Expr
     text: str
 
+    def mapped(self, change: Callable[[Any], Any]) -> Surface:
+        """The surface with changed expressions."""
+        return replace(self, left=change(self.left), right=change(self.right), residual=change(self.residual))
+
 
 @dataclass(frozen=True)
 class Event:
@@ -136,6 +141,13 @@ class Edge:
     stays: bool = False
     of_event: tuple[str, ...] = ()
     part: tuple[str, int] | None = None
+
+    def mapped(self, change: Callable[[Any], Any]) -> Edge:
+        """The edge with changed expressions."""
+        condition = None if self.condition is None else change(self.condition)
+        return replace(
+            self, surface=self.surface.mapped(change), condition=condition, reset=tuple(map(change, self.reset))
+        )
 
 
 SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}
@@ -194,6 +206,16 @@ class Mode:
     def surfaces(self) -> tuple[Surface, ...]:
         """The surfaces of all edges, then the walls."""
         return (*(edge.surface for edge in self.edges), *self.walls)
+
+    def mapped(self, change: Callable[[Any], Any]) -> Mode:
+        """The mode with changed expressions, but those of its scene."""
+        return replace(
+            self,
+            flow=tuple(map(change, self.flow)),
+            walls=tuple(wall.mapped(change) for wall in self.walls),
+            edges=tuple(edge.mapped(change) for edge in self.edges),
+            outputs=tuple(None if output is None else change(output) for output in self.outputs),
+        )
 
 
 @dataclass(frozen=True)

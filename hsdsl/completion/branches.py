@@ -14,7 +14,7 @@ from itertools import takewhile
 import sympy as sp
 
 from hsdsl.completion.nearby import Nearby, Point, as_float, drawn, size_at, solved, value_at
-from hsdsl.functions import absolute, maximum, minimum, power, rebuilt, sign
+from hsdsl.functions import absolute, maximum, minimum, power, rewritten, sign
 from hsdsl.system import TIME
 
 KINKED = (absolute, maximum, minimum, sign)
@@ -71,13 +71,7 @@ class _Branch:
 
     def of(self, expr: sp.Basic) -> sp.Basic:
         """The branch of an expression."""
-        if not expr.args:
-            return expr
-        if expr not in self.done:
-            arguments = tuple(map(self.of, expr.args))
-            new = expr if arguments == expr.args else rebuilt(expr, arguments)
-            self.done[expr] = self._chosen(new)
-        return self.done[expr]
+        return rewritten(expr, self._chosen, self.done)
 
     def _chosen(self, expr: sp.Basic) -> sp.Basic:
         if isinstance(expr, (sign, absolute)) and (side := self._side(expr.args[0])):

@@ -11,7 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 from hsdsl.expression.scope import symbol
-from hsdsl.expression.selection import ONE, is_number, placed, whole
+from hsdsl.expression.selection import ONE, is_number, whole
+from hsdsl.functions import replaced
 from hsdsl.parts import numbered, numbers_of, present, product_name
 from hsdsl.system import Edge, HybridSystem, Initial, Mode, Surface
 
@@ -42,7 +43,7 @@ class _ProductMode:
 
     def here(self, expression: Any) -> Any:
         """What an expression is in this product mode."""
-        return None if expression is None else placed(expression, self._known, self._done)
+        return None if expression is None else replaced(expression, self._known, self._done)
 
     def mode(self) -> Mode:
         """The mode."""

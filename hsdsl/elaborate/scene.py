@@ -9,10 +9,9 @@ from hsdsl.elaborate.modes import output_here, output_scope
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, Value
 from hsdsl.source import Scalar
-from hsdsl.system import HybridSystem, Shape
+from hsdsl.system import ZERO, HybridSystem, Shape
 
 Numbers = list[tuple[Scalar | None, Value | None]]  # each with what it means to the whole model; 0 where left out
-_ZERO = 0
 
 
 def elaborate_scene(symbols: SymbolTable, scope: Scope | None = None) -> tuple[tuple[Shape, ...], Numbers]:
@@ -29,7 +28,7 @@ def elaborate_scene(symbols: SymbolTable, scope: Scope | None = None) -> tuple[t
 
 def scene_of(symbols: SymbolTable, numbers: Numbers, scope: Scope) -> tuple:
     """The numbers of a scene in a mode; None for one that it does not have."""
-    found = (_ZERO if s is None else output_here(symbols, s, value, scope) for s, value in numbers)
+    found = (ZERO if s is None else output_here(symbols, s, value, scope) for s, value in numbers)
     return tuple(value.expr if isinstance(value, Value) else value for value in found)
 
 

@@ -142,19 +142,6 @@ def _guarded(expr: Any, safe: Any, guard: Guard, constants: frozenset[Any]) -> A
     return guard(expr, safe) if expr.free_symbols - constants else expr
 
 
-def placed(expr: Any, known: dict[Any, Any], done: dict[Any, Any]) -> Any:
-    """An expression with numbers in the place of symbols, and its selections made where they are known."""
-    expr = sp.sympify(expr)
-    if expr in known:
-        return known[expr]
-    if not expr.args:
-        return expr
-    if expr not in done:
-        args = tuple(placed(a, known, done) for a in expr.args)
-        done[expr] = expr if args == expr.args else rebuilt(expr, args)
-    return done[expr]
-
-
 def is_number(expr: Any, number: int) -> Any:
     """The condition that an expression is a number."""
     return sp.Eq(expr, number)

@@ -16,7 +16,8 @@ from functools import cached_property
 from typing import Any
 
 from hsdsl.expression.scope import symbol
-from hsdsl.expression.selection import placed, whole
+from hsdsl.expression.selection import whole
+from hsdsl.functions import replaced
 from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.analysis.question import SearchRange
 from hsdsl.lint.subject import EdgePart, ModePart, Subject, edge_parts
@@ -128,7 +129,7 @@ class AutomatonSubject(Subject):
         done: dict[Any, Any] = {}
 
         def here(expr: Any) -> Any:
-            return None if expr is None else placed(expr, known, done)
+            return None if expr is None else replaced(expr, known, done)
 
         def side(surface: Surface) -> Surface:
             return Surface(here(surface.left), here(surface.right), here(surface.residual), surface.text)

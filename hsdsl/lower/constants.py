@@ -8,9 +8,9 @@ import sympy as sp
 from hsdsl import program as lowered
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.stack import deep_stack
+from hsdsl.functions import replaced
 from hsdsl.lower.names import Names, number
 from hsdsl.lower.routines import Definition, print_routines
-from hsdsl.lower.straight import replaced
 from hsdsl.system import HybridSystem
 
 

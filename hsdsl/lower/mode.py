@@ -12,11 +12,11 @@ import sympy as sp
 from hsdsl import program as lowered
 from hsdsl.completion import Overlay
 from hsdsl.expression.scope import symbol
-from hsdsl.functions import absolute, below, maximum, rebuilt
+from hsdsl.functions import absolute, below, maximum, rebuilt, replaced
 from hsdsl.lower.names import Names
 from hsdsl.lower.ordering import ordering
 from hsdsl.lower.routines import Definition, print_routines
-from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.lower.straight import Gradient
 from hsdsl.lower.tape import make_tape
 from hsdsl.lower.terms import Terms
 from hsdsl.system import TIME, Edge, Mode

@@ -23,18 +23,6 @@ LARGEST = 80  # nodes of one statement
 WIDEST = 16  # terms or factors of one statement
 
 
-def replaced(expr: sp.Basic, mapping: dict, done: dict) -> sp.Basic:
-    """Replace symbols, visiting every shared part once; ``done`` is kept between calls with one mapping."""
-    if expr in mapping:
-        return mapping[expr]
-    if not expr.args:
-        return expr
-    if expr not in done:
-        args = tuple(replaced(a, mapping, done) for a in expr.args)
-        done[expr] = expr if args == expr.args else rebuilt(expr, args)
-    return done[expr]
-
-
 class Cut:
     """Expressions cut down to statements of bounded size, in the order of computation.
 

@@ -17,11 +17,11 @@ import sympy as sp
 
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import by_constants
-from hsdsl.functions import absolute, atan2, floor, maximum, minimum, rebuilt, sign
+from hsdsl.functions import absolute, atan2, floor, maximum, minimum, replaced, rewritten, sign
 from hsdsl.lower.routines import Definition
-from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.lower.straight import Gradient
 from hsdsl.program import Switch
-from hsdsl.system import TIME, Edge, HybridSystem, Mode, Surface
+from hsdsl.system import TIME, HybridSystem, Mode
 
 _HALF = sp.Rational(1, 2)
 
@@ -47,14 +47,11 @@ class Switches:
 
     def out_of(self, expr: Any) -> Any:
         """Write an expression with switches."""
-        if expr is None or not expr.args:
-            return expr
-        if expr not in self._done:
-            args = tuple(map(self.out_of, expr.args))
-            new = expr if args == expr.args else rebuilt(expr, args)
-            branch = _BRANCHES.get(type(new))
-            self._done[expr] = branch(self, *new.args) if branch and self._of_time(new) else new
-        return self._done[expr]
+        return rewritten(expr, self._changed, self._done)
+
+    def _changed(self, expr: sp.Basic) -> sp.Basic:
+        branch = _BRANCHES.get(type(expr))
+        return branch(self, *expr.args) if branch and self._of_time(expr) else expr
 
     def _of_time(self, expr: sp.Basic) -> bool:
         names = expr.free_symbols
@@ -95,7 +92,7 @@ def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
     inputs = {symbol(i.name): i.hold for i in system.inputs if i.given is None}  # others may be driven from outside
     moving = frozenset({TIME, *(name for name, hold in inputs.items() if hold == "linear")})
     switches = Switches(moving, frozenset({*inputs, *system.parameter_symbols}))
-    modes = tuple(_mode(_steady(mode, system), switches.out_of) for mode in system.modes)
+    modes = tuple(_steady(mode, system).mapped(switches.out_of) for mode in system.modes)
     return replace(system, modes=modes), switches
 
 
@@ -103,27 +100,7 @@ def _steady(mode: Mode, system: HybridSystem) -> Mode:
     """A mode whose choices by parameters and states that do not flow are smooth."""
     still = (symbol(x) for x, f in zip(mode.states, mode.flow, strict=True) if f == 0)
     constants = frozenset((*system.parameter_symbols, *still))
-    return _mode(mode, lambda expr: by_constants(expr, constants))
-
-
-def _mode(mode: Mode, out_of: Callable[[Any], Any]) -> Mode:
-    return replace(
-        mode,
-        flow=tuple(map(out_of, map(sp.sympify, mode.flow))),
-        walls=tuple(_surface(wall, out_of) for wall in mode.walls),
-        edges=tuple(_edge(edge, out_of) for edge in mode.edges),
-        outputs=tuple(None if output is None else out_of(sp.sympify(output)) for output in mode.outputs),
-    )
-
-
-def _surface(surface: Surface, out_of: Callable[[Any], Any]) -> Surface:
-    left, right, residual = (out_of(sp.sympify(e)) for e in (surface.left, surface.right, surface.residual))
-    return replace(surface, left=left, right=right, residual=residual)
-
-
-def _edge(edge: Edge, out_of: Callable[[Any], Any]) -> Edge:
-    condition, reset = out_of(edge.condition), tuple(map(out_of, map(sp.sympify, edge.reset)))
-    return replace(edge, surface=_surface(edge.surface, out_of), condition=condition, reset=reset)
+    return mode.mapped(lambda expr: by_constants(expr, constants))
 
 
 def switch_programs(switches: Switches) -> tuple[Switch, ...]:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import reduce
 
@@ -12,8 +12,8 @@ import sympy as sp
 from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.trigger import without_roundoff
-from hsdsl.lower.straight import replaced
-from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, Surface
+from hsdsl.functions import replaced
+from hsdsl.system import TIME, HybridSystem, Parameter
 
 PHASE = "phase of the start"  # a parameter of a system that can begin at any phase
 PERIODIC = {sp.sin: 2, sp.cos: 2, sp.tan: 1}  # periods in multiples of pi
@@ -68,43 +68,20 @@ def shifted(system: HybridSystem) -> HybridSystem:
     at = {TIME: TIME + symbol(PHASE)}
     done: dict[sp.Basic, sp.Basic] = {}
 
-    def move(expression):
-        return None if expression is None else replaced(sp.sympify(expression), at, done)
-
     return replace(
         system,
         parameters=(*system.parameters, Parameter(PHASE, sp.S.Zero, "0")),
-        modes=tuple(_moved(mode, move) for mode in system.modes),
+        modes=tuple(replace(mode.mapped(lambda expr: replaced(expr, at, done)), scene=()) for mode in system.modes),
         reference=(),
         scene=(),
     )
 
 
-def _moved(mode: Mode, move: Callable) -> Mode:
-    return replace(
-        mode,
-        flow=tuple(map(move, mode.flow)),
-        walls=tuple(_surface(wall, move) for wall in mode.walls),
-        edges=tuple(_edge(edge, move) for edge in mode.edges),
-        outputs=tuple(map(move, mode.outputs)),
-        scene=(),
-    )
-
-
-def _surface(surface: Surface, move: Callable) -> Surface:
-    return replace(surface, **{part: move(getattr(surface, part)) for part in ("left", "right", "residual")})
-
-
-def _edge(edge: Edge, move: Callable) -> Edge:
-    reset = tuple(map(move, edge.reset))
-    return replace(edge, surface=_surface(edge.surface, move), condition=move(edge.condition), reset=reset)
-
-
 def _expressions(system: HybridSystem) -> Iterator[sp.Basic]:
     for mode in system.modes:
-        yield from map(sp.sympify, mode.flow)
-        yield from (sp.sympify(surface.residual) for surface in mode.surfaces)
+        yield from mode.flow
+        yield from (surface.residual for surface in mode.surfaces)
         for edge in mode.edges:
-            yield from (without_roundoff(sp.sympify(value)) for value in edge.reset)
+            yield from (without_roundoff(value) for value in edge.reset)
             if edge.condition is not None:
                 yield without_roundoff(edge.condition)

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Sequence
 
 import sympy as sp
 
-from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.functions import replaced
+from hsdsl.lower.straight import Gradient
 
 Slopes = dict[sp.Symbol, sp.Expr]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from hsdsl.expression.scope import symbol
-from hsdsl.lower.straight import replaced
+from hsdsl.functions import replaced
 from hsdsl.sensitivity.chain import Slopes
 from hsdsl.sensitivity.derivatives import Derivatives
 from hsdsl.system import Edge, Mode

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hsdsl.expression.derivatives import lie_derivative
+from hsdsl.functions import replaced
 from hsdsl.lint.analysis.question import Constraint, at_most_zero, zero
-from hsdsl.lower.straight import replaced
 from hsdsl.spaceex.feasibility import decide
 from hsdsl.spaceex.formula import Relation
 from hsdsl.spaceex.product import Arrow, Place

@@ -10,8 +10,8 @@ from hsdsl.errors import ModelError
 from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.plain import names_in, value
 from hsdsl.expression.scope import symbol
+from hsdsl.functions import replaced
 from hsdsl.lint.analysis.question import negative, positive
-from hsdsl.lower.straight import replaced
 from hsdsl.spaceex.drafts import Facet, ModeDraft
 from hsdsl.spaceex.feasibility import decide
 from hsdsl.spaceex.formula import Relation

@@ -10,7 +10,7 @@ from typing import Any
 from hsdsl.errors import ModelError
 from hsdsl.expression.plain import names_in, value
 from hsdsl.expression.scope import symbol
-from hsdsl.lower.straight import replaced
+from hsdsl.functions import replaced
 from hsdsl.names import closest, did_you_mean, shown
 from hsdsl.source.xml import Element
 from hsdsl.spaceex.configuration import DOT, Configuration

@@ -16,8 +16,8 @@ from hsdsl.errors import Findings
 from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.plain import value
 from hsdsl.expression.scope import symbol
+from hsdsl.functions import replaced
 from hsdsl.lint.analysis.question import Answer, Constraint, at_most_zero, negative, positive, zero
-from hsdsl.lower.straight import replaced
 from hsdsl.names import shown
 from hsdsl.spaceex.drafts import Facet, ModeDraft, TransitionDraft
 from hsdsl.spaceex.feasibility import decide

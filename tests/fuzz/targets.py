@@ -26,8 +26,9 @@ from hsdsl.expression.inequality import inequality
 from hsdsl.expression.scope import Scope, Value, state, symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.functions import replaced
 from hsdsl.lower.routines import Definition, print_routines
-from hsdsl.lower.straight import Gradient, replaced
+from hsdsl.lower.straight import Gradient
 from hsdsl.model import Model
 from hsdsl.system import TIME
 

@@ -9,9 +9,9 @@ from functools import cached_property
 from typing import Any
 
 from hsdsl.expression.scope import symbol
-from hsdsl.expression.selection import is_mode, placed, select, total, whole
+from hsdsl.expression.selection import is_mode, select, total, whole
 from hsdsl.expression.trigger import Reached, comparisons, number, reached
-from hsdsl.functions import maximum, minimum
+from hsdsl.functions import maximum, minimum, replaced
 from hsdsl.names import memory
 from hsdsl.system import ONE, TIME, ZERO, Edge, Mode, Surface
 
@@ -61,7 +61,7 @@ class Event:
         """How fast an expression changes along the flow of the mode."""
         known, done = number_left(self.edge), dict[Any, Any]()
         moving = ((s, self.flow[s]) for s in sorted(expression.free_symbols, key=str) if s in self.flow)
-        return sum((expression.diff(s) * placed(flow, known, done) for s, flow in moving), ZERO)
+        return sum((expression.diff(s) * replaced(flow, known, done) for s, flow in moving), ZERO)
 
     @property
     def delay(self) -> Any | None:

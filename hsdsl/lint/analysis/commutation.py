@@ -13,6 +13,7 @@ from itertools import product
 from typing import Any
 
 from hsdsl.expression.scope import symbol
+from hsdsl.functions import replaced
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure, ranked
 from hsdsl.lint.analysis.proof import Proof, strict
@@ -20,7 +21,6 @@ from hsdsl.lint.analysis.question import UNKNOWN, Answer, at_most_zero, positive
 from hsdsl.lint.analysis.singularities import breaks
 from hsdsl.lint.analysis.smooth_pieces import KINKED, influencing
 from hsdsl.lint.analysis.zero_time_cycle import chain, same
-from hsdsl.lower.straight import replaced
 from hsdsl.system import Edge, Mode, Surface
 
 DEEPEST = 3  # transitions at one instant that are followed

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from hsdsl.errors import Decided
+from hsdsl.functions import replaced
 from hsdsl.lint.analysis import elimination
 from hsdsl.lint.analysis.elimination import Reduced
 from hsdsl.lint.analysis.newton_search import MOST_BOXES, ROUNDS, STARTS, NewtonSearch, excluded
@@ -21,7 +22,6 @@ from hsdsl.lint.analysis.normal_form import NormalForms, expression
 from hsdsl.lint.analysis.polynomial import Polynomial
 from hsdsl.lint.analysis.question import NEVER, UNKNOWN, Answer, Constraint, Ranges
 from hsdsl.lint.analysis.straight_line_program import Array, StraightLine, too_large
-from hsdsl.lower.straight import replaced
 
 MOST_PARTS = 1500  # of the expressions of one question
 FEWEST_POINTS = 12  # to believe that something is always zero

@@ -17,12 +17,11 @@ import sympy as sp
 from hsdsl.errors import Decided
 from hsdsl.expression.derivatives import derivative, lie_derivative
 from hsdsl.expression.scope import symbol
-from hsdsl.functions import absolute, maximum, minimum
+from hsdsl.functions import absolute, maximum, minimum, replaced
 from hsdsl.lint.analysis.decide import MOST_PARTS, Decider
 from hsdsl.lint.analysis.polynomial import linear_in
 from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, Ranges, SearchRange, at_most_zero, zero
 from hsdsl.lint.analysis.straight_line_program import at_point, enclosure, parts_of, too_large
-from hsdsl.lower.straight import replaced
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 
 MOST_DERIVED = 4000  # parts of an expression as a tree: derivatives are made of it as one

@@ -9,6 +9,7 @@ from typing import Any
 
 import sympy as sp
 
+from hsdsl.functions import replaced
 from hsdsl.lint.analysis.commutation import commute, matters, meeting, overlap_of, speeds
 from hsdsl.lint.analysis.crossing import passes_by, uncrossed
 from hsdsl.lint.analysis.dynamics import Clause, Dynamics
@@ -19,7 +20,6 @@ from hsdsl.lint.analysis.question import UNKNOWN, Answer, Constraint, negative, 
 from hsdsl.lint.analysis.wording import at, number, within
 from hsdsl.lint.finding import Alike, Finding
 from hsdsl.lint.subject import EdgePart, Subject
-from hsdsl.lower.straight import replaced
 from hsdsl.system import TIME, Edge, Mode
 
 MOST_PAIRS = 100  # that are followed: each takes a hundred times as long as to see whether two guards overlap
