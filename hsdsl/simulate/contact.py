@@ -184,16 +184,16 @@ def in_contact(run: Run, here: ModeState, holding: Sequence[int], looked_at: Seq
     assert number is not None
     levels = dict.fromkeys(looked_at, LOOKED_AT) | dict.fromkeys(holding, HELD)
     numbers = [run.arithmetic.zero] * sum(edge.contact is not None for edge in edges)
-    for k, level in levels.items():
-        place = edges[k].contact
-        assert place is not None
-        numbers[place] = run.arithmetic.zero + level
+    places = {k: place for k in levels if (place := edges[k].contact) is not None}
+    for k, place in places.items():
+        numbers[place] = run.arithmetic.zero + levels[k]
     segment = replace(here.segment, data=(*here.segment.data, *numbers))
     program, kernel = run.program.flows[number], run.kernel.bind(number, segment.data)
     more = len(program.edges) - len(edges)
     active = {j if j < len(edges) else j + more for j in here.surfaces.active if j not in levels}
-    touched = frozenset[int](place for k in holding if (place := edges[k].contact) is not None)
-    surfaces = Surfaces(kernel, program.edges, here.surfaces.scale, run.arithmetic, active, touched=touched)
+    touched, pushes = frozenset(places[k] for k in holding), frozenset(places.values())
+    scale, had = here.surfaces.scale, here.arc.scales
+    surfaces = Surfaces(kernel, program.edges, scale, run.arithmetic, active, set(), touched, pushes, had)
     return replace(here, flow=number, mode=program, kernel=kernel, surfaces=surfaces, segment=segment)
 
 

@@ -77,6 +77,7 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
             t, x, ends = behind_end(run, here, held, crossing.edge, t, x)
         if t > crossing.time:
             here.arc.append(t, x, (tuple(b - a for a, b in zip(crossing.state, x, strict=True)),))
+        held.surfaces.leave(t, x)
         if ends:
             after = held_exactly(run, here, held, t, x)
             return run.place(here.index, here.mode.states, t, after.x, outcome.scale, active=after.surfaces.active)

@@ -6,7 +6,7 @@ the step's interpolant, never on the flow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal
@@ -139,6 +139,8 @@ class Surfaces:
     ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
     ``active``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
     state while it waited in a strip, and that the flow leads back through. ``touched`` are the contacts that hold it.
+    The surfaces of ``pushes``, these and other contacts, are the pushes on their guards: motion along guards is off
+    them by the sizes that states have ``had``.
     """
 
     kernel: ModeKernel
@@ -148,6 +150,8 @@ class Surfaces:
     active: set[int] = field(default_factory=set[int])
     emerging: set[int] = field(default_factory=set[int])
     touched: frozenset[int] = frozenset()
+    pushes: frozenset[int] = frozenset()
+    had: Sequence[Number] = ()
 
     def releases(self, k: int) -> bool:
         """Whether surface k ends a contact that holds the state."""
@@ -163,6 +167,8 @@ class Surfaces:
         except DOMAIN_ERRORS:
             return ROUNDOFF_UNITS * unit * magnitude
         scale = self.scale if entry or k in self.active else tuple(self.arithmetic.zero for _ in x)
+        if k < len(self.edges) and self.edges[k].releases in self.pushes:
+            scale = tuple(map(max, self.had, self.scale))
         return roundoff(unit, magnitude, gradient, t, x, scale)
 
     def enter(self, t: Number, x: State, values: Vector, arrival: Arrival = ANY) -> list[int]:

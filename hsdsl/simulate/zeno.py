@@ -139,11 +139,11 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
 
 def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], end: Number) -> State | None:
     """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
-    kept = partial(fixed_point, run, here)
-    if len(edges) > 1 and not is_near(run, here, edges):
+    kept, along = partial(fixed_point, run, here), here.mode.edges[edges[0]].contact is not None
+    if along and not is_near(run, here, edges):
         return None
     q = in_turn(kept, edges, here.t, here.x)
-    if here.mode.edges[edges[0]].contact is not None:
+    if along:
         flow, h = in_contact(run, here, sorted({*touched, *edges})).kernel.flow, end - here.t
         slope = flow(here.t, *q)
         turned = flow(end, *(a + h * f for a, f in zip(q, slope, strict=True)))
@@ -191,15 +191,19 @@ def in_turn(taken: Callable[[int, Number, State], State], edges: list[int], t: N
 
 
 def onto_guard(here: ModeState, k: int, t: Number, x: State) -> State:
-    """A point near a guard taken to it, each state in proportion to its scale."""
+    """A point near a guard taken to it, as near as numbers are, each state in proportion to its scale."""
+    r = here.kernel.surfaces(t, *x)[k]
     for _ in range(MOST_CORRECTIONS_TO_GUARD):
-        r, gradient = here.kernel.surfaces(t, *x)[k], here.kernel.gradients[k](t, *x)[1:]
-        if abs(r) <= here.surfaces.roundoff_bound(k, t, x):
-            break
+        gradient = here.kernel.gradients[k](t, *x)[1:]
         weights = [g * s * s for g, s in zip(gradient, here.sizes, strict=True)]
         across = total((g * w for g, w in zip(gradient, weights, strict=True)), r * 0)
-        if across > 0:
-            x = tuple(a - r / across * w for a, w in zip(x, weights, strict=True))
+        if not across > 0:
+            break
+        nearer = tuple(a - r / across * w for a, w in zip(x, weights, strict=True))
+        left = here.kernel.surfaces(t, *nearer)[k]
+        if not abs(left) < abs(r):
+            break
+        x, r = nearer, left
     return x
 
 

@@ -522,3 +522,58 @@ experiment: {{until: 2}}
     run = assert_engines_agree(model)
     assert run.stop.reason == "step_underflow" and run.stop.time == pytest.approx(2.5 / (0.3 * 7), abs=1e-3)
     assert "the flow of u along the guard of floor jumps" in run.stop.message
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_body_that_flies_is_on_no_floor_when_a_guard_lets_go_of_another(engine: str) -> None:
+    """It bounced on the floor in the step before, and comes nearer to it again, but never back."""
+    text = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: v, v: -2 + 1.56*(t - 0.9), y: w, w: t - 1}
+    transitions:
+      - {name: floor, when: x <= 0, to: a, reset: {v: -v/2}}
+      - {name: stop, when: y <= 0, to: a, reset: {w: -w/2}}
+initial: {mode: a, x: 0.80046, v: 0.4318, y: 0, w: 0}
+experiment: {until: 20}
+"""
+    assert len(hsdsl.loads(text).simulate(engine=engine).transitions) == 1
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_flights_that_shrink_at_growing_speeds_are_no_tail(engine: str) -> None:
+    """A light body between two heavy ones turns them back: nothing is lost."""
+    text = """
+hsdsl: 1
+parameters: {m: 1e-5}
+modes:
+  a:
+    flow: {x: u, y: v, z: w, u: 0, v: 0, w: 0}
+    transitions:
+      - {when: y <= x, to: a, reset: {u: (u - m*u + 2*m*v)/(1 + m), v: (m*v - v + 2*u)/(1 + m)}}
+      - {when: z <= y, to: a, reset: {w: (w - m*w + 2*m*v)/(1 + m), v: (m*v - v + 2*w)/(1 + m)}}
+initial: {mode: a, x: -1, u: 1, y: 0.1, v: 0, z: 1, w: -1}
+experiment: {until: 2, relaxation: 1e-2}
+"""
+    last = hsdsl.loads(text).simulate(engine=engine).final.state
+    assert last["u"] ** 2 + 1e-5 * last["v"] ** 2 + last["w"] ** 2 == pytest.approx(2, abs=1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_equal_pendulums_hang_together_without_a_push(engine: str) -> None:
+    """Round-off of where they swung keeps them apart where they are slow: to let go of each other there has no end."""
+    text = """
+hsdsl: 1
+parameters: {g: 9.7, b: 0.29, e: 0}
+modes:
+  a:
+    flow: {x: u, y: v, z: w, u: -g*sin(x) - b*u, v: -g*sin(y) - b*v, w: -g*sin(z) - b*w}
+    transitions:
+      - {when: y <= x, to: a, reset: {u: u - (1 + e)*(u - v)/2, v: v + (1 + e)*(u - v)/2}}
+      - {when: z <= y, to: a, reset: {v: v - (1 + e)*(v - w)/2, w: w + (1 + e)*(v - w)/2}}
+initial: {mode: a, x: -0.23, y: 0, z: 0, u: 0, v: 0, w: 0}
+experiment: {until: 12}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.stop.reason == "until" and len(run.times) < 1000

@@ -305,6 +305,12 @@ static int releases(const hs_run *run, int j) {
   return j < table->edges && table->edge[j].releases >= 0 && *level_of(run, table->edge[j].releases) == HS_HELD;
 }
 
+/* Whether surface j of the present table is the push on a guard, which is off by the sizes that states have had. */
+static int is_push(const hs_run *run, int j) {
+  const hs_mode *const table = run->here.table;
+  return j < table->edges && table->edge[j].releases >= 0 && *level_of(run, table->edge[j].releases) != 0;
+}
+
 /* Whether the state is in contact with the guard of edge k of its mode. */
 static int in_touch(const hs_run *run, int k) {
   return k < run->model->mode[run->here.mode].edges && releases(run, k);

@@ -228,6 +228,7 @@ HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit);
 /* contact.c */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope);
 static hs_real state_size(const hs_run *run, int s);
+static int is_push(const hs_run *run, int j);
 static void start_sizes(hs_run *run, int mode, hs_time t);
 static int reset_but_counts(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *out);
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k);

@@ -292,13 +292,16 @@ static int along_guards(hs_run *run, hs_time limit) {
     if (outcome == LANDED && releases(run, end)) {
       hs_time t = run->chosen.time;
       copy(run->x, run->chosen.state, here->dimension);
-      if (in_touch(run, end)) return released(run, t);
-      const int ends = behind_end(run, end, &t);
-      if (t > run->chosen.time) {
-        secant(run, &run->cubic);
-        append(run, t, run->z, &run->cubic);
+      int ends = in_touch(run, end);
+      if (!ends) {
+        ends = behind_end(run, end, &t);
+        if (t > run->chosen.time) {
+          secant(run, &run->cubic);
+          append(run, t, run->z, &run->cubic);
+        }
+        swap(&run->x, &run->z);
       }
-      swap(&run->x, &run->z);
+      leave(run, t, run->x);
       if (ends) return released(run, t);
       here->t = t;
       continue;

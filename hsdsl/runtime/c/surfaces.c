@@ -68,10 +68,11 @@ static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time
   const hs_sparse *const row = &here->table->gradients[k];
   hs_real *const g = run->gradient;
   if (!row->values(here->p, t, x, g) && hs_finite(sum(g, row->count))) {
-    const int scaled = entry || run->active_surfaces[k];
+    const int push = is_push(run, k), scaled = entry || run->active_surfaces[k];
     for (int i = 0; i < row->count; i++) {
       const int s = row->place[i] - 1;
-      total = total + fabs(g[i]) * (s < 0 ? fabs(t) : hs_max(fabs(x[s]), scaled ? run->scale[s] : 0.0));
+      const hs_real size = s < 0 ? fabs(t) : push ? state_size(run, s) : scaled ? run->scale[s] : 0.0;
+      total = total + fabs(g[i]) * (s < 0 ? size : hs_max(fabs(x[s]), size));
     }
   }
   return ROUNDOFF_UNITS * HS_UNIT * total;

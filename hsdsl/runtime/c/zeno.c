@@ -66,22 +66,25 @@ static int fixed_point(hs_run *run, int k, hs_time t) {
   return 0;
 }
 
-/* run->z taken to the guard of edge k, which is near, each state in proportion to its scale. */
+/* run->z taken to the guard of edge k, which is near, as near as numbers are, each state in proportion to its scale. */
 static int onto_guard(hs_run *run, int k, hs_time t) {
   const int n = run->here.dimension;
-  hs_real *const x = run->z, *const weights = run->at;
+  hs_real *const x = run->z, *const weights = run->at, *const nearer = run->after;
+  hs_real r, left;
+  if (surface(run, k, t, x, &r)) return RAISED;
   for (int i = 0; i < MOST_CORRECTIONS_TO_GUARD; i++) {
-    hs_real r, noise;
-    if (surface(run, k, t, x, &r) || roundoff_bound(run, k, t, x, 0, &noise)) return RAISED;
     if (gradient_of(run, k, t, x)) return RAISED;
-    if (fabs(r) <= noise) break;
     hs_real across = r * 0;
     for (int s = 0; s < n; s++) {
       weights[s] = run->gradient[s + 1] * state_size(run, s) * state_size(run, s);
       across = across + run->gradient[s + 1] * weights[s];
     }
-    if (across > 0)
-      for (int s = 0; s < n; s++) x[s] = x[s] - r / across * weights[s];
+    if (!(across > 0)) break;
+    for (int s = 0; s < n; s++) nearer[s] = x[s] - r / across * weights[s];
+    if (surface(run, k, t, nearer, &left)) return RAISED;
+    if (!(fabs(left) < fabs(r))) break;
+    copy(x, nearer, n);
+    r = left;
   }
   return 0;
 }
@@ -161,10 +164,10 @@ static int limit_of(hs_run *run, int count, hs_time end) {
   const int n = here->dimension;
   int along = 0;
   hs_real r, noise, *const q = run->z;
-  if (count > 1 && is_near(run) != 1) return 0;
+  for (int k = 0; k < here->table->edges; k++) along |= run->tail[k] && here->table->edge[k].contact >= 0;
+  if (along && is_near(run) != 1) return 0;
   copy(q, run->x, n);
   if (in_turn(run, fixed_point, count, here->t)) return RAISED;
-  for (int k = 0; k < here->table->edges; k++) along |= run->tail[k] && here->table->edge[k].contact >= 0;
   if (along) {
     bind_contacts(run, run->held, run->held);
     const hs_time h = end - here->t;
