@@ -8,6 +8,7 @@ from typing import Any
 import sympy as sp
 from sympy.printing.str import StrPrinter
 
+from hsdsl.expression.selection import positive
 from hsdsl.expression.tokens import LARGEST_INTEGER
 from hsdsl.functions import FUNCTIONS
 from hsdsl.system import Surface
@@ -24,8 +25,7 @@ class _Printer(StrPrinter):
         return f"{name}({', '.join(map(self._print, expr.args))})"
 
     def _print_below(self, expr: Any) -> str:
-        number, bound, one, other = expr.args
-        return f"select({', '.join(map(self._print, (bound - number, one, other)))})"
+        return f"select({', '.join(map(self._print, (positive(expr), *expr.args[2:])))})"
 
     def _print_Exp1(self, expr: Any) -> str:
         return "exp(1)"

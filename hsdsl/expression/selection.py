@@ -68,18 +68,22 @@ def chosen(number: Any, yes: Any, no: Any) -> Any:
     return below(against, ZERO, yes, total(no, lambda e, safe: below(against, ZERO, safe, e), frozenset()))
 
 
+def positive(choice: below) -> Any:
+    """The number that is positive where a choice is its first expression, as people write it."""
+    against, bound = choice.args[:2]
+    return (-against).args[0] if bound == 0 and isinstance(-against, sign) else bound - against
+
+
 def cases(choice: below) -> Any:
     """A choice as people write it: the first expression where a number is positive, and the other one elsewhere."""
-    against, bound = choice.args[:2]
-    number = (-against).args[0] if bound == 0 and isinstance(-against, sign) else bound - against
 
     def known(k: int) -> Any:
         """An expression where it is selected; `total` has written the same choice into it."""
         same = choice.args[:2]
         return choice.args[k].replace(lambda e: isinstance(e, below) and e.args[:2] == same, lambda e: e.args[k])
 
-    positive = sp.Gt(number, ZERO, evaluate=False)
-    return sp.Piecewise((known(2), positive), (known(3), sp.true), evaluate=False)
+    where = sp.Gt(positive(choice), ZERO, evaluate=False)
+    return sp.Piecewise((known(2), where), (known(3), sp.true), evaluate=False)
 
 
 def by_constants(expr: Any, constants: frozenset[Any]) -> Any:

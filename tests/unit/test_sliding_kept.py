@@ -97,3 +97,13 @@ def test_a_kink_of_an_input_does_not_divide_sliding():
     text = SWITCHED.replace("modes:", inputs + "modes:").replace("x: k + 0.5", "x: k + 0.5 + u")
     run = hsdsl.loads(text).simulate(completion="auto")
     assert run.verdict.reasons == ("sliding between down and up from t = 0.6 to t = 3",)
+
+
+def test_a_completed_model_slides_in_its_own_modes_where_a_surface_has_choices():
+    text = SWITCHED.replace("x: -k + 0.5, y: 1 + x", "x: -k, g: 0").replace("x: k + 0.5, y: 1 + x", "x: k, g: 0")
+    text = (
+        text.replace("x <= 0", "'x <= select(g, 1, 0)'").replace("x >= 0", "'x >= select(g, 1, 0)'").replace("y:", "g:")
+    )
+    written = hsdsl.loads(text).completed()
+    again = hsdsl.loads(written)
+    assert "sliding_down_up" in written and again.sliding is again
