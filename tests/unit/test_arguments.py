@@ -83,7 +83,7 @@ def test_pictures_are_the_same_from_any_thread(tmp_path):
     assert len({(tmp_path / f"{k}.svg").read_bytes() for k in range(6)}) == 1
 
 
-@pytest.mark.parametrize("named", ["nonsense", "agg", "module://no.such.module", ""])
+@pytest.mark.parametrize("named", ["nonsense", "module://no.such.module", ""])
 def test_any_backend_of_matplotlib_may_be_named(named, tmp_path):
     command = [sys.executable, "-m", "hsdsl", "run", str(BALL), "-q", "--engine", "python", "--plot", "x.svg"]
     environment = {**os.environ, "MPLBACKEND": named}

@@ -31,14 +31,14 @@ WIDE = (
 def test_a_run_that_fills_its_memory_keeps_what_was_computed(engine, kind):
     if engine == "c" and kind == "paoli-schatzman":
         pytest.skip("no compiled loop")
-    model = hsdsl.load(OSCILLATOR, limits=Limits(memory=4_000_000))
+    model = hsdsl.load(OSCILLATOR, limits=Limits(memory=2_000_000))
     run = model.simulate(engine=engine, **LONG[kind])
     assert run.stop.reason == "memory_limit" and "limit 'memory'" in run.stop.message
     assert len(run.times) > 500 and run.times[-1] == run.stop.time > 0
     kept = sum(getattr(run, name).nbytes for name in ("times", "values", "coefficients", "outputs", "depth"))
-    assert 200_000 < kept < 8_000_000
+    assert 100_000 < kept < 4_000_000
     assert run.verdict.theorem != "holds"
-    longer = hsdsl.load(OSCILLATOR, limits=Limits(memory=6_000_000)).simulate(engine=engine, **LONG[kind])
+    longer = hsdsl.load(OSCILLATOR, limits=Limits(memory=3_000_000)).simulate(engine=engine, **LONG[kind])
     count = len(run.times) - 1  # where it stops, a run of the two-step scheme has a last row of its own
     assert len(longer.times) > count and (longer.times[:count] == run.times[:count]).all()
     assert (longer.values[:count] == run.values[:count]).all()
