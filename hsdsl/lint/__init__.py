@@ -16,7 +16,7 @@ from hsdsl.errors import Diagnostic
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
 from hsdsl.files import ModelFiles
-from hsdsl.lint.automata import automata_of
+from hsdsl.lint.automata import OF_UNITS, automata_of
 from hsdsl.lint.finding import Finding
 from hsdsl.lint.ignores import Ignored, sift
 from hsdsl.lint.parts import findings_of_parts
@@ -62,7 +62,8 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     found: list[Diagnostic] = []
     if subject.system.parts:
         found += [_diagnostic(subject, code, finding) for code, finding in findings_of_parts(subject, codes)]
-        looks = [(part, code) for part in automata_of(subject) for code in codes if code in part.codes]
+        looks = [(subject, code) for code in codes if code in OF_UNITS]
+        looks += [(part, code) for part in automata_of(subject) for code in codes if code in part.codes]
     else:
         looks = [(subject, code) for code in codes]
     places = set[tuple[object, ...]]()

@@ -20,12 +20,15 @@ from hsdsl.expression.selection import whole
 from hsdsl.functions import replaced
 from hsdsl.lint.analysis.dynamics import Dynamics
 from hsdsl.lint.analysis.question import SearchRange
+from hsdsl.lint.source_expressions import written, written_of_automaton
 from hsdsl.lint.subject import EdgePart, ModePart, Subject, edge_parts
+from hsdsl.lint.units.model import Units
 from hsdsl.parts import Part, numbered
 from hsdsl.schema import AutomatonDocument, SystemDocument
 from hsdsl.system import TIME, Edge, Initial, Mode, SampledInput, Surface
 
-OF_ALL = ("HS426", "HS427", "HS428", "HS501")
+OF_UNITS = ("HS601", "HS602", "HS603", "HS604", "HS605")
+OF_ALL = ("HS426", "HS427", "HS428", "HS501", *OF_UNITS)
 OF_CLOSED = (*OF_ALL, "HS502", "HS506", "HS507", "HS508", "HS510")
 MOST = 8  # instances of an automaton that are looked at: those with other parameters or another start
 
@@ -67,6 +70,13 @@ class AutomatonSubject(Subject):
     def codes(self) -> tuple[str, ...]:
         """The rules that hold for it."""
         return OF_ALL if self.foreign else OF_CLOSED
+
+    @cached_property
+    def units(self) -> Units:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """The units that the automaton and the file give, and those of the automaton's expressions."""
+        outer = (e for e in written(self.document) if e.role in ("let", "function") and e.mode is None)
+        expressions = (*outer, *written_of_automaton(self.kind))
+        return Units(self.document, expressions, self.kind, self.reading.system.units)
 
     @property
     def edges(self) -> Iterator[tuple[ModePart, EdgePart]]:

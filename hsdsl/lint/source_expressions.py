@@ -13,15 +13,20 @@ from hsdsl.expression import Expected, parse
 from hsdsl.expression.scope import functions_called
 from hsdsl.expression.syntax import Name, Tree, walk
 from hsdsl.schema import (
+    AutomatonDocument,
     ExperimentDocument,
+    InitialDocument,
     InputFile,
     InputSamples,
+    InstanceDocument,
     ModeDocument,
     ModelDocument,
     MultiplesDocument,
     ParameterEntry,
+    PartInitialDocument,
     ReferenceDocument,
     SolveDocument,
+    SystemDocument,
 )
 from hsdsl.source import Key, Scalar
 
@@ -94,9 +99,7 @@ class SourceExpression:
 
 def written(document: ModelDocument) -> Iterator[SourceExpression]:
     """Every expression of a model, in the order of the language's sections."""
-    for name, entry in document.parameters.items():
-        values = (entry.value, entry.min, entry.max) if isinstance(entry, ParameterEntry) else (entry,)
-        yield from _each("parameter", values, name)
+    yield from _of_parameters(document)
     for name, function in document.functions.items():
         yield SourceExpression("function", function.expression, name, arguments=tuple(map(str, function.of)))
     for name, entry in document.inputs.items():
@@ -114,11 +117,45 @@ def written(document: ModelDocument) -> Iterator[SourceExpression]:
         yield SourceExpression("output", scalar, name)
     for shape in document.scene:
         yield from _each("scene", (*chain.from_iterable(shape.points), *shape.sizes), "")
-    for name, scalar in document.initial.__pydantic_extra__.items():
+    for name, scalar in _starts(document.initial).items():
         yield SourceExpression("initial", scalar, name)
+    for name, part in document.system.items() if isinstance(document, SystemDocument) else ():
+        yield from _of_instance(name, part)
     yield from _of_experiment(document.experiment)
     for reference in document.reference:
         yield from _of_reference(reference)
+
+
+def written_of_automaton(automaton: AutomatonDocument) -> Iterator[SourceExpression]:
+    """Every expression of an automaton."""
+    yield from _of_parameters(automaton)
+    for name, scalar in automaton.let.items():
+        yield SourceExpression("let", scalar, name)
+    for name, mode in automaton.modes.items():
+        yield from _of_mode(str(name), mode)
+    for name, scalar in automaton.outputs.items():
+        yield SourceExpression("output", scalar, name)
+
+
+def _of_parameters(document: ModelDocument | AutomatonDocument) -> Iterator[SourceExpression]:
+    for name, entry in document.parameters.items():
+        values = (entry.value, entry.min, entry.max) if isinstance(entry, ParameterEntry) else (entry,)
+        yield from _each("parameter", values, name)
+
+
+def _of_instance(name: str, part: InstanceDocument) -> Iterator[SourceExpression]:
+    tables: tuple[tuple[Role, Mapping[Key, Scalar]], ...] = (
+        ("parameter", part.parameters),
+        ("input", part.inputs),
+        ("initial", _starts(part.initial)),
+    )
+    for role, given in tables:
+        for key, scalar in given.items():
+            yield SourceExpression(role, scalar, f"{name}.{key}")
+
+
+def _starts(initial: InitialDocument | PartInitialDocument | None) -> Mapping[Key, Scalar]:
+    return {} if initial is None else initial.__pydantic_extra__
 
 
 def _of_experiment(experiment: ExperimentDocument) -> Iterator[SourceExpression]:
@@ -152,10 +189,11 @@ def _of_mode(name: str, mode: ModeDocument) -> Iterator[SourceExpression]:
     for index, scalar in enumerate(mode.domain):
         yield SourceExpression("domain", scalar, "", name, index)
     for index, transition in enumerate(mode.transitions):
-        if transition.event is None:
-            yield SourceExpression("when", transition.when, "", name, index)
-        else:
-            yield SourceExpression("event", transition.event, "", name, index)
+        surface = transition.when if transition.event is None else None  # none where it listens to another one
+        conditions: tuple[tuple[Role, Scalar | None], ...] = (("when", surface), ("event", transition.event))
+        for role, scalar in conditions:
+            if scalar is not None:
+                yield SourceExpression(role, scalar, "", name, index)
         if transition.delay is not None:
             yield SourceExpression("delay", transition.delay, "", name, index, unit_of=TIME)
         if isinstance(transition.priority, Scalar):

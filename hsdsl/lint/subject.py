@@ -176,7 +176,7 @@ class Subject:
     @cached_property
     def units(self) -> Units:
         """The units that the file gives, and those of its expressions."""
-        return Units(self.document, self.expressions)
+        return Units(self.document, self.expressions, of_parts=self.system.units)
 
     @cached_property
     def dynamics(self) -> Dynamics:

@@ -5,6 +5,7 @@ from hsdsl.schema.documents import (
     AutomatonFile,
     ExperimentDocument,
     FunctionDocument,
+    InitialDocument,
     InputFile,
     InputSamples,
     InstanceDocument,
@@ -12,6 +13,7 @@ from hsdsl.schema.documents import (
     ModelDocument,
     MultiplesDocument,
     ParameterEntry,
+    PartInitialDocument,
     PartModeDocument,
     PartTransitionDocument,
     ReferenceDocument,
@@ -25,8 +27,8 @@ from hsdsl.schema.jsonschema import json_schema
 from hsdsl.schema.read import read
 
 __all__ = [
-    "AutomatonDocument", "AutomatonFile", "ExperimentDocument", "FunctionDocument", "InputFile", "InputSamples",
-    "InstanceDocument", "ModeDocument", "ModelDocument", "MultiplesDocument", "ParameterEntry", "PartModeDocument",
-    "PartTransitionDocument", "ReferenceDocument", "ReferenceStateDocument", "ReferenceTransitionDocument",
-    "SolveDocument", "SystemDocument", "TransitionDocument", "json_schema", "read",
+    "AutomatonDocument", "AutomatonFile", "ExperimentDocument", "FunctionDocument", "InitialDocument", "InputFile",
+    "InputSamples", "InstanceDocument", "ModeDocument", "ModelDocument", "MultiplesDocument", "ParameterEntry",
+    "PartInitialDocument", "PartModeDocument", "PartTransitionDocument", "ReferenceDocument", "ReferenceStateDocument",
+    "ReferenceTransitionDocument", "SolveDocument", "SystemDocument", "TransitionDocument", "json_schema", "read",
 ]  # fmt: skip

@@ -81,3 +81,50 @@ def test_events_of_parts_are_looked_past(tmp_path):
     )
     codes = found(tmp_path, text)
     assert ("HS501", "b.odd") not in codes and ("HS427", "b.bounce") not in codes
+
+
+UNITS = """
+hsdsl: 1
+parameters: {g: 9.81, m: {value: 2, unit: kg}, near: {value: 1, unit: m}}
+let: {top: "max(near, sum(car.v))"}
+automata:
+  car:
+    parameters: {m: 3, up: {value: 9, unit: kg}}
+    inputs: [force]
+    units: {x: m, v: m/s, force: N, f: 1/h}
+    outputs: {f: m*v}
+    modes:
+      low:
+        let: {ahead: x + v}
+        flow: {x: v, v: force/m}
+        transitions: [{name: shift, when: v >= up, to: high}]
+      high:
+        flow: {x: force, v: 0}
+        transitions: [{name: low, on: car.shift, to: low, reset: {v: x}}]
+system:
+  car:
+    automaton: car
+    count: 2
+    initial: {mode: low, x: m, v: 1}
+    inputs: {force: "car[index - 1].x + near"}
+    at_ends: {x: 0}
+  one: {automaton: car, initial: {mode: low, x: near, v: 1}, inputs: {force: 1}, parameters: {up: 3}}
+outputs: {gap: "car[1].x - car[2].v"}
+experiment: {until: 1}
+"""
+
+
+def test_units_of_automata_and_connections(tmp_path):
+    path = tmp_path / "units.yaml"
+    path.write_text(UNITS)
+    found = [(f.code, f.span.line, f.message) for f in lint(path).findings if f.code.startswith("HS6")]
+    assert found == [
+        ("HS602", 4, "`sum(car.v)`, in m/s, is compared with something in m"),
+        ("HS602", 13, "`v`, in m/s, is added to something in m"),
+        ("HS602", 15, "`up`, in kg, is compared with something in m/s"),
+        ("HS604", 17, "the flow of 'x' is in N, and should be in m/s"),
+        ("HS605", 18, "the new value of 'v' is in m, and should be in m/s"),
+        ("HS605", 23, "the initial value of 'car.x' is in kg, and should be in m"),
+        ("HS605", 24, "the input 'car.force' is in m, and should be in N"),
+        ("HS602", 27, "`car[2].v`, in m/s, is added to something in m"),
+    ]

@@ -318,12 +318,12 @@ UNITS = """automata:
     parameters: {k: {value: 2, unit: 1/s}, m: 1}
     inputs: [u]
     outputs: {p: k*x}
-    modes: {m: {flow: {x: u, y: 1}}}
+    modes: {m: {flow: {x: u, y: since}}}
     units: {x: m, m: kg, u: m/s, p: m/s}
 system:
   one: {automaton: a, initial: {x: 0, y: 0}, inputs: {u: 1}}
   other: {automaton: a, count: 2, initial: {x: 0, y: 0}, inputs: {u: 1}}
-units: {one.x: km}
+units: {one.x: km, t: s}
 """
 
 
@@ -332,8 +332,8 @@ def test_instances_have_the_units_of_their_automaton():
     assert model.program.units == {
         f"{part}.{name}": unit
         for part in ("one", "other[1]", "other[2]")
-        for name, unit in {"x": "m", "m": "kg", "u": "m/s", "p": "m/s", "k": "1/s"}.items()
-    } | {"one.x": "km"}
+        for name, unit in {"x": "m", "m": "kg", "u": "m/s", "p": "m/s", "k": "1/s", "since": "s"}.items()
+    } | {"one.x": "km", "t": "s"}
     assert [(p.name, p.unit) for p in model.system.parameters][:2] == [("one.k", "1/s"), ("one.m", "kg")]
 
 

@@ -70,6 +70,9 @@ class Parts:
             self.board.check_ends()
 
     def _units(self) -> Iterator[tuple[str, str]]:
+        if (time := self.symbols.text(self.symbols.document.units.get("t"))) is not None:  # pyright: ignore[reportArgumentType]
+            timed = (one for one in self.roster.instances.values() if one.name in self.board.timed)
+            yield from ((one.full(SINCE), time) for one in timed)
         for group in self.roster.automata.values():
             kind = group[0].kind if group else None
             if kind is not None:

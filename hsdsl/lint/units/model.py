@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -11,9 +12,10 @@ from hsdsl.lint.source_expressions import TIME, SourceExpression
 from hsdsl.lint.units.unit import Unit, UnknownUnit, read
 from hsdsl.lint.units.walk import Any_, Measure, Misfit, Walk
 from hsdsl.names import SINCE
-from hsdsl.schema import ModelDocument, ParameterEntry
+from hsdsl.schema import AutomatonDocument, ModelDocument, ParameterEntry
 from hsdsl.source import Scalar
 
+_INDEX = re.compile(r"\[[^\]]*\]")
 _VALUES = ("parameter", "input", "reset", "output", "initial", "scale", "reference", "experiment", "delay")
 
 
@@ -37,22 +39,33 @@ class Misread:
 
 
 class Units:
-    """The units of one model, from its file and its expressions."""
+    """The units of one model, or of one of its automata, from what gives units and its expressions.
 
-    def __init__(self, document: ModelDocument, expressions: tuple[SourceExpression, ...]) -> None:
-        self._document = document
+    ``of_parts`` has the units of names of instances, which others use.
+    """
+
+    def __init__(
+        self,
+        document: ModelDocument,
+        expressions: tuple[SourceExpression, ...],
+        automaton: AutomatonDocument | None = None,
+        of_parts: Mapping[str, str] | None = None,
+    ) -> None:
         self._expressions = expressions
+        self._of_parts = {_INDEX.sub("", name): unit for name, unit in (of_parts or {}).items() if "." in name}
         self._functions = {str(e.name): e for e in expressions if e.role == "function"}
         self._lets: dict[str, dict[str | None, Measure]] = {}  # by name, and by the mode that has it
-        self._texts = {str(key): scalar for key, scalar in document.units.items() if scalar is not None}
-        for key, entry in document.parameters.items():
-            if isinstance(entry, ParameterEntry) and entry.unit is not None:
-                self._texts.setdefault(str(key), entry.unit)
+        self._texts = _texts(document)
+        if automaton is not None:
+            states = (state for mode in automaton.modes.values() for state in mode.flow or ())
+            own = {*map(str, (*automaton.parameters, *automaton.inputs, *states))}
+            outer = {name: text for name, text in self._texts.items() if name not in own}
+            self._texts = outer | _texts(automaton)
 
     @property
     def given(self) -> bool:
         """Whether the file gives units at all."""
-        return bool(self._texts)
+        return bool(self._texts or self._of_parts)
 
     @cached_property
     def _read(self) -> tuple[Mapping[str, Unit], tuple[Misread, ...]]:
@@ -75,7 +88,15 @@ class Units:
     def of(self, name: str) -> Unit | None:
         """The unit of a state, a parameter, an input, an output, `t` or `since`; None where it is not known."""
         known = self._read[0]
+        if "." in name:
+            return known.get(name) or self._of_part(_INDEX.sub("", name))
         return known.get("t") if name == SINCE and name not in known else known.get(name)
+
+    def _of_part(self, name: str) -> Unit | None:
+        try:
+            return read(self._of_parts[name]) if name in self._of_parts else None
+        except UnknownUnit:  # reported with its automaton
+            return None
 
     @cached_property
     def checked(self) -> tuple[Checked, ...]:
@@ -104,3 +125,12 @@ class Units:
             return lets.get(mode, lets.get(None, unknown))
         first, *others = lets.values()  # an output of the whole model is read in every mode
         return first if all(other == first for other in others) else unknown
+
+
+def _texts(document: ModelDocument | AutomatonDocument) -> dict[str, Scalar]:
+    """What is written for the unit of each name."""
+    found = {str(key): scalar for key, scalar in document.units.items() if scalar is not None}
+    for key, entry in document.parameters.items():
+        if isinstance(entry, ParameterEntry) and entry.unit is not None:
+            found.setdefault(str(key), entry.unit)
+    return found

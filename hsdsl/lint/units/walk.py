@@ -151,6 +151,10 @@ class Walk:
         if tree.function in _ALIKE:
             found = self._alike(list(tree.arguments), "compared with")
             return ONE if tree.function == "atan2" else found
+        if tree.function == "sum":
+            return self.measure(tree.arguments[0])
+        if tree.function == "count":
+            return ONE
         if tree.function == "select":
             self.measure(tree.arguments[0])
             return self._alike(list(tree.arguments[1:]), "chosen in place of")
