@@ -233,6 +233,11 @@ class ModeProgram:
     measured: tuple[int, ...] = ()
     derived: int = 0
 
+    @property
+    def surfaces(self) -> range:
+        """The numbers of its surfaces."""
+        return range(len(self.edges) + len(self.walls))
+
     @cached_property
     def conditions(self) -> tuple[tuple[str, ...], ...]:
         """The names of the routines of each edge's condition."""

@@ -12,6 +12,7 @@ from typing import Any
 from hsdsl.chart.judge import Judgement
 from hsdsl.chart.result import Attempt
 from hsdsl.chart.stopwatch import Timed
+from hsdsl.report.words import aligned
 
 COLUMNS: tuple[str, ...] = (
     "model", "tool", "scheme", "method", "size", "value", "seconds", "fastest", "slowest", "first", "error",
@@ -70,8 +71,7 @@ def as_text(rows: Iterable[Row], digits: int = 3) -> str:
         rho = f"{judgement.rho.upper:.{digits - 1}e}" if judgement.rho else ""
         error = f"{judgement.error:.{digits - 1}e}"
         lines.append((row.attempt.tool.label, row.attempt.setting, duration(row.seconds), error, rho, verdict))
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join("  ".join(map(str.ljust, line, widths)).rstrip() for line in lines)
+    return "\n".join(aligned(lines))
 
 
 def duration(seconds: float) -> str:

@@ -39,7 +39,7 @@ def sensitivity(
         if plot is not None and not stability:
             raise UsageError("--plot draws the distances of runs from nearby", "add --stability")
         from hsdsl.model import load
-        from hsdsl.sensitivity.words import ALWAYS, as_json, summary
+        from hsdsl.sensitivity.summary import ALWAYS, as_json, summary
 
         call = located.settings(overrides, until=until, precision=precision)
         loaded = load(model)

@@ -64,11 +64,15 @@ def text_of(expr: Any) -> str:
 
 def inequality(surface: Surface) -> str:
     """The text of a guard."""
-    sign = ">=" if surface.residual == surface.left - surface.right else "<="
-    return f"{text_of(surface.left)} {sign} {text_of(surface.right)}"
+    return _between(surface, ">=", "<=")
 
 
 def wall(surface: Surface) -> str:
     """The text of a wall, whose surface is negative where the inequality holds."""
-    sign = "<=" if surface.residual == surface.left - surface.right else ">="
+    return _between(surface, "<=", ">=")
+
+
+def _between(surface: Surface, of_difference: str, otherwise: str) -> str:
+    """The sides of a surface, with the sign for a residual that is their difference or with the other one."""
+    sign = of_difference if surface.residual == surface.left - surface.right else otherwise
     return f"{text_of(surface.left)} {sign} {text_of(surface.right)}"

@@ -52,7 +52,7 @@ class _Check:
         program, kernel = self.mode(arc.mode, arc.states)
         if program.final:
             return 0.0
-        walls = range(len(program.edges), len(program.edges) + len(program.walls))
+        walls = program.surfaces[len(program.edges) :]
         bounds = [k for k, edge in enumerate(program.edges) if not edge.conditional] + [*walls]
         worst, width = 0.0, len(arc.states)
         for k in range(arc.first, arc.last + 1):

@@ -22,9 +22,9 @@ from hsdsl.model.visible import visible_run
 from hsdsl.names import INITIAL
 from hsdsl.parts import Part, present
 from hsdsl.program import Program
-from hsdsl.sensitivity.names import Target, targets
 from hsdsl.sensitivity.result import Sensitivity, Setting, Slopes
 from hsdsl.sensitivity.state_names import ERROR, SPAN, UNIT
+from hsdsl.sensitivity.targets import Target, targets
 from hsdsl.simulate.review import BecomesStiff
 from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.agreement import SAFE

@@ -18,8 +18,8 @@ from hsdsl.model.differentiate import start_by, varied
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.values import with_parameters
 from hsdsl.names import counted, did_you_mean
-from hsdsl.sensitivity.names import Target
 from hsdsl.sensitivity.result import Sensitivity
+from hsdsl.sensitivity.targets import Target
 
 if TYPE_CHECKING:
     from hsdsl.model.model import Model

@@ -67,20 +67,20 @@ class Orbit:
 
     def as_json(self) -> dict[str, Any]:
         """The object of `orbit --json`."""
-        from hsdsl.orbits.words import as_json
+        from hsdsl.orbits.summary import as_json
 
         return as_json(self)
 
     @property
     def summary(self) -> str:
         """The orbit as lines of text."""
-        from hsdsl.orbits.words import summary
+        from hsdsl.orbits.summary import summary
 
         return summary(self)
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the orbit and its multipliers to a .png or .svg file."""
-        from hsdsl.orbits.words import shown
+        from hsdsl.orbits.summary import shown
         from hsdsl.plot.orbit import plot_orbit
 
         states = [x for x in self.state if x not in self.drift]

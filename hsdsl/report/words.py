@@ -32,6 +32,12 @@ def values(named: Mapping[str, Any], digits: int = DIGITS) -> str:
     return ", ".join(f"{name} = {number(value, digits)}" for name, value in named.items())
 
 
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells as lines, with columns as wide as their widest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
 def meant_digits(execution: Execution) -> int:
     """How many digits of its times and states a run means: those of its tolerance and one more, where it has one."""
     tolerance = execution.settings.get("tolerance")

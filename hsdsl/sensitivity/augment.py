@@ -29,7 +29,6 @@ from hsdsl.functions import below, maximum, sign
 from hsdsl.sensitivity.chain import Slopes, slopes
 from hsdsl.sensitivity.dependence import Dependence, Jump
 from hsdsl.sensitivity.derivatives import Derivatives
-from hsdsl.sensitivity.names import Target
 from hsdsl.sensitivity.overrides import Overridden
 from hsdsl.sensitivity.state_names import (
     ERROR,
@@ -43,6 +42,7 @@ from hsdsl.sensitivity.state_names import (
     slope_name,
     still_rate_name,
 )
+from hsdsl.sensitivity.targets import Target
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Parameter, started
 
 

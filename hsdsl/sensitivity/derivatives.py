@@ -12,9 +12,9 @@ from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
 from hsdsl.lower.switches import with_switches
 from hsdsl.sensitivity.chain import Slopes, slopes
-from hsdsl.sensitivity.names import Target
 from hsdsl.sensitivity.overrides import Overridden, parameter_slopes
 from hsdsl.sensitivity.state_names import derivative_name
+from hsdsl.sensitivity.targets import Target
 from hsdsl.system import TIME, HybridSystem, Mode, SampledInput
 
 

@@ -38,7 +38,7 @@ def parted(
     ``time`` and ``state`` are the derivatives of the place's time and states, ``parameters`` those of all parameters by
     each target. With ``crossing`` a surface that is crossed at once counts too.
     """
-    for k in range(len(place.mode.edges) + len(place.mode.walls)):
+    for k in place.mode.surfaces:
         try:
             if _begins_on(place, k, crossing):
                 moved = (by for by, slopes in parameters.items() if _moves(run, place, k, time[by], state, by, slopes))

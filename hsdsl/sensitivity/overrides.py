@@ -13,7 +13,7 @@ from hsdsl.elaborate import parameter_expression
 from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
 from hsdsl.sensitivity.chain import slopes
-from hsdsl.sensitivity.names import Target
+from hsdsl.sensitivity.targets import Target
 from hsdsl.system import HybridSystem, Initial, started
 
 

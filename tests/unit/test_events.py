@@ -19,7 +19,7 @@ from hsdsl.plot.view import View
 from hsdsl.report import as_json, dumps, mode_graph
 from hsdsl.report.model import model_html
 from hsdsl.report.summary import summary
-from hsdsl.sensitivity import words as derivative_words
+from hsdsl.sensitivity import summary as derivative_summary
 
 HEAD = "hsdsl: 1\nmodes:\n  m:\n"
 
@@ -309,7 +309,7 @@ def test_memory_in_json_is_apart(delayed):
     assert memory.keys() > MEMORY and memory["rise@waiting"] == 1 and found["final"]["state"].keys() == {"x", "y"}
     assert found["transitions"] and "@" not in dumps(found)
     derivatives = delayed.sensitivity("initial.x", until=2)
-    assert "@" not in derivative_words.summary(derivatives) + dumps(derivative_words.as_json(derivatives))
+    assert "@" not in derivative_summary.summary(derivatives) + dumps(derivative_summary.as_json(derivatives))
 
 
 CYCLE = """hsdsl: 1

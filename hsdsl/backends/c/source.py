@@ -103,7 +103,7 @@ def _written(program: Program) -> tuple[_Writer, str]:
     model = (
         f"extern const hs_model hs_the_model;\n"
         f"HS_EXPORT const hs_model hs_the_model = {{{len(program.modes)}, {len(modes)}, {width(program)}, "
-        f"{max(len(m.edges) + len(m.walls) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
+        f"{max(len(m.surfaces) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
         f"{len(program.outputs)}, {len(writer.data) - program.contact_count}, {program.contact_count}, "
         f"{lines(program)}, {len(writer.states)}, {derivatives(program)}, {factors(program)}, {varied(program)}, "
         f"{table}}};\n"
@@ -198,15 +198,14 @@ class _Writer:
 
     def mode(self, index: int, mode: ModeProgram) -> str:
         routine = self.routines(mode.routines)
-        surfaces = range(len(mode.edges) + len(mode.walls))
         edges = [self.edge(k, edge, mode, routine) for k, edge in enumerate(mode.edges)]
         fields = [
-            *map(str, (len(mode.states), len(mode.edges), len(surfaces), int(mode.final))),
+            *map(str, (len(mode.states), len(mode.edges), len(mode.surfaces), int(mode.final))),
             *(routine[name] for name in ("flow", "surfaces", "magnitudes", "outputs")),
             self.table(
-                "hs_sparse", "gradients", [self.sparse(routine[f"gradient_{k}"], mode.slopes[k]) for k in surfaces]
+                "hs_sparse", "gradients", [self.sparse(routine[f"gradient_{k}"], mode.slopes[k]) for k in mode.surfaces]
             ),
-            self.pointers(routine[f"rate_{k}"] for k in surfaces),
+            self.pointers(routine[f"rate_{k}"] for k in mode.surfaces),
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states), mode.derived > 0) if mode.tape else ("0", "0", "0")),
             self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),

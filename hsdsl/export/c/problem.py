@@ -79,7 +79,7 @@ def _sizes(problem: Problem) -> str:
     sizes = {
         "MODES": len(modes),
         "WIDTH": width(program),
-        "SURFACES": max(len(mode.edges) + len(mode.walls) for mode in program.flows),
+        "SURFACES": max(len(mode.surfaces) for mode in program.flows),
         "EDGES": max(len(mode.edges) for mode in program.flows),
         "LINES": lines(program),
         "DERIVATIVES": derivatives(program),

@@ -74,7 +74,7 @@ class Unit:
     def _others(self) -> tuple[Variable, ...]:
         system, units = self.source.system, self.source.system.units
         outputs = (Variable("output", k, name, units.get(name)) for k, name in enumerate(system.outputs))
-        surfaces = max(len(mode.edges) + len(mode.walls) for mode in self.problem.program.flows)
+        surfaces = max(len(mode.surfaces) for mode in self.problem.program.flows)
         indicators = (Variable("indicator", k, f"indicator[{k}]") for k in range(surfaces))
         return (*_inputs(self.source), *outputs, *_modes(self.source), *indicators)
 

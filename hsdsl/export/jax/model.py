@@ -103,7 +103,7 @@ def _functions(source: Source) -> Iterable[str]:
 
 def _tables(source: Source) -> str:
     program, found = source.problem.program, motions(source)
-    surfaces = max(1, *(len(mode.edges) + len(mode.walls) for mode in program.flows))
+    surfaces = max(1, *(len(mode.surfaces) for mode in program.flows))
     wide = max(1, width(program))
     states = program.all_states
     lines = [f"SIZES = {wide}, {surfaces}, {len(program.outputs)}", f"STATES = {_strings(states)}"]
@@ -125,12 +125,8 @@ def _tables(source: Source) -> str:
 def _mode(motion: Motion, motions: list[Motion], program: Program, numbers: list[tuple[int, ...]]) -> str:
     j, held, owner = motion.flow, motion.held, program.modes[motion.owner]
     mode, states, own = program.flows[j], program.all_states, numbers[motion.owner]
-    surfaces = range(len(mode.edges) + len(mode.walls))
-    conditions = [
-        [name for name in mode.routines.names if name.startswith(f"condition_{k}_")] for k in range(len(mode.edges))
-    ]
-    listed = [_names(j, [f"{kind}_{k}" for k in surfaces]) for kind in ("gradient", "rate")]
-    parts = "".join(f"{_names(j, names)}, " for names in conditions)
+    listed = [_names(j, [f"{kind}_{k}" for k in mode.surfaces]) for kind in ("gradient", "rate")]
+    parts = "".join(f"{_names(j, names)}, " for names in mode.conditions)
     places = {(each.owner, each.held): i for i, each in enumerate(motions)}
     edge_of = {edge.contact: k for k, edge in enumerate(owner.edges) if edge.contact is not None}
     ends = [None if edge.releases is None else edge_of[edge.releases] for edge in mode.edges]

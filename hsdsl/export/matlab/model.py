@@ -119,10 +119,9 @@ class ModelText:
         edges = range(len(mode.edges))
         for name in ("flow", "surfaces", "magnitudes", "outputs"):
             self.add(name, self.function(f"{name}_{number}", found[name], mode))
-        surfaces = range(len(mode.edges) + len(mode.walls))
         for name in ("gradient", "rate"):
             self.add(
-                name, cell(self.function(f"{name}_{number}_{k + 1}", found[f"{name}_{k}"], mode) for k in surfaces)
+                name, cell(self.function(f"{name}_{number}_{k + 1}", found[f"{name}_{k}"], mode) for k in mode.surfaces)
             )
         for name in ("reset", "spread"):
             self.add(name, cell(self.function(f"{name}_{number}_{k + 1}", found[f"{name}_{k}"], mode) for k in edges))
@@ -148,9 +147,8 @@ class ModelText:
         """The parts of a condition; an edge without one has none."""
         if not mode.edges[k].conditional:
             return "{}"
-        parts = [name for name in found if name.startswith(f"condition_{k}_")]
-        numbered = [(f"condition_{number}_{k + 1}_{i + 1}", found[f"condition_{k}_{i}"]) for i in range(len(parts))]
-        return cell(self.function(name, definition, mode) for name, definition in numbered)
+        parts = enumerate(mode.conditions[k], 1)
+        return cell(self.function(f"condition_{number}_{k + 1}_{i}", found[name], mode) for i, name in parts)
 
     def jacobian(self, number: int, mode: ModeProgram) -> str:
         """The derivatives of a mode's flow as a matrix."""

@@ -40,7 +40,7 @@ def _sizes(program: Program, table: ButcherTableau) -> str:
     found = table_numbers(table)
     sizes = {
         "W": (width(program), "states of the largest mode"),
-        "M": (max(len(mode.edges) + len(mode.walls) for mode in program.modes), "surfaces of the mode with most"),
+        "M": (max(len(mode.surfaces) for mode in program.modes), "surfaces of the mode with most"),
         "E": (max(len(mode.edges) for mode in program.modes), "edges of the mode with most"),
         "P": (len(program.parameters), "parameters"),
         "D": (3 * len(program.inputs) + len(program.switches), "numbers of a segment of inputs"),
@@ -78,17 +78,17 @@ def _modes(program: Program) -> str:
 
 
 def _mode(j: int, mode: ModeProgram, states: tuple[str, ...]) -> str:
-    surfaces = range(len(mode.edges) + len(mode.walls))
     edges = "".join(_edge(j, k, mode) for k in range(len(mode.edges)))
     plain = ("flow", "surfaces", "magnitudes", "outputs")
     flow, values, magnitudes, outputs = (f"mode_{j}_{name}" for name in plain)
-    gradients, rates = (array(f"mode_{j}_{kind}_{k}" for k in surfaces) for kind in ("gradient", "rate"))
+    gradients, rates = (array(f"mode_{j}_{kind}_{k}" for k in mode.surfaces) for kind in ("gradient", "rate"))
     places = array(str(states.index(name)) for name in mode.states)
     terms = f"Some(mode_{j}_terms)" if mode.terms else "None"
     held = "None" if mode.held is None else f"Some(mode_{j}_held)"
     return (
         f"    Mode {{\n        name: {string(mode.name)},\n        dimension: {len(mode.states)},\n"
-        f"        edges: &[{edges}],\n        surfaces: {len(surfaces)},\n        is_final: {_truth(mode.final)},\n"
+        f"        edges: &[{edges}],\n        surfaces: {len(mode.surfaces)},\n"
+        f"        is_final: {_truth(mode.final)},\n"
         f"        flow: {flow},\n        values: {values},\n        magnitudes: {magnitudes},\n"
         f"        outputs: {outputs},\n        gradients: &{gradients},\n        rates: &{rates},\n"
         f"        terms: {terms},\n        held: {held},\n        states: &{places},\n    }},\n"
@@ -97,7 +97,7 @@ def _mode(j: int, mode: ModeProgram, states: tuple[str, ...]) -> str:
 
 def _edge(j: int, k: int, mode: ModeProgram) -> str:
     edge = mode.edges[k]
-    parts = array(f"mode_{j}_{name}" for name in mode.routines.names if name.startswith(f"condition_{k}_"))
+    parts = array(f"mode_{j}_{name}" for name in mode.conditions[k])
     changes = array(map(str, edge.changes))
     contact = "None" if edge.contact is None else f"Some({edge.contact})"
     return (

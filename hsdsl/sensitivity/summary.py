@@ -8,7 +8,7 @@ from typing import Any
 from hsdsl.names import called, seen
 from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
-from hsdsl.report.words import number
+from hsdsl.report.words import aligned, number
 from hsdsl.sensitivity.result import EndSlopes, Sensitivity, TransitionSlopes
 from hsdsl.sensitivity.ties import Tie
 
@@ -111,9 +111,7 @@ def _slope(value: Any) -> str:
 
 def _table(title: str, heads: list[str], rows: list[list[str]]) -> Iterator[str]:
     shown = rows[:MOST_ROWS]
-    widths = [max(len(row[i]) for row in (heads, *shown)) for i in range(len(heads))]
     yield f"\n{title}"
-    for row in (heads, *shown):
-        yield ("  " + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True))).rstrip()
+    yield from (f"  {line}".rstrip() for line in aligned([heads, *shown]))
     if len(rows) > len(shown):
         yield f"  and {len(rows) - len(shown)} more (--json has all)"
