@@ -11,7 +11,7 @@ sampled input stays as its symbol.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Literal
@@ -148,6 +148,12 @@ class Edge:
         return replace(
             self, surface=self.surface.mapped(change), condition=condition, reset=tuple(map(change, self.reset))
         )
+
+    def of_states(self, names: Container[str]) -> Edge:
+        """The edge with values of these states of its target, and no others."""
+        kept = [k for k, name in enumerate(self.target_states) if name in names]
+        parts = ("target_states", "reset", "reset_texts")
+        return replace(self, **{part: tuple(getattr(self, part)[k] for k in kept) for part in parts})
 
 
 SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}

@@ -79,26 +79,16 @@ class _ProductMode:
 
     def _edges(self, edge: Edge, surface: Surface) -> Iterator[Edge]:
         """An edge for each of the modes that it can lead to."""
-        values = {name: self.here(value) for name, value in zip(edge.target_states, edge.reset, strict=True)}
-        texts = dict(zip(edge.target_states, edge.reset_texts, strict=True))
+        whole = replace(edge.mapped(self.here), source=self.name, surface=surface)
+        values = dict(zip(whole.target_states, whole.reset, strict=True))
         for target in self.every:
             numbers = numbers_of(self.system.parts, target)
             conditions = [is_number(values[part], number) for part, number in numbers.items()]
             if any(condition == False for condition in conditions):  # noqa: E712 - SymPy's own
                 continue
-            states = present(self.system.parts, numbers)
-            kept = tuple(name for name in values if name in states)
-            parts = [c for c in (self.here(edge.condition), *conditions) if c is not None and c != True]  # noqa: E712
-            yield replace(
-                edge,
-                source=self.name,
-                target=target,
-                surface=surface,
-                condition=all_hold(parts),
-                target_states=kept,
-                reset=tuple(values[name] for name in kept),
-                reset_texts=tuple(texts[name] for name in kept),
-            )
+            kept = whole.of_states(present(self.system.parts, numbers))
+            parts = [c for c in (whole.condition, *conditions) if c is not None and c != True]  # noqa: E712
+            yield replace(kept, target=target, condition=all_hold(parts))
 
 
 def all_hold(conditions: list[Any]) -> Any | None:

@@ -101,6 +101,4 @@ def _mode(mode: Mode, needed: set[Node], outputs: list[int], own: set[str]) -> M
 
 
 def _edge(edge: Edge, needed: set[Node], own: set[str]) -> Edge:
-    kept = [k for k, state in enumerate(edge.target_states) if _entered(own, edge, state) in needed]
-    parts = {name: tuple(getattr(edge, name)[k] for k in kept) for name in ("target_states", "reset", "reset_texts")}
-    return replace(edge, **parts)
+    return edge.of_states([state for state in edge.target_states if _entered(own, edge, state) in needed])

@@ -25,7 +25,7 @@ from hsdsl.lint.subject import EdgePart, ModePart, Subject, edge_parts
 from hsdsl.lint.units.model import Units
 from hsdsl.parts import Part, numbered
 from hsdsl.schema import AutomatonDocument, SystemDocument
-from hsdsl.system import TIME, Edge, Initial, Mode, SampledInput, Surface
+from hsdsl.system import TIME, Edge, Initial, Mode, SampledInput
 
 OF_UNITS = ("HS601", "HS602", "HS603", "HS604", "HS605")
 OF_ALL = ("HS426", "HS427", "HS428", "HS501", *OF_UNITS)
@@ -139,43 +139,30 @@ class AutomatonSubject(Subject):
         done: dict[Any, Any] = {}
 
         def here(expr: Any) -> Any:
-            return None if expr is None else replaced(expr, known, done)
-
-        def side(surface: Surface) -> Surface:
-            return Surface(here(surface.left), here(surface.right), here(surface.residual), surface.text)
+            return replaced(expr, known, done)
 
         flow = dict(zip(self._whole.states, self._whole.flow, strict=True))
         states = tuple(name for name in self._whole.states if name in self.part.states[k])
-        edges = [
-            edge for edge in self._whole.edges if self._is_own(edge) and (edge.part is None or edge.part[1] == k + 1)
-        ]
-        walls = map(side, self._whole.walls)
+        edges = (
+            edge for edge in self._whole.edges if self._is_own(edge) and edge.part in (None, (self.part.name, k + 1))
+        )
+        walls = (wall.mapped(here) for wall in self._whole.walls)
         return Mode(
             name=self.part.modes[k],
             states=states,
             flow=tuple(here(flow[name]) for name in states),
             flow_texts=states,
             walls=tuple(wall for wall in walls if _names_in(wall.residual) & self._own),
-            edges=tuple(self._edge(k, edge, here, side(edge.surface)) for edge in edges),
+            edges=tuple(self._edge(k, edge.mapped(here)) for edge in edges),
             outputs=(None,) * len(self.system.outputs),
             final=self.part.final[k],
         )
 
-    def _edge(self, k: int, edge: Edge, here: Any, surface: Surface) -> Edge:
-        values = {name: here(value) for name, value in zip(edge.target_states, edge.reset, strict=True)}
+    def _edge(self, k: int, edge: Edge) -> Edge:
+        values = dict(zip(edge.target_states, edge.reset, strict=True))
         target = int(values[self.part.name]) - 1 if self.part.is_numbered else k
-        own = frozenset(self.part.states[target])
-        kept = [name for name in values if name in own]
-        return replace(
-            edge,
-            source=self.part.modes[k],
-            target=self.part.modes[target],
-            surface=surface,
-            condition=here(edge.condition),
-            target_states=tuple(kept),
-            reset=tuple(values[name] for name in kept),
-            reset_texts=tuple(kept),
-        )
+        modes, states = self.part.modes, self.part.states[target]
+        return replace(edge.of_states(states), source=modes[k], target=modes[target])
 
 
 def _names_in(expr: Any) -> set[str]:

@@ -23,6 +23,7 @@ import numpy as np
 from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
 from hsdsl.execution import Array
+from hsdsl.orbits.orbit import multipliers_of
 from hsdsl.orbits.section import NoReturn, Return
 from hsdsl.orbits.shooting import CLOSED, Closed, gap
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
@@ -80,7 +81,7 @@ class Follower:
     """
 
     def __init__(self, passage: Passage, first: Closed, value: float, range_: tuple[float, float]) -> None:
-        self.passage, self.range = passage, range_
+        self.passage, self.first_orbit, self.range = passage, first, range_
         n = len(first.point)
         _, self.multiple, _ = passage(first.point, first.phase, value)
         self.forced = self.multiple is not None
@@ -152,11 +153,7 @@ class Follower:
 
     def multipliers(self, here: Solution) -> Array:
         """The multipliers of a solution, the largest first."""
-        n = len(here.unknowns) - 2
-        matrix = here.passage.slopes[:, : n + 1].copy()
-        matrix[n, n] += self.forced
-        values = np.linalg.eigvals(self._shown(matrix)[:, self.kept[:-1]])
-        return values[np.argsort(-np.abs(values), kind="stable")][:-1]
+        return multipliers_of(self.first_orbit, here.passage.slopes, self.forced)
 
     def tests(self, here: Solution) -> dict[str, float]:
         """Numbers that change their sign at bifurcations."""

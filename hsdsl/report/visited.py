@@ -15,9 +15,7 @@ def visited_part(program: Program, run: Execution | None) -> Program:
         return program
     if run is None:
         return replace(program, modes=())
-    names = list(dict.fromkeys(arc.mode for arc in run.arcs))
-    names += [made.target for made in run.transitions if made.target not in names]
-    names = list(dict.fromkeys(names))
+    names = list(dict.fromkeys([*(arc.mode for arc in run.arcs), *(made.target for made in run.transitions)]))
     states = {arc.mode: arc.states for arc in run.arcs}
     taken = dict.fromkeys((made.source, made.edge, made.target) for made in run.transitions)
     texts = {edge.name: edge for edge in program.modes[0].edges}
