@@ -20,7 +20,7 @@ from hsdsl.completion.nearby import cancelled
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.scope import symbol
-from hsdsl.system import TIME, Edge, HybridSystem, Mode
+from hsdsl.system import TIME, Edge, HybridSystem, Mode, Surface
 
 PART = sp.Rational(1, 1024)  # of the run: a surface's size alone, zero where all states in it are, bounds no rate
 
@@ -65,7 +65,7 @@ def _pairs(system: HybridSystem) -> Iterator[tuple[Mode, Edge, Mode, Edge]]:
     modes = list(system.modes)
     for i, a in enumerate(modes):
         for b in modes[i + 1 :]:
-            if a.states == b.states and a.states:
+            if a.states and sorted(a.states) == sorted(b.states):
                 for out in a.edges:
                     for back in b.edges:
                         to_and_fro = out.target == b.name and back.target == a.name and _opposite(out, back)
@@ -87,9 +87,10 @@ def _opposite(out: Edge, back: Edge) -> bool:
 
 def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr) -> Sliding:
     states = [symbol(state) for state in a.states]
+    of_b = dict(zip(b.states, b.flow, strict=True))
+    flows = a.flow, tuple(of_b[state] for state in a.states)
     r = out.surface.residual
-    flows = (dict(zip(states, mode.flow, strict=True)) for mode in (a, b))
-    outwards, inwards = (cancelled(lie_derivative(r, flow)) for flow in flows)
+    outwards, inwards = (cancelled(lie_derivative(r, dict(zip(states, flow, strict=True)))) for flow in flows)
     slopes = [sp.diff(r, x) for x in states]
     curved = any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME)))
     pressing = cancelled(outwards - inwards)
@@ -102,13 +103,19 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr)
             return f if f == g else None
         return cancelled(f + share * (g - f)) + back_to * (g - f)
 
-    flow = tuple(map(blended, a.flow, b.flow))
+    flow = tuple(map(blended, *flows))
     stay = {"target_states": a.states, "reset": tuple(states), "reset_texts": a.states, "condition": None}
-    pairs = zip(states, a.flow, b.flow, strict=True)
-    onto = tuple(x + r * (g - f) / pressing if curved else x for x, f, g in pairs)
-    leave = {**stay, "reset": onto, "reset_texts": tuple(map(text_of, onto))}
-    leave_a = Edge(f"{name}->{a.name}", name, a.name, zero_surface(-outwards), priority=out.priority, **leave)
-    leave_b = Edge(f"{name}->{b.name}", name, b.name, zero_surface(inwards), priority=back.priority, **leave)
+    pairs = zip(a.states, states, *flows, strict=True)
+    onto = {state: x + r * (g - f) / pressing if curved else x for state, x, f, g in pairs}
+
+    def leave(mode: Mode, surface: Surface, priority: int) -> Edge:
+        reset = tuple(onto[state] for state in mode.states)
+        texts = tuple(map(text_of, reset))
+        given = {**stay, "target_states": mode.states, "reset": reset, "reset_texts": texts}
+        return Edge(f"{name}->{mode.name}", name, mode.name, surface, priority=priority, **given)
+
+    leave_a = leave(a, zero_surface(-outwards), out.priority)
+    leave_b = leave(b, zero_surface(inwards), back.priority)
     mode = replace(
         a,
         name=name,

@@ -107,3 +107,12 @@ def test_a_completed_model_slides_in_its_own_modes_where_a_surface_has_choices()
     written = hsdsl.loads(text).completed()
     again = hsdsl.loads(written)
     assert "sliding_down_up" in written and again.sliding is again
+
+
+def test_the_order_of_states_does_not_matter_to_sliding():
+    curved = SWITCHED.replace("x <= 0", "x + y**2/9 <= 0").replace("x >= 0", "x + y**2/9 >= 0")
+    curved = curved.replace("x: k + 0.5, y: 1 + x", "x: k - y, y: 1")
+    other = curved.replace("x: k - y, y: 1", "y: 1, x: k - y")
+    one, two = (hsdsl.loads(text).simulate(completion="auto") for text in (curved, other))
+    assert [t.edge for t in one.transitions][-1] == "sliding_down_up->up" and other != curved
+    assert one.final == two.final and [t.time for t in one.transitions] == [t.time for t in two.transitions]
