@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, Literal
 
 import sympy as sp
@@ -142,6 +143,16 @@ class Edge:
     of_event: tuple[str, ...] = ()
     part: tuple[str, int] | None = None
 
+    @property
+    def values(self) -> dict[str, sp.Expr]:
+        """The value that each state of the target gets."""
+        return dict(zip(self.target_states, self.reset, strict=True))
+
+    @property
+    def changes(self) -> dict[Any, sp.Expr]:
+        """The values that are not those before, by the symbols of their states."""
+        return {symbol(name): value for name, value in self.values.items() if value != symbol(name)}
+
     def mapped(self, change: Callable[[Any], Any]) -> Edge:
         """The edge with changed expressions."""
         condition = None if self.condition is None else change(self.condition)
@@ -212,6 +223,11 @@ class Mode:
     def surfaces(self) -> tuple[Surface, ...]:
         """The surfaces of all edges, then the walls."""
         return (*(edge.surface for edge in self.edges), *self.walls)
+
+    @cached_property
+    def vector_field(self) -> dict[Any, sp.Expr]:
+        """The derivative of each state, by its symbol."""
+        return dict(zip(map(symbol, self.states), self.flow, strict=True))
 
     def mapped(self, change: Callable[[Any], Any]) -> Mode:
         """The mode with changed expressions, but those of its scene."""

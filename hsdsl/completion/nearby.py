@@ -36,11 +36,6 @@ def symbols(states: tuple[str, ...]) -> tuple[sp.Symbol, ...]:
     return tuple(map(symbol, states))
 
 
-@lru_cache(maxsize=16)
-def _rows(states: tuple[str, ...], flow: tuple[sp.Expr, ...]) -> dict[sp.Symbol, sp.Expr]:
-    return dict(zip(symbols(states), flow, strict=True))
-
-
 class Nearby:
     """What motion along one guard depends on: the guard, the states that the reset changes, and flows of states.
 
@@ -59,8 +54,8 @@ class Nearby:
     ) -> None:
         self._here, self.mode, self.impact = here, mode, impact
         self.states, self.edge = symbols(mode.states), edge
-        self.guard = sp.sympify(edge.surface.residual).xreplace(here)
-        self._flow = _rows(mode.states, mode.flow)
+        self.guard = edge.surface.residual.xreplace(here)
+        self._flow = mode.vector_field
         pairs = zip(self.states, edge.reset, strict=True)
         self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x and i not in counts]
         self.own = tuple(self.states[i] for i in self.changed)
@@ -76,7 +71,7 @@ class Nearby:
 
     def flow(self, x: sp.Symbol) -> Any:
         """The rate of time or of a state."""
-        return sp.S.One if x == TIME else sp.sympify(self._flow[x]).xreplace(self._here)
+        return sp.S.One if x == TIME else self._flow[x].xreplace(self._here)
 
     def among(self, value: sp.Basic) -> list[Any]:
         """The time, and the states in the order of their names, that a value depends on."""

@@ -87,10 +87,9 @@ def _opposite(out: Edge, back: Edge) -> bool:
 
 def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr) -> Sliding:
     states = [symbol(state) for state in a.states]
-    of_b = dict(zip(b.states, b.flow, strict=True))
-    flows = a.flow, tuple(of_b[state] for state in a.states)
+    flows = a.flow, tuple(b.vector_field[x] for x in states)
     r = out.surface.residual
-    outwards, inwards = (cancelled(lie_derivative(r, dict(zip(states, flow, strict=True)))) for flow in flows)
+    outwards, inwards = (cancelled(lie_derivative(r, mode.vector_field)) for mode in (a, b))
     slopes = [sp.diff(r, x) for x in states]
     curved = any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME)))
     pressing = cancelled(outwards - inwards)

@@ -153,7 +153,7 @@ def _transition(edge: Edge) -> dict[str, str]:
     if edge.condition not in (None, sp.true):
         fields["if"] = text_of(edge.condition)
     fields["to"] = edge.target
-    changes = {name: text_of(r) for name, r in zip(edge.target_states, edge.reset, strict=True) if r != symbol(name)}
+    changes = {state.name: text_of(r) for state, r in edge.changes.items()}
     if changes:
         fields["reset"] = flow_style(changes)
     if edge.priority:

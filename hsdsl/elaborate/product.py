@@ -80,7 +80,7 @@ class _ProductMode:
     def _edges(self, edge: Edge, surface: Surface) -> Iterator[Edge]:
         """An edge for each of the modes that it can lead to."""
         whole = replace(edge.mapped(self.here), source=self.name, surface=surface)
-        values = dict(zip(whole.target_states, whole.reset, strict=True))
+        values = whole.values
         for target in self.every:
             numbers = numbers_of(self.system.parts, target)
             conditions = [is_number(values[part], number) for part, number in numbers.items()]

@@ -67,7 +67,7 @@ def _uses(system: HybridSystem) -> dict[Node, list[Node]]:
         for state, expression in zip(mode.states, mode.flow, strict=True):
             uses[mode.name, state] += _states(mode, [expression])
         for edge in mode.edges:
-            for state, expression in zip(edge.target_states, edge.reset, strict=True):
+            for state, expression in edge.values.items():
                 uses[_entered(own, edge, state)] += _states(mode, [expression])
     return uses
 

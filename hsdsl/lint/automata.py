@@ -102,13 +102,7 @@ class AutomatonSubject(Subject):
     def _set_by_others(self) -> frozenset[str]:
         """Its states that others set, or that it sets where it fires together with them."""
         others = (edge for edge in self._whole.edges if not self._is_own(edge))
-        found = {
-            name
-            for edge in others
-            for name, value in zip(edge.target_states, edge.reset, strict=True)
-            if name in self._own and value != symbol(name)
-        }
-        return frozenset(found)
+        return frozenset(state.name for edge in others for state in edge.changes) & self._own
 
     @cached_property
     def _joined(self) -> frozenset[str]:
@@ -159,8 +153,7 @@ class AutomatonSubject(Subject):
         )
 
     def _edge(self, k: int, edge: Edge) -> Edge:
-        values = dict(zip(edge.target_states, edge.reset, strict=True))
-        target = int(values[self.part.name]) - 1 if self.part.is_numbered else k
+        target = int(edge.values[self.part.name]) - 1 if self.part.is_numbered else k
         modes, states = self.part.modes, self.part.states[target]
         return replace(edge.of_states(states), source=modes[k], target=modes[target])
 

@@ -106,7 +106,7 @@ def _definitions(system: HybridSystem) -> Iterator[tuple[str, Any]]:
     for mode in system.modes:
         yield from zip(mode.states, mode.flow, strict=True)
         for edge in mode.edges:
-            yield from zip(edge.target_states, edge.reset, strict=True)
+            yield from edge.values.items()
     yield from system.initial.values
     yield from ((parameter.name, parameter.value) for parameter in system.parameters)
     for given in system.inputs:

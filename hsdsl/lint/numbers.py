@@ -12,7 +12,6 @@ from sympy.logic.boolalg import BooleanFunction
 
 from hsdsl.expression import numeric
 from hsdsl.expression.derivatives import lie_derivative
-from hsdsl.expression.scope import symbol
 from hsdsl.functions import FUNCTIONS
 from hsdsl.system import Mode, SampledInput, Surface
 
@@ -121,9 +120,8 @@ def leaves(mode: Mode, surface: Surface, point: Point) -> bool | None:
     count as constant.
     """
     rate: Any = surface.residual
-    flow = dict(zip(map(symbol, mode.states), mode.flow, strict=True))
     for _ in range(_DEEPEST):
-        rate = lie_derivative(rate, flow)
+        rate = lie_derivative(rate, mode.vector_field)
         value = evaluate(rate, point)
         if not numeric.finite(value):
             return None

@@ -63,8 +63,8 @@ class Dependence:
         target = self._modes[edge.target]
         if not target.states:
             return [sp.S.Zero] * len(edge.reset)
-        at = dict(zip(map(symbol, edge.target_states), map(sp.sympify, edge.reset), strict=True))
-        return [replaced(sp.sympify(f), at, done) for done in [{}] for f in target.flow]
+        at = {symbol(x): value for x, value in edge.values.items()}
+        return [replaced(f, at, done) for done in [{}] for f in target.flow]
 
     def _spread(self, mode: Mode) -> None:
         """Add what depends on what is known to differ from zero."""

@@ -41,7 +41,7 @@ def with_events(system: HybridSystem) -> HybridSystem:
 def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
     constants = frozenset(system.parameter_symbols)
     flow = {TIME: ONE} | ({symbol(SINCE): ONE} if timed else {})
-    flow |= dict(zip(map(symbol, mode.states), mode.flow, strict=True))
+    flow |= mode.vector_field
     drafts = [Event(edge, mode, timed, flow, constants) for edge in mode.edges if edge.event is not None]
     index, jumps = Memory(drafts), set[str]()
     changes = [new_values(edge, timed) for edge in mode.edges if edge.target == mode.name and drafts]

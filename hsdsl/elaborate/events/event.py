@@ -46,7 +46,7 @@ class Event:
         """
         if self.delay is None:
             return ()
-        given = dict(zip(self.edge.target_states, self.edge.reset, strict=True))
+        given = self.edge.values
         own = () if self.event.at_execution else self.event.given
         stored = tuple(state for state in own if state in given and given[state].free_symbols)
         most = self.event.waiting if self.event.persistent else 1

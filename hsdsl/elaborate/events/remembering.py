@@ -35,9 +35,7 @@ class Memory:
 
 def new_values(edge: Edge, timed: bool) -> dict[Any, Any]:
     """The new value of each symbol that an edge changes."""
-    pairs = ((symbol(name), value) for name, value in zip(edge.target_states, edge.reset, strict=True))
-    meaning: dict[Any, Any] = {name: value for name, value in pairs if value != name}
-    return meaning if edge.stays or not timed else meaning | {symbol(SINCE): ZERO}
+    return edge.changes if edge.stays or not timed else edge.changes | {symbol(SINCE): ZERO}
 
 
 def all_states(events: Sequence[Event]) -> tuple[str, ...]:
@@ -47,7 +45,7 @@ def all_states(events: Sequence[Event]) -> tuple[str, ...]:
 def remembered(draft: Draft, memories: Mapping[str, Memory], order: Mapping[str, tuple[str, ...]]) -> Edge:
     """An edge with what the events of its target remember after it."""
     edge, fired, reached = draft
-    given = dict(zip(edge.target_states, edge.reset, strict=True))
+    given = edge.values
     index, inside = memories[edge.target], edge.source == edge.target
     values: Values = {}
     if not inside:

@@ -16,7 +16,7 @@ from hsdsl.system import HALF, ONE, TIME, ZERO, Edge, HybridSystem, Mode, at_lea
 def begins_to_wait(event: Event) -> Values:
     """The values where an event is triggered: the execution that waits comes before those that are made later."""
     delay = maximum(event.delay, ZERO) if event.delay != 0 else ZERO
-    given = dict(zip(event.edge.target_states, event.edge.reset, strict=True))
+    given = event.edge.values
     waiting, time = _waiting(event), TIME + delay
     values = {waiting.name: ONE if len(event.slots) == 1 else waiting + 1}
     latest = time if delay.free_symbols else None  # with the same delay none is made before one that waits
@@ -66,8 +66,7 @@ def executes(event: Event) -> Edge:
     """The edge that gives the states, after the delay, the values that were stored; later slots move up."""
     edge, first, waiting = replace(event.edge, event=None), event.slots[0], _waiting(event)
     texts = dict(zip(edge.target_states, edge.reset_texts, strict=True))
-    values = dict(zip(edge.target_states, edge.reset, strict=True))
-    values |= {state: symbol(name) for state, name in first.values.items()}
+    values = edge.values | {state: symbol(name) for state, name in first.values.items()}
     if edge.target == event.mode.name:
         for slot, following in pairwise(event.slots):
             values |= dict(zip(slot.states, map(symbol, following.states), strict=True))

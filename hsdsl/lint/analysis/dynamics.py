@@ -51,7 +51,7 @@ class Dynamics:
 
     def flow(self, mode: Mode) -> dict[Any, Any]:
         """The derivative of each state, by symbol."""
-        return {symbol(s): self.placed(f) for s, f in zip(mode.states, mode.flow, strict=True)}
+        return {s: self.placed(f) for s, f in mode.vector_field.items()}
 
     def rate(self, mode: Mode, expr: Any | None) -> Any | None:
         """L_f of an expression; None where it is too large, or follows an input that is interpolated."""
@@ -122,7 +122,7 @@ class Dynamics:
         return replaced(expr, moves, {}) if expr.free_symbols & moves.keys() else expr
 
     def _moves(self, edge: Edge) -> dict[Any, Any]:
-        moves = {symbol(s): self.placed(r) for s, r in zip(edge.target_states, edge.reset, strict=True)}
+        moves = {symbol(s): self.placed(r) for s, r in edge.values.items()}
         return {s: r for s, r in moves.items() if s != r}
 
     def value(self, expr: Any, point: Mapping[Any, float]) -> float:

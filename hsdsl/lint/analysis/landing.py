@@ -62,7 +62,7 @@ def _returns(dynamics: Dynamics, edge: Edge, after: Edge, guard: list[Clause]) -
     if after.target != edge.source or (after.name == edge.name and after.source == edge.source):
         return False
     mode = dynamics.modes[edge.source]
-    for state, value in zip(after.target_states, after.reset, strict=True):
+    for state, value in after.values.items():
         moved = dynamics.carried(dynamics.placed(value), edge) - symbol(state)
         if moved != 0 and any(dynamics.vanishes(mode, moved, clause) is None for clause in guard):
             return False

@@ -160,8 +160,7 @@ class ModePoint:
         """Where an edge leads to from here."""
         target = self.dynamics.modes[edge.target]
         kept = {s: v for s, v in self.point.items() if s is TIME or s in self.dynamics.inputs}
-        values = zip(edge.target_states, edge.reset, strict=True)
-        new = {symbol(s): self.dynamics.value(self.dynamics.placed(r), self.point) for s, r in values}
+        new = {symbol(s): self.dynamics.value(self.dynamics.placed(r), self.point) for s, r in edge.values.items()}
         if any(value != value for value in new.values()):
             raise Unsure
         return ModePoint(self.dynamics, target, kept | new)

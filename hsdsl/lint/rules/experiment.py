@@ -94,10 +94,10 @@ def _reached_by_constant_flow(subject: Subject, until: Number) -> Iterator[str]:
     part = subject.mode(subject.system.initial.mode)
     end = {**subject.start, TIME: until}
     constant = set(subject.numbers)
-    for name, rate in zip(part.mode.states, part.mode.flow, strict=True):
+    for state, rate in part.mode.vector_field.items():
         if not rate.free_symbols <= constant:
             return
-        end[symbol(name)] = evaluate(symbol(name) + rate * TIME, {**subject.start, TIME: until})
+        end[state] = evaluate(state + rate * TIME, {**subject.start, TIME: until})
     surfaces = [edge.surface for edge in part.mode.edges]
     sides = [side(surface, end) for surface in (*surfaces, *part.mode.walls) if _affine(part, surface.residual)]
     known = len(sides) == len(surfaces) + len(part.mode.walls)

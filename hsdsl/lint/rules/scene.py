@@ -41,14 +41,12 @@ def idle_parameter(subject: Subject) -> Iterator[Finding]:
 
 def constant_state(subject: Subject) -> Iterator[Finding]:
     """Find states that no flow and no reset changes."""
-    changing: set[str] = set()
+    changing: set[Any] = set()
     for mode in subject.system.modes:
-        changing.update(name for name, rate in zip(mode.states, mode.flow, strict=True) if rate != 0)
-        for edge in mode.edges:
-            new = zip(edge.target_states, edge.reset, strict=True)
-            changing.update(name for name, value in new if value != symbol(name))
+        changing.update(state for state, rate in mode.vector_field.items() if rate != 0)
+        changing.update(state for edge in mode.edges for state in edge.changes)
     for name, key in subject.states.items():
-        if name not in changing:
+        if symbol(name) not in changing:
             yield Finding(key.place.span, f"the state '{name}' never changes", "make it a parameter")
 
 

@@ -30,9 +30,9 @@ _SIGNS: dict[Any, tuple[str, str]] = {  # of left less right, where the comparis
 def identity_reset(subject: Subject) -> Iterator[Finding]:
     """Find resets of a state to itself."""
     for part, edge in subject.edges:
-        new = dict(zip(edge.edge.target_states, edge.edge.reset, strict=True))
+        values = edge.edge.values
         for name in edge.document.reset:
-            if new[str(name)] == symbol(name) and name in part.mode.states:
+            if values[name] == symbol(name) and name in part.mode.states:
                 fix = without_entry(subject.node(*edge.path, "reset"), str(name))
                 yield Finding(name.place.span, f"the state '{name}' keeps its value anyway", "leave it out", fix=fix)
 

@@ -192,10 +192,9 @@ def _repeats(edge: Edge, mode: Mode) -> bool:
     """Whether the reset of an edge to its own mode changes states, and none that decides about a next transition."""
     if edge.target != mode.name or mode.final:
         return False
-    flow = dict(zip(map(symbol, mode.states), mode.flow, strict=True))
-    changed = {symbol(s) for s, value in zip(mode.states, edge.reset, strict=True) if value != symbol(s)}
+    changed = edge.changes.keys()
     surfaces = {x for surface in mode.surfaces for x in surface.residual.free_symbols}
-    moving = [row for x, row in flow.items() if x in edge.surface.residual.free_symbols]
+    moving = [row for x, row in mode.vector_field.items() if x in edge.surface.residual.free_symbols]
     rates = {x for row in moving for x in row.free_symbols}
     conditions = {x for e in mode.edges if e.condition is not None for x in e.condition.free_symbols}
     return bool(changed) and not changed & (surfaces | rates | conditions)

@@ -143,18 +143,17 @@ class _Maker:
 
     def _rate(self, edge: Edge, surface: sp.Expr, mode: Mode) -> sp.Expr | None:
         """The surface's derivative along the flow; None where time or an input is in it."""
-        flow = dict(zip(map(symbol, mode.states), mode.flow, strict=True))
-        rate = lie_derivative(edge.surface.residual, flow)
+        rate = lie_derivative(edge.surface.residual, mode.vector_field)
         if self._moves(rate):
             return None
-        return self._place(lie_derivative(surface, flow) if self._moves(edge.surface.residual) else rate)
+        return self._place(lie_derivative(surface, mode.vector_field) if self._moves(edge.surface.residual) else rate)
 
     def _kept(self) -> tuple[tuple[int, ...], ...] | None:
         common = [n for n in self.states[0] if all(n in states for states in self.states)]
         for mode in self.system.modes:
             for edge in mode.edges:
-                reset = dict(zip(edge.target_states, edge.reset, strict=True))
-                common = [n for n in common if self._unchanged(edge, reset[n], n)]
+                values = edge.values
+                common = [n for n in common if self._unchanged(edge, values[n], n)]
         common += ["t"] * self.timed
         names = [states + ("t",) * self.timed for states in self.states]
         return tuple(tuple(own.index(n) for n in common) for own in names) if common else None
