@@ -65,7 +65,7 @@ def run(
             ahead.begin(ModelFiles.read(model, None, text), engine != "python" and precision is None)
         loaded = _load(model, text, engine, precision, experiment.scheme)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
-        names = chosen_names(outputs, loaded.columns)
+        names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
         shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
         result: Any
         with progress(answer.hidden) as show:
@@ -151,11 +151,11 @@ def _record(execution: Execution, names: list[str] | None, estimated: Any) -> di
     return result | ({} if estimated is None else {"estimate": estimated.as_json()})
 
 
-def chosen_names(outputs: str | None, known: list[str]) -> list[str] | None:
+def chosen_names(outputs: str | None, known: list[str], inputs: list[str]) -> list[str] | None:
     """The names of ``--outputs``, None where it is left out."""
     if outputs is None:
         return None
-    names = known_names(outputs, known, "--outputs", STATE)
+    names = known_names(outputs, known, "--outputs", STATE, inputs)
     if not names:
         raise UsageError("--outputs: expected names of states or outputs, with commas between them")
     return list(names)

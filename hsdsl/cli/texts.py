@@ -39,15 +39,18 @@ def names_of(text: str | None) -> list[str]:
     return [part.strip() for part in (text or "").split(",") if part.strip()]
 
 
-def known_names(text: str | None, known: Sequence[str], name: str, kind: str = "") -> tuple[str, ...]:
-    """The names in a text with commas between them; ``kind`` says in an error what they name.
+def known_names(
+    text: str | None, known: Sequence[str], name: str, kind: str = "", inputs: Sequence[str] = ()
+) -> tuple[str, ...]:
+    """The names in a text with commas between them; ``kind`` says in an error what they name, and ``inputs`` do not.
 
     Raises UsageError: one of them is not known.
     """
     names = names_of(text)
     for each in names:
         if each not in known:
-            raise UsageError(f"{name}: there is no {kind}'{each}'", did_you_mean(each, known))
+            given = f"it is an input: write outputs: {{{each}: {each}}}" if each in inputs else None
+            raise UsageError(f"{name}: there is no {kind}'{each}'", given or did_you_mean(each, known))
     return tuple(names)
 
 

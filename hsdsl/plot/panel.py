@@ -202,20 +202,21 @@ def _draw_levels(axis: Axes, guards: Sequence[GuardLine]) -> None:
 
 
 def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tuple[float, float], room: float) -> None:
-    """Draw each level where its mode is occupied, and label it at the end; labels that would collide become one."""
+    """Draw each level where its modes are occupied, and label it at the end; labels that would collide become one."""
     low, high = ends
     longest = max((len(guard.label) for guard in guards), default=0)
     share = max(0.15, 1.2 * longest * LETTER / room)
     near = share * (data.span[1] - data.span[0]), 0.04 * (high - low)
     labels: dict[tuple[float, float], list[str]] = {}
-    for guard in guards:
-        spans = [(begin, end) for mode, begin, end in data.bands if mode in (guard.mode, SEVERAL)]
-        if not spans or not low < guard.value < high:
+    for label, level in dict.fromkeys((guard.label, guard.value) for guard in guards):
+        modes = {SEVERAL, *(guard.mode for guard in guards if (guard.label, guard.value) == (label, level))}
+        spans = [(begin, end) for mode, begin, end in data.bands if mode in modes]
+        if not spans or not low < level < high:
             continue
         begins, stops = [begin for begin, _ in spans], [end for _, end in spans]
-        axis.hlines([guard.value] * len(spans), begins, stops, colors="#444444", linestyles="dotted", linewidth=1.1)
-        close = (at for at in labels if abs(at[0] - stops[-1]) < near[0] and abs(at[1] - guard.value) < near[1])
-        labels.setdefault(next(close, (stops[-1], guard.value)), []).append(guard.label)
+        axis.hlines([level] * len(spans), begins, stops, colors="#444444", linestyles="dotted", linewidth=1.1)
+        close = (at for at in labels if abs(at[0] - stops[-1]) < near[0] and abs(at[1] - level) < near[1])
+        labels.setdefault(next(close, (stops[-1], level)), []).append(label)
     start, whole = data.span[0], (data.span[1] - data.span[0]) or 1
     for (end, level), texts in labels.items():
         above, distinct = level > (low + high) / 2, list(dict.fromkeys(texts))

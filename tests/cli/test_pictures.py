@@ -56,6 +56,11 @@ def test_names_are_refused_before_the_run(command, model, tmp_path, words, sente
     assert answer.code == 2 and sentence in answer.err and not (tmp_path / "run.png").exists()
 
 
+def test_inputs_are_drawn_as_outputs(command, model):
+    text = BALL.replace("parameters:", "inputs: {u: {times: [0, 1], values: [0, 1]}}\nparameters:", 1)
+    assert "write outputs: {u: u}" in command("run", model(text), *ENGINE, "--outputs", "h,u").err
+
+
 def test_options_of_pictures_need_a_picture(command, model, tmp_path):
     assert "give --plot" in command("run", model(BALL), "--phase", "h,v").err
     assert "give --animate" in command("run", model(BALL), "--speed", "2").err

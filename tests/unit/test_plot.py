@@ -143,6 +143,12 @@ def test_stop_levels_are_dotted_lines_where_their_mode_is():
     assert axis.get_ylim()[1] < 2  # a level far away does not squash the curve
 
 
+def test_a_level_of_several_modes_has_one_label():
+    guards = [GuardLine("on", "T", 0.9, "T >= level"), GuardLine("off", "T", 0.9, "T >= level")]
+    axis = _figure(hand_made.thermostat(2), guards=guards).axes[0]
+    assert [text.get_text() for text in axis.texts].count("T >= level") == 1
+
+
 @pytest.mark.parametrize(("transitions", "markers"), [(4, 2), (60, 2), (61, 1), (400, 1), (401, 0)])
 def test_markers_are_thinned_out(transitions, markers):
     axis = _figure(hand_made.thermostat(transitions)).axes[0]
