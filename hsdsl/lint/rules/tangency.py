@@ -64,7 +64,7 @@ def _contact(here: ModePoint, residual: Any) -> tuple[str, int]:
     try:
         order, sign = here.first(residual)
     except Unsure:
-        return "a kink, a jump or an input decides there whether it crosses", 1
+        return "whether it crosses there was not decided (a kink, a jump, an input or a long expression)", 1
     if not sign:
         return f"all derivatives of r along the flow vanish there, up to order {order}", 1
     if order % 2:
