@@ -76,7 +76,7 @@ class Standstill:
             )
             return self.not_finite(ahead)
         if failure.kind in ("error", "unsolved", "creeping", "jump") and (jump := self._jump_near(slope)):
-            why = f"{jump}, and the solution is driven back across that"
+            why = f"{jump}, and the solution is driven back; with a mode for each side, completion: auto follows it"
             return Stop("step_underflow", t, f"no step leads on at t = {show(t)} in mode {name}: {why}")
         why = {
             "unsolved": "the equations of an implicit step are not solved by Newton's method",
