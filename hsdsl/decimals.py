@@ -28,6 +28,14 @@ def is_finite(x: Any) -> bool:
     return math.isfinite(x)
 
 
+def number_of(text: str) -> float | None:
+    """The number that a text is, or None."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
 def bits(numbers: Iterable[Any]) -> int:
     """How many bits hold every one of ``numbers`` exactly, at least those of float64."""
     return max((x._mpf_[3] for x in numbers if is_multiprecision(x)), default=FLOAT_BITS)

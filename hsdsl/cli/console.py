@@ -76,6 +76,13 @@ def write_table(target: Path | None, text: Callable[[], str]) -> None:
         say(f"wrote {target}")
 
 
+def draw(found: Any, plot: Path | None) -> None:
+    """Draw an answer where a file is given for its picture, and say so."""
+    if plot is not None:
+        found.plot(plot)
+        say(f"wrote {plot}")
+
+
 @contextmanager
 def errors_reported(json: bool) -> Generator[None]:
     """Turn `ModelError` and `UsageError` into messages and exit codes."""

@@ -9,9 +9,10 @@ from typing import Annotated, Any
 
 from typer import Argument, Exit
 
-from hsdsl.cli.console import progress, say
+from hsdsl.cli.console import draw, progress
 from hsdsl.cli.options import WRT, Answer, Located, Model, option, overriding
 from hsdsl.cli.texts import check_target
+from hsdsl.decimals import number_of
 from hsdsl.errors import UsageError
 
 SET = "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first value."
@@ -41,9 +42,7 @@ def fit(
             watch = show and partial(_watch, show)
             columns = {"sigma": _numbers("--sigma", sigma), "weights": _numbers("--weight", weight)}
             found = load(model).fit(data, wrt, progress=watch, **columns, **located.settings(overrides))
-        if plot is not None:
-            found.plot(plot)
-            say(f"wrote {plot}")
+        draw(found, plot)
         answer.give(found.as_json, lambda: found.summary)
     if not found.success:
         raise Exit(3)
@@ -58,18 +57,11 @@ def _numbers(name: str, pairs: list[str] | None) -> dict[str, float] | float | N
     """Read NAME=NUMBER, or the number of the only column."""
     found: dict[str, float] = {}
     for pair in pairs or ():
-        if len(pairs or ()) == 1 and (alone := _number(pair)) is not None:
+        if len(pairs or ()) == 1 and (alone := number_of(pair)) is not None:
             return alone
         column, equals, value = (part.strip() for part in pair.partition("="))
-        number = _number(value)
+        number = number_of(value)
         if not equals or not column or number is None:
             raise UsageError(f"{name}: expected NAME=NUMBER, got '{pair}'", f"for example {name} x=0.1")
         found[column] = number
     return found or None
-
-
-def _number(text: str) -> float | None:
-    try:
-        return float(text)
-    except ValueError:
-        return None

@@ -13,6 +13,7 @@ from typer import Argument, Option
 from hsdsl.cli.completion import model_files, override_names
 from hsdsl.cli.console import errors_reported, print_json
 from hsdsl.cli.texts import limit_options
+from hsdsl.decimals import number_of
 from hsdsl.integrators import METHODS
 from hsdsl.limits import NUMBERS, applied
 from hsdsl.metrics.table import CURVE_METRICS
@@ -82,9 +83,8 @@ class Experiment(NamedTuple):
     def in_numbers(self) -> bool:
         """Whether all values are numbers, and no expressions of the model's parameters."""
         given = [self.until, self.step, self.tolerance, self.relaxation]
-        return all(
-            map(_is_number, [text for text in given if text] + [o.partition("=")[2] for o in self.overrides or ()])
-        )
+        texts = [text for text in given if text] + [o.partition("=")[2] for o in self.overrides or ()]
+        return None not in map(number_of, texts)
 
 
 class Located(NamedTuple):
@@ -131,14 +131,6 @@ def answering(json: bool, allow_path: AllowPath, limit: Limit) -> Generator[None
     """Report errors, and apply the limits while the command runs."""
     with errors_reported(json), applied(limit_options(allow_path or (), limit or ())):
         yield
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def split(overrides: list[str] | None) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from hsdsl.cli.console import progress, say
+from hsdsl.cli.console import draw, progress
 from hsdsl.cli.options import AS_RUN, Answer, Located, Model, option, overriding
 from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
@@ -43,9 +43,7 @@ def orbit(
             else:
                 name, *ends = _range(follow)
                 found = loaded.continuation(section, name, *ends, progress=counted_runs(show, name), **call)
-        if plot is not None:
-            found.plot(plot)
-            say(f"wrote {plot}")
+        draw(found, plot)
         answer.give(found.as_json, lambda: found.summary)
 
 

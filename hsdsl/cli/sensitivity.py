@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Option
 
-from hsdsl.cli.console import progress, say
+from hsdsl.cli.console import draw, progress
 from hsdsl.cli.options import AS_RUN, WRT, Answer, Located, Model, Until, option, overriding
 from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
@@ -46,9 +46,8 @@ def sensitivity(
         found = loaded.sensitivity(wrt, **call)
         parts = (at,) if at else ALWAYS
         nearby = _nearby(loaded, wrt, call, answer.hidden) if stability else None
-        if nearby is not None and plot is not None:
-            nearby.plot(plot)
-            say(f"wrote {plot}")
+        if nearby is not None:
+            draw(nearby, plot)
         answer.give(
             lambda: as_json(found, parts) | ({"orbital_stability": nearby.as_json()} if nearby else {}),
             lambda: summary(found, parts) + (f"\n\n{nearby.sentence}" if nearby else ""),

@@ -1,5 +1,19 @@
 # pyright: basic
-"""Documents to mathematics: names resolved, everything substituted, every error reported."""
+"""Documents to mathematics: names resolved, everything substituted, every error reported.
+
+A document goes through these, in this order; `symbols` has what its names mean, `resolver` reads its expressions.
+
+================= ===========================================================================
+``definitions``   parameters and `let`; ``functions``, ``inputs`` and ``solve`` what else has a name
+``modes``         flow, walls and outputs of modes; ``edges`` their transitions
+``parts``         in the place of these: a system of parts as one mode
+``scene``         the shapes of the scene
+``experiment``    start and settings; ``reference`` what is known of runs
+``events``        transitions with a memory, then ``timers``: the time in a mode
+================= ===========================================================================
+
+Of the system that this gives, ``slicing`` makes a smaller one, and ``product`` a flat one of parts.
+"""
 
 from __future__ import annotations
 

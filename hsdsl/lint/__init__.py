@@ -1,7 +1,11 @@
 """Findings in legal models: probable mistakes (warnings), and remarks (notes).
 
-`lint` reads a model, lets every selected rule of `hsdsl.lint.rules` look at it, and sorts out what comments in the
-file ask to ignore.
+`lint` reads a model, lets every rule of `hsdsl.lint.rules` in the `selection` look at it as a `subject`, and sorts out
+what comments in the file ask to ignore (`ignores`). A rule gives `finding`s, which `fix` remedies by `edits`.
+
+Rules decide by `analysis` for all states and by `numbers` at one, read `source_expressions` as they are written, and
+ask `dependencies` and `units`. In a system of parts they look at each of its `automata`; `parts` has what is found
+besides.
 """
 
 from __future__ import annotations

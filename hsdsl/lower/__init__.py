@@ -1,9 +1,13 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """HybridSystem -> Program: every expression becomes a straight-line routine over numbered states, parameters and time.
 
-The pipeline is in :func:`lower`. `hsdsl.program.ModeProgram` lists the routines. `names` numbers, `mode` has the
-routines of a mode, `constants` those of parameters alone; each expression is written by `routines`, in steps that
-`straight` and `sharing` make small, `tape` the one of Taylor coefficients.
+The pipeline is in :func:`lower`. `hsdsl.program.ModeProgram` lists the routines. `switches` takes out what jumps with
+time, `names` numbers, `mode` has the routines of a mode, `constants` those of parameters alone, `slopes` those that
+only exports need. `routines` writes each by `printer`, in steps that `straight` and `sharing` make small; `elimination`
+solves linear equations in them.
+
+Besides, a mode has bounds on round-off (`terms`), an order of elimination for implicit steps (`ordering`), and a `tape`
+for Taylor coefficients.
 """
 
 from __future__ import annotations

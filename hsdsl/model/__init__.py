@@ -12,6 +12,10 @@
 ``stream``        a run whose rows go to a file while it goes on
 ``estimate``      a run's error, by a finer run
 ``distances``     distances of runs; ``points`` those of points
+``differentiate`` sensitivities; ``fits`` to measurements
+``orbits``        periodic orbits; ``nearby`` orbital stability by runs from nearby
+``mechanical``    one mass against one stop, for the scheme paoli-schatzman
+``visible``       runs of systems of parts as readers see them; ``guards`` levels for pictures
 ================= ==========================================================================================
 """
 

@@ -1,5 +1,10 @@
 # pyright: reportUnknownMemberType=false
-"""Pictures of runs: states over time with mode bands, jumps not joined, guards as dotted levels; phase plots."""
+"""Pictures of runs: states over time with mode bands, jumps not joined, guards as dotted levels; phase plots.
+
+`view` is what a picture shows, `curves` are the points that it draws; `figure` has the panels (`panel`, `phase`), in
+the colours of `style`, and `page` is the same as HTML. Other subjects have modules of their own: `analyses`, `orbit`,
+`path`, `sweep`; `animation` draws the `shapes` of a scene, `notebook` is what notebooks display.
+"""
 
 from __future__ import annotations
 

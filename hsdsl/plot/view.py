@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hsdsl.calls import checks_methods
+from hsdsl.decimals import number_of
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.names import SINCE, did_you_mean, without_memory
@@ -104,14 +105,6 @@ class View:
         if self.labels and len(self.labels) != len(runs):
             raise UsageError(f"expected {len(runs)} labels, one for each run, got {len(self.labels)}")
         return list(self.labels) or [f"run {k}" for k in range(1, len(runs) + 1)]
-
-
-def number_of(text: str) -> float | None:
-    """The number that a text is, or None."""
-    try:
-        return float(text)
-    except ValueError:
-        return None
 
 
 def names_of(runs: Iterable[Execution]) -> list[str]:

@@ -1,4 +1,9 @@
-"""The shape of a model file: pydantic documents, their faults in the language's own words, and the JSON Schema."""
+"""The shape of a model file: pydantic documents, their faults in the language's own words, and the JSON Schema.
+
+`documents` has the keys of each mapping (`shapes` those of a scene), `fields` the values that each may hold, and
+`jsonschema` is made of both. `read` makes documents of nodes: it explains faults by `suggestions`, `value_suggestions`,
+`indentation`, `idioms` and `spelling`, and reads on without them (`recovery`).
+"""
 
 from hsdsl.schema.documents import (
     AutomatonDocument,

@@ -1,5 +1,10 @@
 # pyright: basic
-"""Systems of parts: instances of automata and their connections, to one hybrid system."""
+"""Systems of parts: instances of automata and their connections, to one hybrid system.
+
+`files` puts automata of other files in place, `instances` lists the parts, `names` and `starts` are what their names
+and initial values mean. `transitions` reads those of each part, `broadcast` joins those that fire together, and
+`composition` makes the one mode of all.
+"""
 
 from __future__ import annotations
 
