@@ -11,8 +11,6 @@ from hsdsl.chart.result import Array, Result
 from hsdsl.chart.scene import Scene, sampled
 from hsdsl.execution import Verdict
 
-OUTCOMES = ("right", "warns", "stops", "refuses", "wrong", "crashes", "hangs")
-"""From best to worst."""
 FINER = 8  # points of the exact curve from sample to sample
 SAME_END = 1e-9  # of the run: ends nearer than this are one
 

@@ -55,7 +55,7 @@ def chart(
         from hsdsl.integrators import METHODS
 
         check_target(out, "--out", (".csv",))
-        check_target(plot, "--plot", (".png", ".svg"))
+        check_target(plot, "--plot")
         options: dict[str, Any] = {
             "schemes": known_names(schemes, SCHEMES, "--schemes") or SCHEMES,
             "methods": known_names(methods, tuple(METHODS), "--methods"),

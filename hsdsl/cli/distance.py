@@ -48,7 +48,7 @@ def distance(
     with answering(json, allow_path, limit):
         parameters, metric = _parameters(overrides), metric and str(metric)
         options = {"relaxation": relaxation, "parameters": parameters, "hops": hops, "seconds": seconds}
-        check_target(plot, "--plot", (".png", ".svg"))
+        check_target(plot, "--plot")
         if second is not None:
             if start is not None or end is not None:
                 raise UsageError("give two runs, or one model with --from and --to")

@@ -35,7 +35,7 @@ def fit(
 ) -> None:
     """Fit parameters and initial states to measurements."""
     with answer.reporting():
-        check_target(plot, "--plot", (".png", ".svg"))
+        check_target(plot, "--plot")
         from hsdsl.model import load
 
         with progress(answer.hidden) as show:

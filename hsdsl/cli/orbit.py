@@ -32,7 +32,7 @@ def orbit(
 ) -> None:
     """Find a periodic orbit near the model's run, with its Floquet multipliers."""
     with answer.reporting():
-        check_target(plot, "--plot", (".png", ".svg"))
+        check_target(plot, "--plot")
         from hsdsl.model import load
 
         call = located.settings(overrides, until=until, laps=laps, period=period)

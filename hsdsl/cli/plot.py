@@ -11,7 +11,7 @@ from hsdsl.cli.completion import model_files
 from hsdsl.cli.console import print_json, say
 from hsdsl.cli.options import Answer, Phases, option
 from hsdsl.cli.saved import drawn
-from hsdsl.cli.texts import check_target, names_of, pairs_of
+from hsdsl.cli.texts import PICTURES, check_target, names_of, pairs_of
 from hsdsl.errors import UsageError
 
 RUNS = "Saved runs (.npz), or model files, each of which is run as its own experiment says."
@@ -35,7 +35,7 @@ def plot(
 ) -> None:
     """Draw runs in one picture."""
     with answer.reporting():
-        check_target(out, "--out", (".png", ".svg", ".html"))
+        check_target(out, "--out", (*PICTURES, ".html"))
         if labels and len(labels) != len(runs):
             raise UsageError(f"--label: expected {len(runs)}, one for each run, got {len(labels)}")
         loaded = None if model is None else _loaded(model)

@@ -12,7 +12,7 @@ from hsdsl import ahead
 from hsdsl.cli.console import progress, say
 from hsdsl.cli.options import Answer, EngineName, Experiment, Model, Phases, option
 from hsdsl.cli.shown import needed, shown_of, write_film
-from hsdsl.cli.texts import STATE, check_target, known_names, pairs_of
+from hsdsl.cli.texts import PICTURES, STATE, check_target, known_names, pairs_of
 from hsdsl.errors import UsageError
 from hsdsl.files import ModelFiles, read_bytes
 from hsdsl.interrupts import INTERRUPTED
@@ -35,7 +35,7 @@ SPEED = "Of the film: time of the run by seconds; else 1 where the film then las
 EVERY_ALONE = "--every streams to --out FILE.csv, without --plot, --animate, --estimate or --precision"
 WRITES = {  # the suffixes of the files that options write
     "--out": (".csv", ".parquet", ".npz"),
-    "--plot": (".png", ".svg", ".html"),
+    "--plot": (*PICTURES, ".html"),
     "--animate": (".gif", ".mp4"),
 }
 

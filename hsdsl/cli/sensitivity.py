@@ -35,7 +35,7 @@ def sensitivity(
 ) -> None:
     """Differentiate a run by parameters and initial states, through its jumps."""
     with answer.reporting():
-        check_target(plot, "--plot", (".png", ".svg"))
+        check_target(plot, "--plot")
         if plot is not None and not stability:
             raise UsageError("--plot draws the distances of runs from nearby", "add --stability")
         from hsdsl.model import load

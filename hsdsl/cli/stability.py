@@ -44,7 +44,7 @@ def stability(
         from hsdsl.simulate import SCHEMES
 
         check_target(out, "--out", (".csv",))
-        check_target(plot, "--plot", (".png", ".svg"))
+        check_target(plot, "--plot")
         if not 0 < patience < 1e6 or (processes is not None and processes < 1):
             raise UsageError("--patience and --processes: expected positive numbers")
         options = values_of(overrides)

@@ -52,7 +52,7 @@ def sweep(
 ) -> None:
     """Run a model over many values, into a dataset of Parquet files."""
     with answer.reporting():
-        check_target(plot, "--plot", (".png", ".svg"))
+        check_target(plot, "--plot")
         _check(model, vary, out, show)
         if show is not None:
             from hsdsl.sweep import load

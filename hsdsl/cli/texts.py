@@ -12,6 +12,7 @@ from hsdsl.limits import DEFAULT, NUMBERS, Limits
 from hsdsl.names import did_you_mean
 
 STATE = "state or output "
+PICTURES = (".png", ".svg")
 
 
 def limit_options(folders: Sequence[Path], pairs: Sequence[str]) -> Limits:
@@ -69,7 +70,10 @@ def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, s
 
 
 def check_target(
-    path: Path | None, option: str, suffixes: Sequence[str], others: Mapping[str, Sequence[str]] = MappingProxyType({})
+    path: Path | None,
+    option: str,
+    suffixes: Sequence[str] = PICTURES,
+    others: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> None:
     """Refuse a file that could not be written before a long run, not after it.
 

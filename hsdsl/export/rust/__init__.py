@@ -100,13 +100,12 @@ def _manifest(source: Source, name: str) -> str:
 def _readme(source: Source, table: ButcherTableau) -> str:
     settings = source.problem.settings
     heading = "".join(f"    {line}\n" for line in source.heading)
-    size = f"step {settings.step}" if settings.tolerance is None else f"tolerance {settings.tolerance}"
     decide = structural(source.problem)
     fixed = ", ".join(name for name in source.problem.program.parameters if name in decide)
     kept = f"Fixed, since times of inputs depend on them:\n\n    {fixed}\n\n" if fixed else ""
     return (
         f"A hybrid system in Rust\n=======================\n\n{heading}\n"
-        f"It runs the scheme relaxed with {table.name}, {size}, relaxation {settings.relaxation}.\n\n"
+        f"It runs the scheme relaxed with {table.name}, {source.size}, relaxation {settings.relaxation}.\n\n"
         "    cargo test                        compare with the transitions of hsdsl\n"
         "    cargo run --example transitions   print the transitions\n\n"
         "`hybrid::simulate` runs from parameters, settings, a mode and a state; a `Sink` takes rows and transitions.\n"
