@@ -24,9 +24,7 @@ def forced(system: HybridSystem) -> bool:
     """Whether anything but outputs depends on time."""
     if system.inputs:
         names = ", ".join(i.name for i in system.inputs)
-        raise UsageError(
-            f"the sampled input {names} does not repeat, so no execution does", "write it as an expression"
-        )
+        raise UsageError(f"samples of inputs do not repeat, so no execution does: {names}", "write expressions of t")
     return any(TIME in e.free_symbols for e in _expressions(system))
 
 
