@@ -235,16 +235,7 @@ class Orbits:
 
     def continued(self, parameter: str, start: Any, end: Any) -> Branch:
         """Follow the orbit of the model's run in a parameter; see `Model.continuation`."""
-        if parameter not in self.model.program.parameters:
-            raise UsageError(
-                f"the model has no parameter '{parameter}'", meant_alone(parameter, self.model.program.parameters)
-            )
-        values = with_parameters(self.model.pipeline.values(FLOAT64), self._parameters)
-        low, high = (float(values.number(value, f"the range of {parameter}")) for value in (start, end))
-        if not low != high:
-            raise UsageError(f"expected a range of {parameter}, got {low:g} to {high:g}")
-        own = float(values.parameters[self.model.program.parameters.index(parameter)])
-        value = own if min(low, high) <= own <= max(low, high) else low
+        low, high, value = self._range(parameter, start, end)
         self._parameters = self._parameters | {parameter: value}
         self.arguments["parameters"] = self._parameters
         first, self._followed = self.find(), parameter
@@ -271,13 +262,25 @@ class Orbits:
             parts.append(branch(follower, 1.0))
         except NoReturn as error:
             raise UsageError(f"the orbit at {parameter} = {value:g} cannot be followed: {error}") from None
-        points = [*reversed(parts[0][0]), *parts[1][0][1:]]
-        own = len(parts[0][0]) - 1  # where the branch began
-        bifurcations = [replace(each, after=own - each.after - 1) for each in reversed(parts[0][1])]
-        bifurcations += [replace(each, after=own + each.after) for each in parts[1][1]]
-        names = self._entered()[1]
+        (back, behind, _), (onward, ahead, _) = parts
+        began = len(back) - 1
+        points = (*reversed(back), *onward[1:])
+        bifurcations = [replace(each, after=began - each.after - 1) for each in reversed(behind)]
+        bifurcations += [replace(each, after=began + each.after) for each in ahead]
         ends = tuple(why for *_, why in parts)
-        return Branch(self.edge, parameter, names, tuple(points), tuple(bifurcations), ends, first)
+        return Branch(self.edge, parameter, self._entered()[1], points, tuple(bifurcations), ends, first)
+
+    def _range(self, parameter: str, start: Any, end: Any) -> tuple[float, float, float]:
+        """The ends of a parameter's range, and the value in it that a branch begins at."""
+        known = self.model.program.parameters
+        if parameter not in known:
+            raise UsageError(f"the model has no parameter '{parameter}'", meant_alone(parameter, known))
+        values = with_parameters(self.model.pipeline.values(FLOAT64), self._parameters)
+        low, high = (float(values.number(value, f"the range of {parameter}")) for value in (start, end))
+        if not low != high:
+            raise UsageError(f"expected a range of {parameter}, got {low:g} to {high:g}")
+        own = float(values.parameters[known.index(parameter)])
+        return low, high, own if min(low, high) <= own <= max(low, high) else low
 
     def judge(self, found: Closed, parameters: Mapping[str, Any], forcing: float | None) -> Orbit:
         """Say what is known of an orbit."""
