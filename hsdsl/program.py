@@ -327,6 +327,11 @@ class Program:
         return self.modes + self.contacts
 
     @property
+    def edges(self) -> tuple[EdgeProgram, ...]:
+        """The edges of all modes."""
+        return tuple(edge for mode in self.modes for edge in mode.edges)
+
+    @property
     def contact_count(self) -> int:
         """How many contacts the mode with most has."""
         return max((sum(edge.contact is not None for edge in mode.edges) for mode in self.modes), default=0)

@@ -369,10 +369,14 @@ class HybridSystem:
         names = [mode.name for mode in self.modes]
         if len(set(names)) != len(names):
             raise ValueError("mode names must differ")
-        for mode in self.modes:
-            for edge in mode.edges:
-                if edge.target not in names:
-                    raise ValueError(f"edge {edge.name} leads to unknown mode {edge.target}")
+        for edge in self.edges:
+            if edge.target not in names:
+                raise ValueError(f"edge {edge.name} leads to unknown mode {edge.target}")
+
+    @property
+    def edges(self) -> tuple[Edge, ...]:
+        """The edges of all modes."""
+        return tuple(edge for mode in self.modes for edge in mode.edges)
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -131,7 +131,7 @@ class Orbits:
         if self._guess is not None:
             return self._guess.entered
         program = self.model.program
-        edge = next(e for m in program.modes for e in m.edges if e.name == self.edge)
+        edge = next(edge for edge in program.edges if edge.name == self.edge)
         target = program.modes[edge.target]
         if not target.final:
             return target.name, target.states

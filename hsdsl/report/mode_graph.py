@@ -35,15 +35,14 @@ CSS = """
 def mode_graph(program: Program, execution: Execution | None = None) -> str:
     """The graph and its table, as HTML; every text of the model is escaped. Without a run nothing is counted."""
     program = as_written(visited_part(program, execution), execution)
-    edges = [edge for mode in program.modes for edge in mode.edges]
-    picture = graph_of(program, execution)
-    return f"<h2>Modes</h2>\n{picture}\n{_table(program, edges, _counts(edges, program, execution))}" if picture else ""
+    picture, counts = graph_of(program, execution), _counts(program.edges, program, execution)
+    return f"<h2>Modes</h2>\n{picture}\n{_table(program, program.edges, counts)}" if picture else ""
 
 
 def graph_of(program: Program, execution: Execution | None = None) -> str:
     """The graph alone; empty for a model without transitions, or one with too many modes for a picture."""
     program = as_written(program, execution)
-    edges = [edge for mode in program.modes for edge in mode.edges]
+    edges = program.edges
     if not edges or len(program.modes) > MOST_DRAWN:
         return ""
     names = [mode.name for mode in program.modes]

@@ -60,7 +60,7 @@ def preferring(system: HybridSystem, firsts: Sequence[str]) -> HybridSystem:
     """The system in which some edges go before others that are tied with them."""
     if not firsts:
         return system
-    highest = 1 + max(edge.priority for mode in system.modes for edge in mode.edges)
+    highest = 1 + max(edge.priority for edge in system.edges)
     modes = (
         replace(m, edges=tuple(replace(e, priority=highest) if e.name in firsts else e for e in m.edges))
         for m in system.modes

@@ -9,6 +9,7 @@ from typing import Any
 
 import sympy as sp
 
+from hsdsl.decimals import number_of
 from hsdsl.elaborate import parameter_expression
 from hsdsl.errors import UsageError
 from hsdsl.expression.scope import symbol
@@ -47,13 +48,7 @@ class Overridden:
 
 def is_expression(value: Any) -> bool:
     """Whether a value of an override is a text that may name parameters."""
-    if not isinstance(value, str):
-        return False
-    try:
-        float(value)
-    except ValueError:
-        return True
-    return False
+    return isinstance(value, str) and number_of(value) is None
 
 
 def overridden(

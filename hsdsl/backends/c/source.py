@@ -113,7 +113,7 @@ def _written(program: Program) -> tuple[_Writer, str]:
 
 def width(program: Program) -> int:
     """How many states the largest mode has; one without a flow has those it is entered with."""
-    entered = (len(edge.target_states) for mode in program.modes for edge in mode.edges)
+    entered = (len(edge.target_states) for edge in program.edges)
     return max((len(program.initial_states), *(len(mode.states) for mode in program.modes), *entered))
 
 

@@ -132,7 +132,7 @@ class Dynamics:
     @cached_property
     def incoming(self) -> dict[str, list[Edge]]:
         """The edges that lead to each mode."""
-        edges = [edge for mode in self.system.modes for edge in mode.edges]
+        edges = self.system.edges
         return {name: [edge for edge in edges if edge.target == name] for name in self.modes}
 
     @cached_property

@@ -14,6 +14,7 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
+from hsdsl.arithmetic import FLOAT64
 from hsdsl.enclosures import RESTRICTED, Range, hull, whole_power
 from hsdsl.functions import FUNCTIONS
 
@@ -124,7 +125,7 @@ def _enclosed(expr: Any) -> tuple[float, float, float]:
     if bounds is None:
         return _NOTHING
     low, high = bounds
-    nearest = _double(low + (high - low) / 2)
+    nearest = FLOAT64.constant(low + (high - low) / 2)
     if low == high and np.isfinite(nearest) and Fraction(nearest) == low:
         return nearest, nearest, nearest
     return nearest, float(np.nextafter(nearest, -np.inf)), float(np.nextafter(nearest, np.inf))
@@ -141,13 +142,6 @@ def enclosure(expr: Any) -> tuple[Fraction, Fraction] | None:
     with mpmath.workdps(40):
         value = Fraction(int(mpmath.floor(mpmath.mpf(number) * 10**32)), 10**32)
     return value, value + Fraction(2, 10**32)
-
-
-def _double(value: Fraction) -> float:
-    try:
-        return float(value)
-    except OverflowError:
-        return float("inf") if value > 0 else float("-inf")
 
 
 def too_large(expressions: Iterable[Any], most: int) -> bool:

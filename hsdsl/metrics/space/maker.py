@@ -64,7 +64,7 @@ class _Maker:
     def _states_of(self, mode: Mode) -> tuple[str, ...]:
         if mode.states or not mode.final:
             return mode.states
-        entered = {e.target_states for m in self.system.modes for e in m.edges if e.target == mode.name}
+        entered = {e.target_states for e in self.system.edges if e.target == mode.name}
         if len(entered) > 1:
             raise UsageError(
                 f"distances: the final mode {mode.name} is entered with different states, so it is no single domain",
