@@ -252,8 +252,8 @@ class Surfaces:
     def excursion(self, trial: Trial) -> StepFailure | None:
         """Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant.
 
-        Only where the flow points out of a surface at the step's start and back in at its end; for adaptive steps,
-        whose length nobody chose.
+        Only where the step starts on it, or the flow points out of it there, and back in at its end; for adaptive
+        steps, whose length nobody chose.
         """
         if trial.end_slope is None:
             return None
@@ -261,7 +261,7 @@ class Surfaces:
             try:
                 out = self._rate(gradient(trial.t, *trial.x), trial.slope)
                 back = self._rate(gradient(trial.t1, *trial.z), trial.end_slope)
-                if out > 0 >= back and self._beyond_within(trial, k):
+                if (out > 0 or k in self.active) and back <= 0 and self._beyond_within(trial, k):
                     return StepFailure("deep", k)
             except DOMAIN_ERRORS:
                 continue

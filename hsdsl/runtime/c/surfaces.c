@@ -258,7 +258,8 @@ static hs_found excursion(hs_run *run, hs_trial *trial) {
     hs_real out, back;
     if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
     if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
-    if (out > 0 && 0 >= back && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
+    const int leaves = out > 0 || run->active_surfaces[k];
+    if (leaves && back <= 0 && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
   }
   return CLEAR;
 }

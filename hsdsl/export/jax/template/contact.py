@@ -121,8 +121,11 @@ def let_go(model, config, p, lane, event):
     ended, above = jax.vmap(look)(after)
     first, own = jnp.argmax(ended | above | (t + after >= bound.end)), event.k == lane.held
     late, frees = jnp.where(own, 0.0, after[first]), own | ended[first]
-    here = noticed(model, lane, x)._replace(
+    t, x = t + frozen(late), x + frozen(late) * slope
+    facts, scale = bound.facts(lane.mode, t, x), jnp.where(lane.active[:, None], lane.scale, 0.0)
+    here = noticed(model, lane, frozen(event.x))._replace(
         t=event.t + late, x=event.x + late * slope, trial=lane.h, clear=jnp.asarray(False), phase=jnp.int32(STEP),
+        active=lane.active & (jnp.abs(facts.values) <= noise_of(facts, t, x, scale)),
         halvings=jnp.zeros_like(lane.halvings), terms=jnp.zeros_like(lane.terms),
     )  # fmt: skip
     free = out_of_contact(model, here, jnp.asarray(True))

@@ -152,7 +152,7 @@ def excursion(lane, trial, ends):
     noise = noise_of(ends.shares, ends.times, ends.states, scaled(lane))
     seen = (ends.shares.values > noise) & ends.shares.conditions
     first = ends.first.values > ends.first_noise
-    return (out > 0) & (back <= 0) & seen[1:].any(axis=0) & ~first
+    return ((out > 0) | lane.active) & (back <= 0) & seen[1:].any(axis=0) & ~first
 
 
 def relaxed_verdict(model, config, bound, lane, trial):

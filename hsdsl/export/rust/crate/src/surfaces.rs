@@ -195,7 +195,8 @@ impl<S> Run<'_, S> {
             let out = self.rate_along(k, self.trial.t, &self.x, &self.slope);
             let back = self.rate_along(k, self.trial.t1, &self.z, &self.end);
             if let (Some(out), Some(back)) = (out, back) {
-                if out > 0.0 && 0.0 >= back && self.beyond_within(k) == Some(true) {
+                let leaves = out > 0.0 || self.active[k];
+                if leaves && 0.0 >= back && self.beyond_within(k) == Some(true) {
                     return Some(Failure::Deep(k));
                 }
             }
