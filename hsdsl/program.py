@@ -326,6 +326,11 @@ class Program:
         """The modes, then those with motion along guards: what a kernel has routines for."""
         return self.modes + self.contacts
 
+    @cached_property
+    def mode_names(self) -> tuple[str, ...]:
+        """The names of the modes."""
+        return tuple(mode.name for mode in self.modes)
+
     @property
     def edges(self) -> tuple[EdgeProgram, ...]:
         """The edges of all modes."""

@@ -75,7 +75,7 @@ def compared(scene: Scene, result: Result, slack: float) -> tuple[float, int]:
     """
     times, values, modes = _exact_curve(scene)
     wide, span, until = slack * float(scene.grid[-1]), spans(scene), float(scene.exact.final.time) * (1 + SAME_END)
-    free = ~np.isin(modes, [mode.name for mode in scene.model.program.modes])
+    free = ~np.isin(modes, scene.model.program.mode_names)
     low, high = np.fmin(values[:-1], values[1:]), np.fmax(values[:-1], values[1:])
     first = np.maximum(np.searchsorted(times, scene.grid - wide) - 1, 0)
     last = np.minimum(np.searchsorted(times, scene.grid + wide, side="right"), len(times) - 1)

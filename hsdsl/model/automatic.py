@@ -119,9 +119,11 @@ def _judge(
 ) -> Stiffness | None:
     """The stiffness of a mode of a program at a state of a run whose steps were so long on average."""
     name, values = program.modes[mode].name, dict(zip(program.modes[mode].states, x, strict=False))
-    index = next((k for k, each in enumerate(plain.program.modes) if each.name == name), None)
-    states = () if index is None else plain.program.modes[index].states
-    if index is None or not 0 < len(states) <= MOST_STATES or not values.keys() >= set(states):
+    if name not in plain.program.mode_names:
+        return None
+    index = plain.program.mode_names.index(name)
+    states = plain.program.modes[index].states
+    if not 0 < len(states) <= MOST_STATES or not values.keys() >= set(states):
         return None
     here, until = [float(values[each]) for each in states], float(plain.settings.until)
     try:

@@ -109,7 +109,7 @@ class PreparedEnsemble:
         sampled = [(name, kept.states[:, i]) for i, name in enumerate(self.names)]
         sampled += [(name, kept.results[:, :, i]) for i, name in enumerate(program.outputs)]
         final, _ = columns_by_name(kept.final, kept.kind, self.kinds, self.names)
-        modes = np.array([*(mode.name for mode in program.modes), ""])
+        modes = np.array([*program.mode_names, ""])
         refused = self.columns.refused.items()
         return Ensemble(
             model=program.path,

@@ -100,7 +100,7 @@ class Rows:
         columns, present = columns_by_name(rows["values"], rows["kind"], self._layouts.kinds, self._names)
         return Samples(
             time=rows["times"],
-            mode=np.array([mode.name for mode in self._program.modes])[rows["mode"]],
+            mode=np.array(self._program.mode_names)[rows["mode"]],
             jump=rows["jump"],
             kind=np.full(len(columns), "flow"),
             states=self._names,

@@ -252,7 +252,7 @@ def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, t
     Raises UsageError: the mode does not exist, lacks one of the states, or has one without a value.
     """
     program = values.program
-    names = [mode.name for mode in program.modes]
+    names = program.mode_names
     given = overrides.get("mode")
     if given is not None and given not in names:
         raise UsageError(f"the model has no mode '{given}'", did_you_mean(str(given), names))

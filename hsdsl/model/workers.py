@@ -90,7 +90,7 @@ class ArrayRecorder:
         kept, last = self.kept, execution.arcs[-1]
         n, end = len(last.states), execution.times[-1]
         kept.stop[i] = execution.stop.reason
-        modes = [mode.name for mode in self.program.modes]
+        modes = self.program.mode_names
         kept.mode[i] = modes.index(last.mode)
         kept.kind[i] = self.kinds.index(last.states)
         kept.transitions[i] = len(execution.transitions)
@@ -108,7 +108,7 @@ class ArrayRecorder:
         if kept.logs:
             kept.log[i] = self._logged(execution.transitions, modes)
 
-    def _logged(self, transitions: Sequence[Transition], modes: list[str]) -> Logged:
+    def _logged(self, transitions: Sequence[Transition], modes: tuple[str, ...]) -> Logged:
         nan = float("nan")
         table = np.zeros(len(transitions), structures.TRANSITION)
         before, after = np.full((2, len(transitions), self.kept.width), nan)

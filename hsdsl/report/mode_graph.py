@@ -45,7 +45,7 @@ def graph_of(program: Program, execution: Execution | None = None) -> str:
     edges = program.edges
     if not edges or len(program.modes) > MOST_DRAWN:
         return ""
-    names = [mode.name for mode in program.modes]
+    names = program.mode_names
     counts = _counts(edges, program, execution)
     if execution is None or counts is None:
         return _picture(program, edges, [1] * len(edges), set(names), program.initial_mode)

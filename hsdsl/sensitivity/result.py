@@ -12,6 +12,7 @@ import numpy as np
 from hsdsl.calls import checks_methods
 from hsdsl.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.parts import numbered, present, product_name
+from hsdsl.program import ModeProgram
 from hsdsl.sensitivity.landing import landing, parted
 from hsdsl.sensitivity.state_names import (
     MEASURED,
@@ -292,7 +293,7 @@ class Sensitivity:
     def _flow(self, mode: str, t: Any, x: Sequence[Any], after: bool) -> Sequence[Any]:
         """The flow of a mode, with the inputs right before or after a time; that of a mode without one is zero."""
         plain = self.setting.plain
-        index = next(k for k, each in enumerate(plain.program.modes) if each.name == mode)
+        index = plain.program.mode_names.index(mode)
         if not plain.program.modes[index].states:
             return [0] * len(x)
         segments = plain.timeline.segments
@@ -302,7 +303,12 @@ class Sensitivity:
 
     def _rests(self, mode: str) -> bool:
         """Whether a mode is a final one without a flow."""
-        return not next(each for each in self.setting.plain.program.modes if each.name == mode).states
+        return not self._mode(mode).states
+
+    def _mode(self, name: str) -> ModeProgram:
+        """A mode of the run without derivatives."""
+        program = self.setting.plain.program
+        return program.modes[program.mode_names.index(name)]
 
     def _output(self, values: Mapping[str, Any], y: str, rate: str, time: Slopes) -> Slopes:
         return {by: values[derivative_name(y, by)] + (values[rate] * time[by] if time[by] else 0) for by in self.wrt}
@@ -369,8 +375,7 @@ class Sensitivity:
             return table[rate_name(name)]
         rates: list[Any] = []
         for t, mode, row in zip(table.time.tolist(), table.mode.tolist(), range(len(table)), strict=True):
-            index = next(k for k, each in enumerate(self.setting.plain.program.modes) if each.name == mode)
-            states = self.setting.plain.program.modes[index].states
+            states = self._mode(mode).states
             x = [table[state][row] for state in states]
             rates.append(self._flow(mode, t, x, True)[states.index(name)] if name in states else float("nan"))
         return np.array(rates)

@@ -22,7 +22,7 @@ def names_text(problem: Problem, title: str) -> str:
         parts.append(array(f"{pointer} *const", f"problem_{kind}", (f"{kind}s_{k}" for k in modes)))
     for kind, text in (("name", title), ("scheme", settings.scheme), ("method_name", settings.method.name)):
         parts.append(f"const char problem_{kind}[] = {string(text)};\n")
-    parts.append(_strings("problem_mode_name", (mode.name for mode in program.modes)))
+    parts.append(_strings("problem_mode_name", program.mode_names))
     parts.append(_strings("problem_start_state", problem.states))
     parts.append(_strings("problem_parameter", program.parameters))
     parts.append(_strings("problem_output", program.outputs))

@@ -100,7 +100,7 @@ class ModelText:
         """Names and sizes."""
         modes, states = program.modes, program.all_states
         yield "name", string(self.source.name)
-        yield "mode_names", strings(mode.name for mode in modes)
+        yield "mode_names", strings(program.mode_names)
         yield "state_names", cell(strings(mode.states) for mode in modes)
         yield "dim", vector(len(mode.states) for mode in modes)
         yield "final", vector(int(mode.final) for mode in modes)

@@ -30,7 +30,7 @@ def expected_text(source: Source) -> str:
     most = min(MOST, settings.max_transitions)
     limited = problem.with_settings(replace(settings, max_transitions=most))
     run = prepare(limited, _compiled(source)).simulate()
-    modes = [mode.name for mode in program.modes]
+    modes = program.mode_names
     rows: list[str] = []
     for made in run.transitions:
         mode = modes.index(made.source)

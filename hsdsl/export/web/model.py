@@ -31,7 +31,7 @@ def model_of(source: Source, shown: Source, run: Execution) -> Data:
     system, problem = source.system, source.problem
     program, states = problem.program, problem.program.all_states
     seen = [name for name in without_memory(states) if name not in numbered(program.parts)]
-    colour = colours([mode.name for mode in program.modes])
+    colour = colours(program.mode_names)
     return {
         "title": visible(system.title or source.name),
         "about": [*source.heading, *([visible(system.source)] if system.source else [])],
