@@ -13,6 +13,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -38,6 +39,7 @@ class Lowered(NamedTuple):
 
 
 Answer = Lowered | ModelError | None
+UnderWay = Callable[[], bool]  # whether compiled code is still being made
 LARGE = 0.03  # seconds to elaborate a model, from which on a copy takes less time than half of the lowering
 NICE = 5  # the run that needs no compiled code goes first
 # what pydantic and SymPy load where they first look for plugins and tensors, of which no model has any: for nothing
@@ -76,20 +78,6 @@ class _Copy(Generic[Result]):
             os.waitpid(self.process, 0)
 
 
-@dataclass(frozen=True)
-class Compilation:
-    """A process that compiles a program for the cache, whether or not this one waits for it."""
-
-    process: int
-
-    def ended(self) -> bool:
-        """Whether it has ended, which it does without compiled code where there is no compiler."""
-        try:
-            return os.waitpid(self.process, os.WNOHANG)[0] != 0
-        except ChildProcessError:
-            return True
-
-
 _begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
 _seen: list[ModelFiles] = []
 
@@ -102,6 +90,11 @@ def begin(files: ModelFiles, compiled: bool = True) -> None:
     if _saves_time() and not program_cache.is_kept(files):
         with suppress(OSError):  # there may be no more processes
             _begun.append((files, _copy(lambda: _lowered(files), _compile if compiled else None)))
+
+
+def begun() -> bool:
+    """Whether another process lowers a model, and compiles what runs it if that is needed."""
+    return bool(_begun)
 
 
 def begin_run(words: list[str]) -> None:
@@ -124,26 +117,34 @@ def _saves_time() -> bool:
     )
 
 
-def taken(files: ModelFiles, needed: Sequence[str] = ()) -> tuple[Lowered, Compilation | None] | None:
-    """The programs of a model that was begun, and who compiles the one that runs; None where there is none.
+def taken(files: ModelFiles, needed: Sequence[str] = ()) -> tuple[Lowered, UnderWay | None] | None:
+    """The programs of a model that was begun, and whether the one that runs is being compiled; None if there is none.
 
     Modules that are needed afterwards are imported while the other process works.
 
     Raises ModelError: the model has errors.
     """
-    for begun in [begun for begun in _begun if begun[0] == files]:
+    for one in [each for each in _begun if each[0] == files]:
         for name in needed:
             import_module(name)
-        answer = begun[1].wait()
-        _begun.remove(begun)
-        if isinstance(answer, Lowered) and begun[1].goes_on:
-            os.close(begun[1].answer)
-            return answer, Compilation(begun[1].process)
-        begun[1].end()
+        answer = one[1].wait()
+        _begun.remove(one)
+        if isinstance(answer, Lowered) and one[1].goes_on:
+            os.close(one[1].answer)
+            return answer, partial(_goes_on, one[1].process)
+        one[1].end()
         if isinstance(answer, ModelError):
             raise answer
         return None if answer is None else (answer, None)
     return None
+
+
+def _goes_on(process: int) -> bool:
+    """Whether a copy of this process has not ended."""
+    try:
+        return os.waitpid(process, os.WNOHANG)[0] == 0
+    except ChildProcessError:
+        return False
 
 
 def _copy(work: Callable[[], Result], then: Callable[[Result], object] | None = None) -> _Copy[Result]:
@@ -248,13 +249,14 @@ def _lowered(files: ModelFiles) -> Answer:
 
 def _compile(lowered: Answer) -> None:
     """Compile the program that runs, for the cache."""
-    from hsdsl.runtime.library import NoCompiler, loop
-    from hsdsl.runtime.programs import compiled
+    from hsdsl.runtime import library
+    from hsdsl.runtime.programs import NoCompiler, compiled
 
     if isinstance(lowered, Lowered):
         with applied(lowered.files.limits), suppress(NoCompiler):  # the run that needs it reports the failure
+            library.begin()
             compiled(lowered.sliding or lowered.program)
-            loop()
+            library.loop()
 
 
 @atexit.register

@@ -147,6 +147,13 @@ def making(kind: str, key: str) -> AbstractContextManager[None]:
     return locked(entry) if usable else nullcontext()
 
 
+def is_made(kind: str, key: str) -> bool:
+    """Whether another process makes an entry at this moment."""
+    from hsdsl.unfinished import is_locked
+
+    return is_locked(folder() / kind / key)
+
+
 def _checksum(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:40]
 

@@ -54,6 +54,20 @@ def locked(folder: Path) -> Generator[None]:
             os.close(descriptor)
 
 
+def is_locked(folder: Path) -> bool:
+    """Whether another process locks a folder at this moment."""
+    with suppress(FileNotFoundError, PermissionError):
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            if fcntl is not None:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        finally:
+            os.close(descriptor)
+    return False
+
+
 def _claimed(folder: Path) -> tuple[Path, int]:
     while True:
         path = folder / f"{BEFORE}{secrets.token_hex(6)}{AFTER}"

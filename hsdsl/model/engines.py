@@ -11,12 +11,16 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
+from math import inf
 
+from hsdsl import ahead
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
-from hsdsl.runtime import kernel
-from hsdsl.runtime.compiler import NoCompiler
+from hsdsl.program import Program
+from hsdsl.runtime import kernel, library, programs
+from hsdsl.runtime.compiler import NoCompiler, find_compiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.runtime.structures import SCHEMES
 from hsdsl.simulate import Settings
@@ -31,14 +35,32 @@ def check(engine: str) -> None:
 
 
 def begin(engine: str, precision: int | None, scheme: str | None) -> None:
-    """Compile the runtime while a model is read, where the run may need it."""
-    if engine != "python" and precision is None and (scheme or SCHEMES[0]) in SCHEMES:
-        kernel.begin()
+    """Compile the loop while a model is read, where the run may need it and no other process does so."""
+    if engine != "python" and precision is None and (scheme or SCHEMES[0]) in SCHEMES and not ahead.begun():
+        library.begin()
 
 
-def serves(settings: Settings, precision: int | None) -> bool:
-    """Whether the compiled loop can run it."""
-    return _refusal(settings, precision) is None
+def pending(
+    program: Program, settings: Settings, precision: int | None, compiling: Callable[[], bool] | None
+) -> Callable[[], bool] | None:
+    """Whether other processes still make what can run a program; None where there is nothing to wait for.
+
+    ``compiling`` says it of a process that was begun for it.
+    """
+    if _refusal(settings, precision) is None:
+        with suppress(NoCompiler):
+            find_compiler()  # what has none says so
+            compiling = compiling or programs.under_way(program)
+            return compiling if compiling() else None
+    return None
+
+
+def worth(spent: float) -> float:
+    """How many seconds the Python loop may take to make a run whose model took so long to read.
+
+    That is about how long the compiler takes for the model; the compiled loop, where it is not kept, takes longer.
+    """
+    return spent if library.is_kept(library.LOOP[0]) else inf
 
 
 def choose(

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 # what compiles, runs and reports a model
 _RUNNING = ("pickle", "hsdsl.backends.c", "hsdsl.runtime.process", "hsdsl.simulate.verdict", "hsdsl.report")
 
-_OF_THIS_PROCESS = ("system", "sliding", "compilation", "_compiled", "kernels")
+_OF_THIS_PROCESS = ("system", "sliding", "compiling", "_compiled", "kernels")
 
 
 def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Pipeline:
@@ -49,12 +49,12 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
         return Pipeline(None, time.perf_counter() - began, files, program)
     lowered = ahead.taken(files, _RUNNING)
     if lowered is not None and _method_exists(lowered[0].program):
-        (program, sliding, files), compilation = lowered
+        (program, sliding, files), compiling = lowered
         made = Pipeline(None, time.perf_counter() - began, files, program)
         made.keep(program)
         if sliding is not None:
             made.keep(sliding, (SLIDING,))
-        (made if sliding is None else made.sliding).compilation = compilation
+        (made if sliding is None else made.sliding).compiling = compiling
         return made
     system = _elaborated(files)
     return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
@@ -92,7 +92,7 @@ class Pipeline:
         if program is not None:
             self.program = program
         self._files, self._part, self._left_out = files, part, left_out
-        self.compilation: ahead.Compilation | None = None  # of the program, by another process
+        self.compiling: Callable[[], bool] | None = None  # whether a process begun for the program goes on
         self.seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
@@ -102,12 +102,12 @@ class Pipeline:
         state = {
             key: value
             for key, value in vars(self).items()
-            if key not in ("system", "sliding", "compilation", "_compiled", "kernels")
+            if key not in ("system", "sliding", "compiling", "_compiled", "kernels")
         }
         return state | {"program": program} | ({"system": self.system} if self._files is None else {})
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, compilation=None, _compiled=None, kernels={})
+        self.__dict__.update(state, compiling=None, _compiled=None, kernels={})
 
     @property
     def files(self) -> ModelFiles | None:
@@ -238,10 +238,10 @@ class Pipeline:
         settings = following_digits(settings, options, values.kernel.arithmetic)
         problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x)
         take = partial(engines.choose, engine, settings, precision, self._compile)
-        compilation = self.compilation if engine == "auto" and engines.serves(settings, precision) else None
-        if compilation is None or compilation.ended():
+        compiling = engines.pending(self.program, settings, precision, self.compiling) if engine == "auto" else None
+        if compiling is None:
             return prepare(problem, take())
-        return prepare(problem, None, Pending(compilation.ended, take, self.seconds["load"]))
+        return prepare(problem, None, Pending(compiling, take, engines.worth(self.seconds["load"])))
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """The inputs over time."""

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Hashable
-from contextlib import suppress
-from contextvars import copy_context
 from functools import cache
-from threading import Lock, Thread
+from threading import Lock
 from typing import Any
 
 from hsdsl.program import Program
 from hsdsl.runtime import structures
-from hsdsl.runtime.compiler import NoCompiler
-from hsdsl.runtime.library import LOOP, is_kept, loop
+from hsdsl.runtime.library import loop
 from hsdsl.runtime.programs import SYMBOL, compiled
 
 _loading = Lock()
@@ -24,7 +21,7 @@ def runtime() -> ctypes.CDLL:
 
     Raises NoCompiler: there is no compiler, or it fails.
     """
-    with _loading:  # another thread may compile it: see `begin`
+    with _loading:  # another thread may compile it: see `library.begin`
         return _runtime()
 
 
@@ -38,18 +35,6 @@ def _runtime() -> ctypes.CDLL:
     library.hs_screen_run.argtypes, library.hs_screen_run.restype = (ctypes.c_void_p,) * 3, ctypes.c_int64
     library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
     return library
-
-
-def begin() -> None:
-    """Compile the runtime in another thread, unless an earlier process compiled it."""
-
-    def compile_runtime() -> None:
-        with suppress(NoCompiler):  # the run that needs it reports the failure
-            runtime()
-
-    with suppress(NoCompiler):
-        if not is_kept(LOOP[0]):
-            Thread(target=copy_context().run, args=(compile_runtime,), daemon=True).start()
 
 
 class CompiledModel:

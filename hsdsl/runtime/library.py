@@ -12,11 +12,13 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from contextvars import copy_context
 from functools import cache
 from pathlib import Path
+from threading import Thread
 
 from hsdsl import limits
-from hsdsl.cache import find, keep, key_of, making
+from hsdsl.cache import find, is_made, keep, key_of, making
 from hsdsl.names import shown
 from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
 
@@ -30,6 +32,7 @@ GIVEN_UP = "given-up"  # entries for models that took too long to compile: the s
 LOOP = '#include "library.c"\n', "hs_simulate"  # its text and symbol
 EFFORT: Effort = "-O1"  # -O2 compiles 1.5 times as long, for code that is a hundredth faster
 _OPTIONS = " ".join((EFFORT, *FLAGS))
+_here: set[str] = set()  # what this process compiles or waits for
 
 
 def loop_object(folder: Path) -> Path:
@@ -70,6 +73,18 @@ def loop() -> ctypes.CDLL:
     return load(text, symbol, lambda: [text])
 
 
+def begin() -> None:
+    """Compile the loop in another thread, unless it was compiled before."""
+
+    def compile_loop() -> None:
+        with suppress(NoCompiler):  # the run that needs it reports the failure
+            loop()
+
+    with suppress(NoCompiler):
+        if not is_kept(LOOP[0]) and not made_elsewhere(LOOP[0])():
+            Thread(target=copy_context().run, args=(compile_loop,), daemon=True).start()
+
+
 def _shipped(content: str) -> Path:
     """Where a library would be that came with this package."""
     return SHIPPED / f"{key_of(content, _our_text(), _OPTIONS, _processor())}.so"
@@ -92,6 +107,7 @@ def load(content: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctyp
     loaded = _kept(key)
     if loaded is not None:
         return loaded
+    _here.add(key)
     with making(KIND, key):
         return _kept(key) or _made(compiler, key, symbol, source)
 
@@ -114,6 +130,15 @@ def is_kept(content: str) -> bool:
     Raises NoCompiler: there is no compiler.
     """
     return _shipped(content).exists() or find(KIND, _key(content, find_compiler())) is not None
+
+
+def made_elsewhere(content: str) -> Callable[[], bool]:
+    """A function that says whether another process compiles ``content`` at the moment.
+
+    Raises NoCompiler: there is no compiler.
+    """
+    key = _key(content, find_compiler())
+    return lambda: key not in _here and is_made(KIND, key)
 
 
 def _key(content: str, compiler: Compiler) -> str:

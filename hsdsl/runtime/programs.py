@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 
 from hsdsl import limits
 from hsdsl.program import Program
 from hsdsl.runtime.compiler import NoCompiler, TooSlow
-from hsdsl.runtime.library import load
+from hsdsl.runtime.library import LOOP, load, made_elsewhere
 
 SYMBOL = "hs_the_model"
 
@@ -17,12 +18,24 @@ def compiled(program: Program) -> ctypes.CDLL:
 
     Raises NoCompiler: there is no compiler, or it fails.
     """
-    data = len(program.parameters), len(program.inputs), len(program.switches)
-    content = repr(((*data, len(program.outputs), program.initial_states), program.flows))
     try:
-        return load(content, SYMBOL, lambda: _source(program))
+        return load(_content(program), SYMBOL, lambda: _source(program))
     except TooSlow as error:
         raise NoCompiler(f"{error}; {_longest(program)}") from None
+
+
+def under_way(program: Program) -> Callable[[], bool]:
+    """A function that says whether other processes compile a program, or the loop, at the moment.
+
+    Raises NoCompiler: there is no compiler.
+    """
+    looks = made_elsewhere(_content(program)), made_elsewhere(LOOP[0])
+    return lambda: any(look() for look in looks)
+
+
+def _content(program: Program) -> str:
+    data = len(program.parameters), len(program.inputs), len(program.switches)
+    return repr(((*data, len(program.outputs), program.initial_states), program.flows))
 
 
 def _longest(program: Program) -> str:

@@ -59,7 +59,7 @@ class Pending:
     ``worth`` is how many seconds a run may take that does not wait.
     """
 
-    ended: Callable[[], bool]
+    under_way: Callable[[], bool]
     take: Callable[[], CompiledModel | None]
     worth: float
 
@@ -67,7 +67,7 @@ class Pending:
         """Whether the code is there, or a run that began then is expected to take longer than it is worth."""
         passed = time.perf_counter() - began
         late = passed > EARLY * self.worth and passed * float(run.until) > self.worth * float(run.now)
-        return late or self.ended()
+        return late or not self.under_way()
 
 
 @dataclass(frozen=True, eq=False)

@@ -184,6 +184,22 @@ def test_an_end_in_a_fast_decay() -> None:
             assert abs(mine["y1"] - since[-1][1]) <= 1e-7 * max(abs(row[1]) for row in slopes), by
 
 
+@pytest.mark.campaign  # a minute or more in Python's loop
+def test_more_digits_give_an_end_in_a_fast_decay() -> None:
+    """All derivatives to ten digits of the largest of their kind, which no run in doubles has of y1."""
+    _, exact, texts, _, _ = CASES["switch"]
+    texts = {by: text for by, text in texts.items() if by != "initial.y1"}  # which is forgotten in a microsecond
+    found = SWITCH.sensitivity(list(texts), precision=25, tolerance="1e-14", method="radau")
+    guesses = [float(made.time) for made in found.execution.transitions]
+    with mpmath.workdps(60):
+        given = {by: mpmath.mpf(text) for by, text in CASES["switch"][2].items()}
+        for by in texts:
+            slopes = exact_slopes(exact, given, by, mpmath.mpf(5), guesses)
+            for i, name in enumerate(("y1", "y2"), 1):
+                off = abs(found.final.state[name][by] - slopes[-1][i])
+                assert off <= 1e-10 * max(abs(row[i]) for row in slopes), (by, name)
+
+
 @pytest.mark.parametrize("by", ["slow", "high", "low"])
 def test_the_last_digits_of_numbers_decide_an_end_in_a_fast_decay(by: str) -> None:
     """The exact derivatives of y1, by numbers that are one unit in the last place away: off by more than 1e-9.
