@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 from hsdsl.completion.contact import Contact, contact
-from hsdsl.completion.overlay import Overlay, overlay
+from hsdsl.completion.overlay import Overlay, overlays
 from hsdsl.completion.sliding import Sliding, slidings, with_sliding
 
-__all__ = ["Contact", "Overlay", "Sliding", "contact", "overlay", "slidings", "with_sliding"]
+__all__ = ["Contact", "Overlay", "Sliding", "contact", "overlays", "slidings", "with_sliding"]

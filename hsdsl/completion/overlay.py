@@ -17,8 +17,9 @@ from hsdsl.completion.coupled_contacts import Pairs, connected_sets, coupled_flo
 from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import absolute, below
+from hsdsl.parts import numbered
 from hsdsl.program import HELD, LOOKED_AT
-from hsdsl.system import TIME, Edge, Mode, Surface
+from hsdsl.system import TIME, Edge, HybridSystem, Mode, Surface
 
 _NAN = symbol("nan")
 
@@ -38,6 +39,12 @@ class Overlay:
     flags: tuple[sp.Symbol, ...]
     contacts: tuple[Contact, ...]
     releases: tuple[int | None, ...]
+
+
+def overlays(system: HybridSystem) -> list[Overlay | None]:
+    """The motions along guards of each mode of a system."""
+    numbers = numbered(system.parts)
+    return [overlay(mode, numbers) for mode in system.modes]
 
 
 def overlay(mode: Mode, numbers: Sequence[str] = ()) -> Overlay | None:
@@ -61,7 +68,7 @@ def overlay(mode: Mode, numbers: Sequence[str] = ()) -> Overlay | None:
 
 def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp.Symbol]):
     """The flow with all choices, and for each contact its push and the size of that."""
-    flow, near = list[sp.Expr](map(sp.sympify, mode.flow)), neighbours(contacts)
+    flow, near = list(mode.flow), neighbours(contacts)
     off = [below(flag, HELD, sp.S.One, sp.S.Zero) for flag in flags]
     pairs: dict[int, Pairs] = {}
     seen: set[int] = set()
@@ -114,7 +121,7 @@ def _released(found: Contact, chosen: sp.Expr, flag: sp.Symbol, push: sp.Expr, s
     edge = found.near.edge
     was, condition = edge.surface, edge.condition
     left, right, residual = (
-        below(chosen, LOOKED_AT, sp.sympify(side), other)
+        below(chosen, LOOKED_AT, side, other)
         for side, other in ((was.left, size), (was.right, sp.S.Zero), (was.residual, -push))
     )
     if condition is not None:

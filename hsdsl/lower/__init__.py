@@ -20,7 +20,7 @@ import sympy as sp
 
 from hsdsl import limits
 from hsdsl import program as lowered
-from hsdsl.completion import Overlay, overlay
+from hsdsl.completion import Overlay, overlays
 from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import OutOfTime, timebox
@@ -29,7 +29,6 @@ from hsdsl.lower.mode import LoweredMode, lowered_overlay
 from hsdsl.lower.names import Names, number
 from hsdsl.lower.routines import print_routines
 from hsdsl.lower.switches import switch_programs, switch_routines, with_switches
-from hsdsl.parts import numbered
 from hsdsl.system import HybridSystem, SampledInput
 
 __all__ = ["in_turn", "lower", "lower_constants", "lower_expressions"]
@@ -97,7 +96,7 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
 def _modes(system: HybridSystem, names: Names, indices: dict[str, int], both: Both):
     """The modes, and those with motion along their guards."""
     modes = [LoweredMode(mode, names) for mode in system.modes]
-    found = [overlay(mode, numbered(system.parts)) for mode in system.modes]
+    found = overlays(system)
     every = [*modes, *(lowered_overlay(each, names) for each in found if each)]
     routines, others = both(lambda: [each.routines() for each in every], lambda: [each.others() for each in every])
     programs = [each.program(indices, *pair) for each, *pair in zip(every, routines, others, strict=True)]

@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hsdsl.completion import overlay
+from hsdsl.completion import overlays
 from hsdsl.expression.stack import deep_stack
 from hsdsl.lower.mode import LoweredMode, lowered_overlay
 from hsdsl.lower.names import number
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient
 from hsdsl.lower.switches import with_switches
-from hsdsl.parts import numbered
 from hsdsl.program import Routines
 from hsdsl.system import TIME, HybridSystem
 
@@ -34,8 +33,8 @@ def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
     with deep_stack():
         whole, switches = with_switches(system)
         names = number(whole, switches.symbols)
-        held = (found for mode in whole.modes if (found := overlay(mode, numbered(whole.parts))))
-        flows = (*(LoweredMode(mode, names) for mode in whole.modes), *(lowered_overlay(each, names) for each in held))
+        held = (lowered_overlay(found, names) for found in overlays(whole) if found)
+        flows = (*(LoweredMode(mode, names) for mode in whole.modes), *held)
         return tuple(map(_slopes, flows))
 
 

@@ -88,7 +88,8 @@ def names_of(program: Program, group: str) -> tuple[str, ...]:
     if group == "parameters":
         return program.parameters
     modes = (f"{part.name}.mode" for part in program.parts) if group == "initial" else ()
-    return (*(name for name in program.all_states if name not in numbered(program.parts)), *modes)
+    hidden = frozenset(numbered(program.parts))
+    return (*(name for name in program.all_states if name not in hidden), *modes)
 
 
 def resolve(sources: Mapping[str, Mapping[str, Any]], states: Sequence[str] = ()) -> Options:

@@ -175,6 +175,6 @@ def _geometric(mode: Mode):
     yield from (wall.residual for wall in mode.walls)
     for edge in mode.edges:
         yield edge.surface.residual
-        yield from (sp.sympify(r) for r in edge.reset)
+        yield from edge.reset
         if edge.condition is not None:
             yield edge.condition
