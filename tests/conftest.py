@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import signal
 import sys
 import threading
@@ -17,6 +18,8 @@ from hsdsl import cache
 
 ROOM = 4 << 30  # bytes of addresses that a test may take, and each process that it starts; memory in use is far less
 
+# two workers on two cores: each product of matrices would wait for a thread that the other worker keeps from running
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("any machine")
 cache.MOST_ENTRIES = 1 << 20  # tests make thousands: to look for the oldest of 500 takes longer than to write one

@@ -18,7 +18,7 @@ from hsdsl.runtime.library import RUNTIME
 TESTS = Path(__file__).parents[1]
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
 WARNINGS = ("-Wall", "-Wextra", "-Werror", "-pedantic")
-SANITIZERS = "-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g"
+SANITIZERS = "-fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer -g1"
 
 
 @pytest.mark.parametrize("compiler", COMPILERS)
