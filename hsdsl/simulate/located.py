@@ -80,6 +80,8 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
         held.surfaces.leave(t, x)
         if ends:
             after = held_exactly(run, here, held, t, x)
+            if t == here.t and crossing.edge < len(edges):  # to round-off it neither holds the state nor lets go
+                after.surfaces.active.discard(crossing.edge)
             return run.place(here.index, here.mode.states, t, after.x, outcome.scale, active=after.surfaces.active)
         held = held.moved(t, x)
 

@@ -574,3 +574,18 @@ experiment: {until: 10, scheme: relaxed, relaxation: 1e-6}
 """
     run = hsdsl.loads(text).simulate(engine=engine, method=method)
     assert run.final.state["v"] == pytest.approx(108, abs=0.01)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_push_that_ends_between_two_numbers_lets_go(engine: str) -> None:
+    """A whole turn of its phase loses digits: the push jumps over zero by more than its round-off."""
+    text = """
+hsdsl: 1
+modes:
+  a: {flow: {y: w, w: 7.8*sin(6.23 + 1.6*t)}, transitions: [{when: y <= 0, to: a, reset: {w: -w/2}}]}
+initial: {mode: a, y: 0, w: 0}
+experiment: {until: 1}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    after = 1 - (2 * math.pi - 6.23) / 1.6
+    assert run.final.state["y"] == pytest.approx(7.8 / 1.6 * (after - math.sin(1.6 * after) / 1.6), abs=1e-9)

@@ -266,10 +266,12 @@ static void drop_releases(hs_run *run) {
   run->alternatives_count = kept;
 }
 
-/* Go on in the mode itself from run->x, which a guard no longer holds. */
-static int released(hs_run *run, hs_time t) {
+/* Go on in the mode itself from run->x, which a guard no longer holds; not on that of edge `at_once`, -1 for none, which
+   to round-off neither holds the state nor lets go. */
+static int released(hs_run *run, hs_time t, int at_once) {
   hs_mode_state *const here = &run->here;
   be_held_exactly(run, t, run->x, -1);
+  if (at_once >= 0 && run->active_surfaces[at_once]) run->active_surfaces[at_once] = 0, here->standing--;
   const int standing_before = here->standing;
   copy(run->scale, run->landed, here->dimension);
   place(run, here->mode, here->dimension, t, 0);
@@ -287,6 +289,7 @@ static void stand(hs_run *run, const int *on, int surfaces) {
 /* Flow along guards until one lets go of the state. */
 static int along_guards(hs_run *run, hs_time limit) {
   hs_mode_state *const here = &run->here;
+  const hs_time from = here->t;
   for (;;) {
     const int outcome = follow(run, limit), end = run->chosen.edge;
     if (outcome == LANDED && releases(run, end)) {
@@ -302,7 +305,7 @@ static int along_guards(hs_run *run, hs_time limit) {
         swap(&run->x, &run->z);
       }
       leave(run, t, run->x);
-      if (ends) return released(run, t);
+      if (ends) return released(run, t, t == from && end < run->model->mode[here->mode].edges ? end : -1);
       here->t = t;
       continue;
     }
