@@ -249,14 +249,14 @@ def _lowered(files: ModelFiles) -> Answer:
 
 def _compile(lowered: Answer) -> None:
     """Compile the program that runs, for the cache."""
-    from hsdsl.runtime import library
-    from hsdsl.runtime.programs import NoCompiler, compiled
+    from hsdsl.runtime.library import NoCompiler, loop
+    from hsdsl.runtime.programs import compiled
 
     if isinstance(lowered, Lowered):
-        with applied(lowered.files.limits), suppress(NoCompiler):  # the run that needs it reports the failure
-            library.begin()
-            compiled(lowered.sliding or lowered.program)
-            library.loop()
+        with applied(lowered.files.limits):
+            for make in (partial(compiled, lowered.sliding or lowered.program), loop):
+                with suppress(NoCompiler):  # the run that needs it reports the failure
+                    make()
 
 
 @atexit.register

@@ -12,10 +12,10 @@ from gallery.records import Record, Records
 from gallery.scenes import Entry
 from gallery.settings import MOST, WITHIN
 from hsdsl.chart import PEERS
-from hsdsl.chart.outcome import OUTCOMES
 from hsdsl.simulate import SCHEMES
 
 OURS = ("hsdsl c", "hsdsl python")
+OUTCOMES = ("right", "warns", "stops", "refuses", "wrong", "crashes", "hangs")  # from best to worst
 filled = partial(fill, width=120, break_long_words=False, break_on_hyphens=False)
 HEAD = """<!-- Written by examples/gallery: edit the models and the code, not this page. -->
 

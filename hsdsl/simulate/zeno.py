@@ -176,7 +176,7 @@ def held_exactly(
     touched, after = in_touch(here, held), after_contact(here, held, t, x)
     after = replace(after, surfaces=replace(after.surfaces, scale=here.sizes))
     try:
-        q = in_turn(partial(onto_guard, after), [*touched, *reached], t, x)
+        q = in_turn(partial(onto_guard, after), sorted({*touched, *reached}), t, x)
         q = in_turn(partial(fixed_point, run, after), touched, t, q)
         return after.moved(t, q) if all(keeps(run, after.moved(t, q), k) for k in touched) else after
     except DOMAIN_ERRORS:
