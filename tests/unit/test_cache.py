@@ -393,7 +393,7 @@ def test_processes_that_begin_together_compile_once(tmp_path):
     compiler.write_text(f'#!/bin/sh\necho "$*" >> {log}\nexec {shutil.which("cc") or shutil.which("gcc")} "$@"\n')
     compiler.chmod(0o755)
     environment = os.environ | {"CC": str(compiler), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    words = [sys.executable, "-m", "hsdsl", "run", str(ROOT / "models" / "bouncing-ball.yaml"), "-q"]
+    words = [sys.executable, "-m", "hsdsl", "run", str(ROOT / "models" / "bouncing-ball.yaml"), "-q", "--engine", "c"]
     begun = [subprocess.Popen(words, env=environment) for _ in range(2)]
     assert [process.wait() for process in begun] == [0, 0]
     libraries = [line for line in log.read_text().splitlines() if "-shared" in line]
