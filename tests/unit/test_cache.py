@@ -48,7 +48,7 @@ print([name for name in sys.argv[2:] if name in sys.modules])
 LIGHT_COMMAND = """
 import sys
 from hsdsl.cli.verbs import obey
-obey(["run", sys.argv[1], "--json"])
+obey(["run", sys.argv[1], "--json", "--engine", "c"])  # which waits for the compiler
 print([name for name in sys.argv[2:] if name in sys.modules])
 """
 HEAVY = ("sympy", "mpmath", "scipy", "pydantic", "yaml", "matplotlib", "pint")
