@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -198,7 +198,8 @@ class Model:
         settings : mapping, optional
             Settings below the ones above but above the file's (what ``--set experiment.NAME`` reaches).
         engine : {"auto", "c", "python"}
-            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler.
+            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler, unless a
+            short run is made sooner while another process compiles the model.
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
         outputs : sequence of str, optional
@@ -217,20 +218,25 @@ class Model:
         key = call_key(*arguments)
         ready = self._prepared.find(key)
         if ready is None:
-            ready = automatic.judged(self.pipeline.prepare(dict(zip(ARGUMENTS, arguments, strict=True))))
-            self._prepared.keep(key, ready)
+            call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
+            ready = self._kept(key, automatic.judged(self.pipeline.prepare(call, wait=False)))
         with in_notebook() as show:
             watch = watch or (show and partial(running, show))
             try:
                 run = ready.simulate(watch, self.pipeline.seconds)
             except BecomesStiff as found:
-                ready = automatic.instead(ready, found)
-                self._prepared.keep(key, ready)
+                ready = self._kept(key, automatic.instead(ready, found))
                 run = ready.simulate(watch, self.pipeline.seconds)
         run = visible_run(run, ready)
         run.__dict__["differentiation"] = partial(self._differentiate, arguments)
         run.__dict__["look"] = partial(self.look, parameters)
         return run
+
+    def _kept(self, key: Hashable | None, ready: Prepared) -> Prepared:
+        """A run to be made, kept for the same call; one that compiled code is still made for is prepared anew then."""
+        if ready.pending is None:
+            self._prepared.keep(key, ready)
+        return ready
 
     def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
         call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))

@@ -216,14 +216,17 @@ class Pipeline:
             raise self._compiled
         return self._compiled
 
-    def prepare(self, arguments: Mapping[str, Any]) -> Prepared:
-        """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run."""
+    def prepare(self, arguments: Mapping[str, Any], wait: bool = True) -> Prepared:
+        """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run.
+
+        Unless it may ``wait``, the Python loop makes the run while another process compiles the model.
+        """
         parameters, initial = (overrides_of(arguments, group, self.program) for group in ("parameters", "initial"))
         engine, precision = arguments.get("engine", "auto"), arguments.get("precision")
         options = self.resolve(arguments.get("settings"), {key: arguments.get(key) for key in KEYS})
         engines.check(engine)
         if options.values["completion"].value == "auto" and self.sliding is not self:
-            return self.sliding.prepare(arguments)
+            return self.sliding.prepare(arguments, wait)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
         with applied(None if self._files is None else self._files.limits):
             settings = settings_of(options, values, recorded(parameters, initial, options))
@@ -238,10 +241,11 @@ class Pipeline:
         settings = following_digits(settings, options, values.kernel.arithmetic)
         problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x)
         take = partial(engines.choose, engine, settings, precision, self._compile)
-        compiling = engines.pending(self.program, settings, precision, self.compiling) if engine == "auto" else None
-        if compiling is None:
-            return prepare(problem, take())
-        return prepare(problem, None, Pending(compiling, take, engines.worth(self.seconds["load"])))
+        if not wait and engine == "auto" and self._compiled is None:
+            compiling = engines.pending(self.program, settings, precision, self.compiling)
+            if compiling is not None:
+                return prepare(problem, None, Pending(compiling, take, engines.worth(self.seconds["load"])))
+        return prepare(problem, take())
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """The inputs over time."""

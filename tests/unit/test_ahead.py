@@ -155,6 +155,15 @@ def test_other_commands_begin_themselves(words, monkeypatch, tmp_path):
     assert not ahead._begun
 
 
+def test_what_makes_many_runs_waits_for_the_compiler(monkeypatch):
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    model = hsdsl.load(MODELS / "bouncing-ball.yaml")
+    model.pipeline.compiling, model.pipeline.seconds["load"] = lambda: True, 1e9
+    first = model.simulate()
+    assert (first.engine, first.sensitivity("e").execution.engine) == ("python", "c")
+    assert (model.ensemble(parameters={"e": [0.5, 0.6]}).engine, model.simulate().engine) == ("c", "c")
+
+
 def test_a_run_does_not_wait_for_what_another_process_compiles(monkeypatch):
     monkeypatch.setattr(library, "_here", set())
     model = hsdsl.load(MODELS / "bouncing-ball.yaml")

@@ -75,7 +75,9 @@ class Parts:
             self.board.check_ends()
 
     def _units(self) -> Iterator[tuple[str, str]]:
-        if (time := self.symbols.text(self.symbols.document.units.get("t"))) is not None:  # pyright: ignore[reportArgumentType]
+        given = self.symbols.document.units.get("t")  # pyright: ignore[reportArgumentType]
+        time = None if given is None else self.symbols.text(given)
+        if time is not None:
             timed = (one for one in self.roster.instances.values() if one.name in self.board.timed)
             yield from ((one.full(SINCE), time) for one in timed)
         for group in self.roster.automata.values():

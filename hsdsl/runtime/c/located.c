@@ -266,8 +266,8 @@ static void drop_releases(hs_run *run) {
   run->alternatives_count = kept;
 }
 
-/* Go on in the mode itself from run->x, which a guard no longer holds; not on that of edge `at_once`, -1 for none, which
-   to round-off neither holds the state nor lets go. */
+/* Go on in the mode itself from run->x, which a guard no longer holds; not on that of edge `at_once`, -1 for none,
+   which to round-off neither holds the state nor lets go. */
 static int released(hs_run *run, hs_time t, int at_once) {
   hs_mode_state *const here = &run->here;
   be_held_exactly(run, t, run->x, -1);
