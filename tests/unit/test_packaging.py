@@ -34,13 +34,15 @@ def built(tmp_path_factory):
     return build(tmp_path_factory.mktemp("dist"), HSDSL_SHIP_LOOP="0")
 
 
-def run_there(wheel: Path, folder: Path, program: str, **more: str) -> subprocess.CompletedProcess[str]:
+def run_there(
+    wheel: Path, folder: Path, program: str, engine: str = "auto", **more: str
+) -> subprocess.CompletedProcess[str]:
     """Run a model with the package of a wheel, and a cache of its own."""
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(folder / "site")
     environment = {key: value for key, value in os.environ.items() if key != "CC"} | more
     environment |= {"PYTHONPATH": str(folder / "site"), "XDG_CACHE_HOME": str(folder / "cache")}
-    words = [sys.executable, "-c", program, "run", str(ROOT / "models" / "bouncing-ball.yaml")]
+    words = [sys.executable, "-c", program, "run", str(ROOT / "models" / "bouncing-ball.yaml"), "--engine", engine]
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done
@@ -104,6 +106,6 @@ def test_the_wheel_of_a_platform_has_the_loop_compiled(built, tmp_path):
     for each in (pure, wheel):
         folder = tmp_path / each.name
         folder.mkdir()
-        assert not run_there(each, folder, "from hsdsl.cli import main; main()").stderr
+        assert not run_there(each, folder, "from hsdsl.cli import main; main()", engine="c").stderr
         compiled.append(len(list((folder / "cache" / "hsdsl" / "compiled").iterdir())))
     assert compiled == [2, 1]  # the loop and the model, the model alone
