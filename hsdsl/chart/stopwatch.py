@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import _thread
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import nan
 from statistics import median
-from threading import Lock, Timer, main_thread
+from threading import Event, Lock, Thread, main_thread
 from types import TracebackType
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from hsdsl.chart.result import Attempt, Result
 
@@ -41,33 +42,42 @@ class Timed:
 
 
 class Deadline:
-    """Interrupt what the block does after some seconds; ``passed`` says whether that was done."""
+    """Interrupt what the block does after some seconds; ``passed`` says whether that was done.
+
+    Python forgets an interrupt in a destructor, so that another one follows each second until the block is over.
+    """
 
     def __init__(self, seconds: float) -> None:
-        self.passed, self._over, self._lock = False, False, Lock()
-        self._timer = Timer(seconds, self._pass)
-        self._timer.daemon = True
+        self.passed, self._seconds, self._over, self._lock = False, seconds, Event(), Lock()
 
-    def _pass(self) -> None:
-        with self._lock:
-            if not self._over:
-                self.passed = True
+    def _wait(self) -> None:
+        seconds = self._seconds
+        while not self._over.wait(seconds):
+            with self._lock:
+                if self._over.is_set():
+                    return
+                self.passed, seconds = True, 1.0
                 if hasattr(signal, "pthread_kill"):  # else not where the main thread sleeps
                     signal.pthread_kill(main_thread().ident or 0, signal.SIGINT)
                 else:
                     _thread.interrupt_main()
 
+    def _forgotten(self, found: Any) -> None:
+        if found.exc_type is not KeyboardInterrupt:
+            self._hook(found)
+
     def __enter__(self) -> Deadline:
-        self._timer.start()
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._forgotten
+        Thread(target=self._wait, daemon=True).start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: BaseException | TracebackType | None) -> bool:
         try:
             with self._lock:
-                self._over = True
+                self._over.set()
         except KeyboardInterrupt:  # it came in between
-            self._over = True
-        self._timer.cancel()
+            self._over.set()
+        sys.unraisablehook = self._hook
         return self.passed and kind is KeyboardInterrupt
 
 

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from typing import Any
 
 LONGEST_WAIT = 3600.0  # a lock cannot wait for ever
+AGAIN = 1.0  # Python forgets an exception in a destructor: the next one follows after so many seconds
 PARTS = 15  # into which the time for a file is divided: one expression may take one
 
 _python: Any = getattr(ctypes, "pythonapi", None)  # CPython; elsewhere the time is looked at between parts
@@ -59,12 +60,11 @@ def timebox(seconds: float, parts: int = 1) -> Generator[Box]:
     thread = threading.get_ident()
 
     def watch() -> None:
-        while not done.wait(min(max(0.01, box.left()), LONGEST_WAIT)):
+        while not done.wait(AGAIN if sent.is_set() else min(max(0.01, box.left()), LONGEST_WAIT)):
             with lock:
                 if not done.is_set() and box.left() <= 0:
                     sent.set()
                     _raise_in(thread, OutOfTime)
-                    return
 
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()

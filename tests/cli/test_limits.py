@@ -37,6 +37,18 @@ def test_work_is_cut_short():
     assert time.process_time() - began < 2
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_work_is_cut_short_after_a_destructor_forgot_it():
+    with pytest.raises(OutOfTime), timebox(0.1):
+        Destroyed()  # Python forgets the first exception, in the destructor
+        busy()
+
+
+class Destroyed:
+    def __del__(self):
+        busy()
+
+
 def test_each_part_has_its_own_time():
     with timebox(2.0, parts=4) as box:
         for _ in range(3):

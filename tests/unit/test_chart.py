@@ -21,7 +21,7 @@ from hsdsl.chart.judge import judge
 from hsdsl.chart.peers import prepare
 from hsdsl.chart.result import Attempt, Result, Tool
 from hsdsl.chart.rows import COLUMNS, as_csv
-from hsdsl.chart.stopwatch import race
+from hsdsl.chart.stopwatch import Deadline, race
 from hsdsl.chart.translation import as_function, in_floats, translate
 from hsdsl.errors import UsageError
 from hsdsl.functions import FUNCTIONS
@@ -193,9 +193,27 @@ def test_a_search_for_rho_is_ended(ball, monkeypatch):
     assert (row.judgement.verdict, row.judgement.rho) == ("right", None)
 
 
+def test_a_run_is_ended_after_a_destructor_forgot_it():
+    class Destroyed:
+        def __del__(self):
+            time.sleep(60)
+
+    with Deadline(0.2) as deadline:
+        Destroyed()
+        time.sleep(60)
+    assert deadline.passed
+
+
 def test_ctrl_c_ends_a_race():
     with pytest.raises(KeyboardInterrupt):
         list(race([Calls(interrupted=True).attempt("a", "a1")], lambda *_: None, 1, 10, lambda _: None))
+
+
+def test_an_earlier_end_has_a_reference_of_its_own():
+    seen = []
+    scene = Scene.of(hsdsl.load(MODELS / "bouncing-ball.yaml"), until="3/2", samples=50, digits=6, watch=seen.append)
+    assert scene.exact.engine == "refined" and scene.grid[-1] == scene.exact.final.time == pytest.approx(1.5)
+    assert len(scene.exact.transitions) == 1 and [float(each.until) for each in seen] == [1.5, 1.5]
 
 
 @pytest.mark.parametrize("engine", ["c", "python"])
