@@ -12,10 +12,11 @@ import numpy as np
 
 from hsdsl.chart.result import Array, Result
 from hsdsl.errors import UsageError
-from hsdsl.exact import precise, reference
+from hsdsl.exact import precise, reference, start_of
 from hsdsl.execution import Execution
 from hsdsl.model import Model
 from hsdsl.names import did_you_mean
+from hsdsl.simulate.recorder import Progress
 
 DIGITS = 8  # of a refined reference: each takes longer than the one before
 
@@ -61,7 +62,8 @@ class Scene:
         clearance: float | None = None,
         digits: int = DIGITS,
         exact: Execution | None = None,
-        until: float | None = None,
+        until: float | str | None = None,
+        watch: Callable[[Progress], None] | None = None,
     ) -> Scene:
         """Make the scene of a model with `hsdsl.exact.reference`, or `hsdsl.exact.precise` where there is none.
 
@@ -79,22 +81,28 @@ class Scene:
             Of a refined reference, 4 to 14; errors below its last digit mean nothing.
         exact : Execution, optional
             Replaces the reference.
-        until : float, optional
-            The end of the samples, where it is not the exact execution's own: one may end before a run is to end.
+        until : float or str, optional
+            The end of runs, where it is not the exact execution's own; a given one may end before. The reference of an
+            earlier end is refined.
+        watch : callable, optional
+            Called once with how far each run of a refined reference is, as in ``Model.simulate``.
 
         Raises UsageError: an unknown state, fewer than two samples, none clear of jumps, or no reference.
         """
         if samples < 2:
             raise UsageError(f"a chart takes at least 2 samples, not {samples}")
-        initial: dict[str, float] = {}
+        initial: Mapping[str, str] = {}
         if exact is None:
-            exact, initial = _exact(model, block, digits)
+            exact = _known(model, block) if until is None else None
+            initial = start_of(model, block)
+            exact = exact or precise(model, digits, until=until, initial=initial, watch=watch)
+            until = None
         for name in states:
             if name not in exact.states:
                 raise UsageError(f"the model has no state '{name}'", did_you_mean(name, exact.states))
         chosen = tuple(states) or exact.states
         start, end = (float(t) for t in exact.time_span)
-        end = end if until is None else until
+        end = end if until is None else float(until)
         grid = np.linspace(start, end, samples)
         jumps = np.array([tr.time for tr in exact.transitions], dtype=float)
         near = np.abs(grid[:, None] - jumps[None, :]).min(axis=1) if len(jumps) else np.full(samples, np.inf)
@@ -150,14 +158,10 @@ def _countable(exact: Execution, jumps: Array, nearly_end: float) -> tuple[float
     return int(np.count_nonzero(jumps <= nearly_end)), len(jumps)
 
 
-def _exact(model: Model, block: int, digits: int) -> tuple[Execution, dict[str, float]]:
+def _known(model: Model, block: int) -> Execution | None:
     try:
-        exact = reference(model, block)
+        return reference(model, block)
     except UsageError:
         if block:
             raise
-        return precise(model, digits), {}
-    if not block:
-        return exact, {}
-    first = exact.arcs[0]
-    return exact, {name: float(v) for name, v in zip(first.states, exact.values[0], strict=False)}
+        return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,6 +13,7 @@ from hsdsl.cli.console import progress, say, write_table
 from hsdsl.cli.options import Answer, option
 from hsdsl.cli.texts import check_target, known_names, names_of
 from hsdsl.errors import UsageError
+from hsdsl.progress import Show, Text, running
 
 if TYPE_CHECKING:
     from hsdsl.chart import Row
@@ -31,6 +32,7 @@ def chart(
     steps: Annotated[str | None, option("A,B", "For fixed-step methods.")] = None,
     against: Annotated[str | None, option("A,B", PEERS_HELP)] = None,
     states: Annotated[str | None, option("A,B", "Take the error of these states only.")] = None,
+    until: Annotated[str | None, option("T", "End of runs; an earlier one has a reference of its own.")] = None,
     samples: Annotated[int, option("N", "At how many samples the error is taken.")] = 2000,
     clearance: Annotated[
         float | None,
@@ -67,7 +69,10 @@ def chart(
             "patience": patience,
             "with_rho": rho,
         }
-        sampling = {"states": names_of(states), "samples": samples, "clearance": clearance, "digits": digits}
+        sampling = {
+            **{"states": names_of(states), "samples": samples, "clearance": clearance},
+            **{"digits": digits, "until": until},
+        }
         _report(_charted(models, sampling, options, answer), out, plot, answer)
 
 
@@ -84,7 +89,7 @@ def _charted(
             if show:
                 show(lambda: text)
 
-        for scene in [_scene(text, sampling, watch) for text in models]:
+        for scene in [_scene(text, sampling, show) for text in models]:
             name = scene.name
             rows, remarks = work_precision(scene, **options, watch=lambda what, name=name: watch(f"{name}: {what}"))
             charted.append((name, rows))
@@ -93,15 +98,19 @@ def _charted(
     return charted
 
 
-def _scene(text: str, sampling: dict[str, Any], watch: Callable[[str], None]) -> Any:
+def _scene(text: str, sampling: dict[str, Any], show: Show | None) -> Any:
     from hsdsl.chart import Scene
     from hsdsl.model import load
 
-    watch(f"{text}: the exact execution (where no formula is known, in many digits)")
     path, colon, block = text.rpartition(":")
     if not (colon and block.isdecimal()):
         path, block = text, "0"
-    return Scene.of(load(path), block=int(block), **sampling)
+
+    def named(far: Text) -> None:
+        if show:
+            show(lambda: f"{text}: exact execution in many digits {far()}")
+
+    return Scene.of(load(path), block=int(block), **sampling, watch=partial(running, named))
 
 
 def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, answer: Answer) -> None:

@@ -8,7 +8,7 @@
 ==================  ===========================================================================================
 """
 
-from hsdsl.exact.references import reference
+from hsdsl.exact.references import reference, start_of
 from hsdsl.exact.refined import precise
 
-__all__ = ["precise", "reference"]
+__all__ = ["precise", "reference", "start_of"]

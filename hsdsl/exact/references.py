@@ -56,7 +56,7 @@ def reference(model: Referenced, block: int = 0) -> Execution:
     program = model.program
     defects: dict[str, str] = {}
     if 0 <= block < max(1, len(references_of(model))):
-        start = _start(model, block)
+        start = model.simulate(until=0, initial=start_of(model, block))(0.0, side="left")
         for run in _candidates(program):
             defect = _defect(program, start, run)
             if not defect:
@@ -74,12 +74,12 @@ def references_of(model: Referenced) -> list[Mapping[str, str]]:
     return [block.settings for block in model.system.reference]
 
 
-def _start(model: Referenced, block: int) -> Point:
+def start_of(model: Referenced, block: int) -> Mapping[str, str]:
+    """The initial values by which a block of a model's ``reference:`` section differs from the model."""
     settings: Mapping[str, str] = dict(enumerate(references_of(model))).get(block, {})
     if any(not name.startswith("initial.") for name in settings):
         raise UsageError(f"block {block} of the reference overrides more than initial values, which is not supported")
-    initial = {name.removeprefix("initial."): text for name, text in settings.items()}
-    return model.simulate(until=0, initial=initial)(0.0, side="left")
+    return {name.removeprefix("initial."): text for name, text in settings.items()}
 
 
 def _candidates(program: Program) -> Iterator[Execution]:
