@@ -35,6 +35,7 @@ _LETTERS = str.maketrans(  # Cyrillic and Greek letters and the Latin ones they 
 _WIDE = re.compile("<(?:wide|narrow|small|noBreak|compat)> [0-9A-F]{4,5}")
 _LONGEST_TO_COMPARE = 60
 _MOST_TO_COMPARE = 300
+MOST_LISTED = 8
 
 
 def normalised(name: str) -> str:
@@ -128,8 +129,11 @@ def called(title: str | None, path: str) -> str:
     return title or ("a model without a file" if path.rpartition("/")[2] == NO_FILE else path)
 
 
-def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:
-    """A hint with the closest candidate, or with all of them where they are few; memory of events is none."""
+def did_you_mean(name: str, candidates: Iterable[str], otherwise: str | None = None) -> str | None:
+    """A hint with the closest candidate, or with all of them where they are few; memory of events is none.
+
+    Of many candidates with none close the hint is the other one, or the first few.
+    """
     names = list(dict.fromkeys(without_memory(candidates)))
     best = closest(name, names)
     if best is not None and best != name and in_latin(best) == in_latin(name):
@@ -138,9 +142,10 @@ def did_you_mean(name: str, candidates: Iterable[str]) -> str | None:
         return f"did you mean '{best}'? `{strange}` is U+{ord(strange):04X}, another letter that looks the same"
     if best is not None:
         return f"did you mean '{best}'?"
-    if 0 < len(names) <= 8:
-        return "known here: " + ", ".join(names)
-    return None
+    if names and (len(names) <= MOST_LISTED or otherwise is None):
+        more = len(names) - MOST_LISTED
+        return "known here: " + ", ".join(names[:MOST_LISTED]) + f" and {more} more" * (more > 0)
+    return otherwise
 
 
 def visible(text: str) -> str:

@@ -69,7 +69,7 @@ def _check_states(symbols: SymbolTable, mode: str, given: dict[Key, Scalar]) -> 
         if key not in symbols.states[mode] and not (key == SINCE and symbols.timed):
             message = f"the mode '{mode}' has no state '{shown(key)}'"
             hint = f"under `flow` of '{mode}' write {shown(key)}: and its derivative, or remove it here"
-            symbols.report(key.place, "HS308", message, did_you_mean(key, lacking) or hint)
+            symbols.report(key.place, "HS308", message, did_you_mean(key, lacking, hint))
             meant = closest(key, lacking)
             lacking = [s for s in lacking if s != meant]
     if lacking:

@@ -124,7 +124,7 @@ def _split(
     known = states + outputs
     for name in columns:
         if name not in known:
-            hint = did_you_mean(name, known) or f"there are {', '.join(known) or 'none'}"
+            hint = did_you_mean(name, known) or "there are none"
             raise UsageError(f"no state or output is called {name}", hint=hint)
     named = dict.fromkeys(columns)
     return tuple(name for name in named if name in states), tuple(name for name in named if name not in states)

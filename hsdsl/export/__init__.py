@@ -64,7 +64,7 @@ def files_of(source: Source, target: str) -> dict[str, bytes]:
 def check_target(target: str) -> None:
     """Refuse a target that there is not."""
     if target not in TARGETS:
-        raise UsageError(f"there is no export target '{target}'", did_you_mean(target, TARGETS) or _choices())
+        raise UsageError(f"there is no export target '{target}'", did_you_mean(target, TARGETS, _choices()))
 
 
 def check_scheme(model: Model, target: str, arguments: Mapping[str, Any]) -> None:

@@ -140,7 +140,7 @@ class Scope:
         hint = f"add {flow} to its flow, where it then keeps its value"
         if value.uses == {node.name}:
             message = f"{self.place} has no state '{node.name}'"
-            hint = did_you_mean(node.name, sorted(self.states - {SINCE})) or hint
+            hint = did_you_mean(node.name, sorted(self.states - {SINCE}), hint)
         return ExpressionError.at(node, "HS117", message, hint)
 
     def _call(self, node: Call) -> ExpressionError | None:
@@ -180,9 +180,9 @@ class Scope:
             return NAMES[name]
         if owned := [n for n in known if n.rpartition(".")[2] == name and n != name]:
             return f"write {' or '.join(owned[:2])}: names of parts have the part in front"
-        near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS])
-        more = "; a unit belongs under `units`" if unit(name) else ""
-        return (near or "define it, under `parameters`, `inputs` or `let`") + more
+        define = "define it, under `parameters`, `inputs` or `let`"
+        near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS], define) or ""
+        return near + "; a unit belongs under `units`" * bool(unit(name))
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states

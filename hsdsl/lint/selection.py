@@ -46,7 +46,7 @@ def codes_of(names: Iterable[str], where: str) -> set[str]:
         answering = {code for code, rule in RULES.items() if _answers(code, rule.name, name)}
         if not answering:
             known = [*RULES, *FAMILIES, *(rule.name for rule in RULES.values())]
-            hint = did_you_mean(name, known) or "rules have codes such as HS401; the documentation lists them"
+            hint = did_you_mean(name, known, "rules have codes such as HS401; the documentation lists them")
             raise UsageError(f"{where}: no lint rule is called '{name}'", hint)
         found |= answering
     return found

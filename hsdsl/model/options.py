@@ -124,7 +124,7 @@ def resolve(sources: Mapping[str, Mapping[str, Any]], states: Sequence[str] = ()
         raise UsageError(f"there is no scheme '{scheme}' ({origin})", did_you_mean(str(scheme), [*SCHEMES]))
     completion, by = values["completion"].value, values["completion"].origin
     if completion not in COMPLETIONS:
-        hint = did_you_mean(str(completion), COMPLETIONS) or f"choose from {', '.join(COMPLETIONS)}"
+        hint = did_you_mean(str(completion), COMPLETIONS)
         raise UsageError(f"there is no completion '{completion}' ({by})", hint)
     if scheme in OWN_FORMULA:
         _own_formula(scheme, values)

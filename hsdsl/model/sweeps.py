@@ -139,8 +139,8 @@ def _check_names(model: Model, names: Sequence[str], fixed: Mapping[str, Mapping
         if name not in known and name not in map(of_all, known):
             settings = name.removeprefix("experiment.") in KEYS
             hint = "until and relaxation may be expressions of a parameter that varies" if settings else None
-            hint = hint or meant(name, known) or f"it may vary {', '.join(known)}"
-            raise UsageError(f"--vary: the model has no parameter or initial value '{name}'", hint)
+            message = f"--vary: the model has no parameter or initial value '{name}'"
+            raise UsageError(message, hint or meant(name, known))
         group = "initial" if name.startswith(INITIAL) else "parameters"
         if name.removeprefix(INITIAL) in fixed[group]:
             raise UsageError(f"{name} is both set and varied", "leave one of them out")

@@ -117,6 +117,6 @@ def names_of(runs: Iterable[Execution]) -> list[str]:
 def checked(name: str, known: Sequence[str]) -> str:
     """Refuse a name that is not among those known."""
     if name not in known:
-        hint = did_you_mean(name, known) or f"there are {', '.join(known) or 'none'}"
+        hint = did_you_mean(name, known) or "there are none"
         raise UsageError(f"no state or output is called {name}", hint)
     return name

@@ -86,7 +86,7 @@ def check(name: str, distribution: str, arguments: Sequence[float]) -> None:
     """Refuse a distribution that there is not, or arguments that do not fit it."""
     known = DISTRIBUTIONS.get(distribution)
     if known is None:
-        hint = did_you_mean(distribution, DISTRIBUTIONS) or f"choose from {', '.join(DISTRIBUTIONS)}"
+        hint = did_you_mean(distribution, DISTRIBUTIONS)
         raise UsageError(f"--vary {name}: there is no distribution '{shown(distribution)}'", hint)
     form = f"{distribution}({', '.join(known.arguments)})"
     if len(arguments) != len(known.arguments):

@@ -97,11 +97,11 @@ def _flat(table: Any, column: str) -> Array:
     return table.column(column).combine_chunks().flatten().to_numpy(zero_copy_only=False)
 
 
-def _hint(sweep: Sweep, column: str) -> str:
+def _hint(sweep: Sweep, column: str) -> str | None:
     first = column.partition(".")[0]
     if first in LISTS:
         return f"record it: --record {'outputs:every=TIME' if first == 'sample' else 'transitions'}"
-    return did_you_mean(column, sweep.columns) or f"there are {', '.join(sweep.columns)}"
+    return did_you_mean(column, sweep.columns)
 
 
 def _axis(sweep: Sweep, name: str) -> Axis:

@@ -192,7 +192,7 @@ class Board:
             for key in several[0].given.at_ends:
                 if str(key) not in read:
                     message = f"nothing reads '{shown(key)}' beyond the ends of '{base}'"
-                    hint = did_you_mean(key, read) or f"remove it, or read {base}[index - 1].{shown(key)}"
+                    hint = did_you_mean(key, read, f"remove it, or read {base}[index - 1].{shown(key)}")
                     self.symbols.report(key.place, "HS351", message, hint)
 
     def _beyond(self, base: str, number: int, attribute: str) -> Meaning:

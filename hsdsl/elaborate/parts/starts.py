@@ -114,7 +114,7 @@ class StartNames(Mapping[str, Meaning]):
             return self.starts.of(other, attribute, self.symbolic)
         known = [*other.states, *map(str, other.kind.parameters)]
         message = f"'{attribute}' is no state or parameter of '{other.automaton}'"
-        return Refusal("HS111", message, did_you_mean(attribute, known) or _SENTENCE)
+        return Refusal("HS111", message, did_you_mean(attribute, known, _SENTENCE))
 
     def __iter__(self) -> Iterator[str]:
         if self.one is not None:
