@@ -20,8 +20,8 @@ from hsdsl.model.values import with_parameters
 from hsdsl.names import did_you_mean
 from hsdsl.orbits.branch import Branch
 from hsdsl.orbits.continuation import Follower, branch
-from hsdsl.orbits.orbit import Orbit, judged, multipliers_of
-from hsdsl.orbits.section import LONGER, NoReturn, Return, Section
+from hsdsl.orbits.orbit import Orbit, judged, multipliers_of, returning
+from hsdsl.orbits.section import LONGER, NoReturn, Return, Section, without_noise
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
 from hsdsl.parts import meant_alone, numbers_of
 from hsdsl.sensitivity.result import Sensitivity
@@ -285,17 +285,17 @@ class Orbits:
     def judge(self, found: Closed, parameters: Mapping[str, Any], forcing: float | None) -> Orbit:
         """Say what is known of an orbit."""
         forced, passage = forcing is not None, found.passage
-        sensitivity = passage.sensitivity
         multipliers = multipliers_of(found, passage.slopes, forced)
         verdict, reason = judged(multipliers, self._error(found, parameters, multipliers, forced))
-        broken = tuple(why for when, why in sensitivity.breaks if when <= passage.time * (1 + TIE))
+        breaks = passage.sensitivity.breaks_along(returning(found, forced))
+        broken = tuple(why for when, why in breaks if when <= passage.time * (1 + TIE))
         verdict, reasons = "undecided" if broken else verdict, (reason, *broken)
-        states = self._entered()[1]
+        mode, states = self._entered()
         return Orbit(
             self.edge,
             self.laps,
-            self._entered()[0],
-            dict(zip(states, found.point.tolist(), strict=True)),
+            mode,
+            dict(zip(states, without_noise(found.point, found.sizes).tolist(), strict=True)),
             None if forcing is None else found.phase % forcing,
             passage.time,
             multipliers,

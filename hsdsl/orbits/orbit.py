@@ -98,14 +98,35 @@ def multipliers_of(found: Closed, slopes: Array, forced: bool) -> Array:
 
     The map does not depend on where along the flow it begins: that direction has the eigenvalue zero.
     """
-    n = len(found.point)
-    matrix = slopes[:, : n + 1].copy()
-    if forced:
-        matrix[n, n] += 1  # the phase moves with the time
-    of, count = found.symmetry, n + forced
+    matrix, of = return_matrix(slopes, forced), found.symmetry
+    count = len(found.point) + forced
     values = np.linalg.eigvals(of.without_shifts(matrix[:count])[:, of.kept(count)])
     order = np.argsort(-np.abs(values), kind="stable")
     return values[order][:-1]
+
+
+def return_matrix(slopes: Array, forced: bool) -> Array:
+    """The derivatives of where a lap leads, states and phase, by where it begins."""
+    n = len(slopes) - 1
+    matrix = slopes[:, : n + 1].copy()
+    if forced:
+        matrix[n, n] += 1  # the phase moves with the time
+    return matrix
+
+
+def returning(found: Closed, forced: bool) -> dict[str, dict[str, float]]:
+    """The directions in which executions nearby are apart after a lap, by what moves them a lap before.
+
+    Off a surface that a lap ends on none is, and where a lap ends in one point there is none.
+    """
+    wrt, sizes = found.passage.sensitivity.wrt, np.append(found.sizes, found.passage.time)[: len(found.point) + forced]
+    matrix = return_matrix(found.passage.slopes, forced)[: len(wrt), : len(wrt)] * sizes
+    matrix[np.abs(matrix) <= LEAST_MARGIN * sizes[:, None]] = 0
+    return {
+        by: dict(zip(wrt, column, strict=True))
+        for by, column in zip(wrt, matrix.T.tolist(), strict=True)
+        if any(column)
+    }
 
 
 def judged(multipliers: Array, error: float) -> tuple[str, str]:
@@ -113,7 +134,8 @@ def judged(multipliers: Array, error: float) -> tuple[str, str]:
     if not len(multipliers):
         return "stable", "the section has one point"
     largest, margin = float(np.abs(multipliers[0])), max(LEAST_MARGIN, 10 * error)
-    known = f"the largest multiplier has the size {largest:.10g}, known to {margin:.1g}"
+    size = largest if largest >= LEAST_MARGIN else 0
+    known = f"the largest multiplier has the size {size:.10g}, known to {margin:.1g}"
     if largest < 1 - margin:
         return "stable", known
     return ("unstable" if largest > 1 + margin else "undecided"), known

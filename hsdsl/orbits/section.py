@@ -17,6 +17,11 @@ LONGER = 4  # a run that does not return is made so many times longer,
 MOST_LONGER = 4  # as often as this
 
 
+def without_noise(point: Array, sizes: Array) -> Array:
+    """A point with zeros where its states are round-off of their sizes."""
+    return np.where(np.abs(point) <= ROUNDOFF * sizes, 0.0, point)
+
+
 class NoReturn(Exception):
     """A run from the section does not come back to it; the message says what it does."""
 
@@ -71,7 +76,7 @@ class Section:
         """
         names = [f"initial.{x}" for x in self.states]
         wrt = [*names, *([self.phase] if self.phase else []), *([parameter] if parameter else [])]
-        there = np.where(np.abs(point) <= ROUNDOFF * self.sizes, 0.0, point)
+        there = without_noise(point, self.sizes)
         start, most = dict(zip(self.states, there.tolist(), strict=True)), self.most
         found = self.run(start, phase, horizon, most, wrt)
         for tried in range(1 + longer):

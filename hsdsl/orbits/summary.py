@@ -9,7 +9,7 @@ import numpy as np
 
 from hsdsl.execution import Array
 from hsdsl.names import called, seen
-from hsdsl.orbits.orbit import Orbit
+from hsdsl.orbits.orbit import LEAST_MARGIN, Orbit
 from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number, values
@@ -54,9 +54,9 @@ def _facts(orbit: Orbit) -> Iterator[tuple[str, str]]:
 
 
 def shown(found: Array) -> str:
-    """Multipliers, a pair of conjugate ones as one."""
+    """Multipliers, a pair of conjugate ones as one; what is not known from zero is zero."""
     parts: list[str] = []
-    for m in found:
+    for m in np.where(np.abs(found) < LEAST_MARGIN, 0.0, found):
         if m.imag == 0:
             parts.append(number(float(m.real), 12))
         elif m.imag > 0:

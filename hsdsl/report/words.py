@@ -21,10 +21,10 @@ COLUMNS = ("#", "time", "delay", "edge", "from -> to", "state")
 
 
 def number(x: Any, digits: int = 6) -> str:
-    """Write a number to a few significant digits; text and None as they are."""
+    """Write a number to a few significant digits, zero without a sign; text and None as they are."""
     if isinstance(x, (bool, int)) or not (isinstance(x, float) or decimals.is_multiprecision(x)):
         return str(x)
-    return f"{float(x):.{digits}g}"
+    return f"{float(x) + 0.0:.{digits}g}"
 
 
 def values(named: Mapping[str, Any], digits: int = DIGITS) -> str:

@@ -148,8 +148,12 @@ class Sensitivity:
     @cached_property
     def breaks(self) -> tuple[tuple[Any, str], ...]:
         """Times from which on no derivative exists, and why; the verdict of the run has not been looked at."""
+        return self.breaks_along({by: {by: 1.0} for by in self.wrt})
+
+    def breaks_along(self, ways: Mapping[str, Slopes]) -> tuple[tuple[Any, str], ...]:
+        """The same where only some directions count, each with its components by what derivatives are taken by."""
         found = [(tie.time, str(tie.reason)) for tie in self._parting]
-        found += self._landings
+        found += self._landings(ways)
         stop = self.execution.stop
         if stop.reason == "not_finite":
             sentence = f"at t = {show(stop.time)} a guard is reached at rate zero within the error of the run"
@@ -158,18 +162,25 @@ class Sensitivity:
             found.append((stop.time, f"the run ends there ({stop.reason}): {stop.message}"))
         return tuple(sorted(found, key=lambda found: found[0]))
 
-    @cached_property
-    def _landings(self) -> list[tuple[Any, str]]:
+    def _landings(self, ways: Mapping[str, Slopes]) -> list[tuple[Any, str]]:
         """The first landing on a guard from which executions nearby go on in different ways."""
         view = RunView(self.setting.plain, self.execution)
         tied = {show(tie.time) for tie in self.ties}
+
+        def along(row: Slopes) -> Slopes:
+            return {way: sum(row[by] * part for by, part in parts.items()) for way, parts in ways.items()}
+
+        names, own = self.setting.plain.program.parameters, self.setting.parameters
+        moved = [along({by: own[by][i] for by in self.wrt}) for i in range(len(names))]
+        parameters = {way: tuple(row[way] for row in moved) for way in ways}
         for made in self.execution.transitions:
             if show(made.time) in tied:  # its orders have been looked at
                 continue
             after = made.after or {}
             time = self._shifts(after)
             state = self._followed(made.target, made.time, after, time, True)
-            if found := next(parted(view, landing(view, made), time, state, self.setting.parameters), None):
+            rows = {x: along(row) for x, row in state.items()}
+            if found := next(parted(view, landing(view, made), along(time), rows, parameters), None):
                 return [(made.time, f"at t = {show(made.time)} {made.edge} leads onto {found}")]
         return []
 

@@ -227,6 +227,38 @@ def test_stick_slip_on_a_belt() -> None:
     assert np.allclose(orbit.multipliers, 0, atol=1e-12)
 
 
+RELAY = """
+hsdsl: 1
+modes:
+  pos:
+    flow: {x: -3*x + y - 1, y: -3*x + z + 1.2, z: -2*x - 1}
+    transitions: [{name: down, when: x <= 0, to: neg}]
+  neg:
+    flow: {x: -3*x + y + 1, y: -3*x + z - 1.2, z: -2*x + 1}
+    transitions: [{name: up, when: x >= 0, to: pos}]
+initial: {mode: pos, x: 0.5, y: 0.3, z: 0.2}
+experiment: {until: 40, completion: auto}
+"""
+
+
+@pytest.mark.parametrize("section", ["pos->sliding_pos_neg", "neg->sliding_pos_neg", "sliding_pos_neg->pos"])
+def test_sections_of_sliding(section: str) -> None:
+    """A start off the surface parts from the orbit at the end of sliding, but no lap ends there."""
+    orbit = hsdsl.loads(RELAY).orbit(section)
+    assert orbit.verdict == "stable"
+    assert np.isclose(orbit.period, 6.933568018533765, rtol=1e-12)
+    assert close(orbit.multipliers, [0.0362579783319586, 0])
+    assert orbit.state["x"] == 0
+    assert "multipliers 0.036257978332, 0\n" in orbit.summary
+
+
+def test_multipliers_that_are_zero() -> None:
+    """Sticking puts every near orbit on the same line."""
+    orbit = hsdsl.load(BELT).orbit("slower->sliding_slower_faster")
+    assert orbit.verdict == "stable"
+    assert "multipliers 0\nverdict     stable: the largest multiplier has the size 0," in orbit.summary
+
+
 WORLD = """
 hsdsl: 1
 title: A monopod whose foot has a place in the world
