@@ -75,14 +75,21 @@ def _pairs(system: HybridSystem) -> Iterator[tuple[Mode, Edge, Mode, Edge]]:
 
 def _first(mode: Mode, edge: Edge) -> set[str]:
     """The modes that edges of higher priority on the same surface lead to; a common one is sliding that is written."""
-    r = edge.surface.residual
-    return {e.target for e in mode.edges if e.priority > edge.priority and sp.expand(e.surface.residual - r) == 0}
+    return {e.target for e in mode.edges if e.priority > edge.priority and _factor(e, edge) > 0}
 
 
 def _opposite(out: Edge, back: Edge) -> bool:
     """Whether two edges that change no state cross one surface in opposite directions, whenever it is reached."""
     plain = all(e.condition is None and e.reset == tuple(map(symbol, e.target_states)) for e in (out, back))
-    return plain and sp.expand(out.surface.residual + back.surface.residual) == 0
+    return plain and _factor(out, back) < 0
+
+
+def _factor(one: Edge, other: Edge) -> sp.Number:
+    """The number by which the residual of an edge is that of another one; 0 where it is none."""
+    r, s = (sp.expand(edge.surface.residual).as_coefficients_dict() for edge in (one, other))
+    term = next(iter(r))
+    factor = r[term] / s[term] if s.get(term) else sp.S.Zero
+    return factor if {each: value * factor for each, value in s.items()} == dict(r) else sp.S.Zero
 
 
 def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr) -> Sliding:
@@ -158,4 +165,4 @@ def _same(one: Edge, other: Edge) -> bool:
     alike = all(getattr(one, key) == getattr(other, key) for key in keys)
     if not alike or not (back or one.target == other.target):
         return False
-    return sp.expand(one.surface.residual - other.surface.residual) == 0
+    return _factor(one, other) > 0

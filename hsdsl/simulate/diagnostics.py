@@ -104,7 +104,7 @@ def slides(edge: str, source: ModeProgram, target: ModeProgram, t: Number) -> St
             how += "on an intersection of surfaces no rule gives one flow"
         else:
             how += (
-                "completion: auto follows the motion where both modes press on one surface, written alike, "
-                "and neither has events"
+                "completion: auto follows the motion where both modes press on one surface, written alike "
+                "up to a factor, and neither has events"
             )
     return Stop("zeno", t, f"sliding at t = {show(t)}: {how}")

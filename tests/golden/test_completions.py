@@ -203,6 +203,16 @@ def test_sliding_on_an_intersection_is_refused_with_its_reason() -> None:
     assert run.stop.reason == "zeno" and "intersection" in run.stop.message
 
 
+@pytest.mark.parametrize("back", ["-2*x**2 - 2*y**2 + 2 >= 0", "(x**2 + y**2)/3 <= 1/3", "0.1*(1 - x**2) >= 0.1*y**2"])
+def test_surfaces_that_differ_by_a_factor_are_one(back: str) -> None:
+    plain, other = (
+        sliding(modes, "x: 1/2, y: 0", 1.5, tolerance=1e-12)
+        for modes in (CIRCLE.replace("Q", "1"), CIRCLE.replace("Q", "1").replace("x**2 + y**2 <= 1", back))
+    )
+    assert [t.time for t in other.transitions] == pytest.approx([t.time for t in plain.transitions], abs=1e-10)
+    assert {t.edge for t in other.transitions} >= {"sliding_a_b->b"}
+
+
 def test_without_auto_sliding_stops_and_says_how_to_go_on() -> None:
     text = f"hsdsl: 1\nmodes:\n{FRICTION}\ninitial: {{mode: a, x: 12, v: 6}}\nexperiment: {{until: 30}}"
     run = hsdsl.loads(text).simulate()
