@@ -37,11 +37,20 @@ def text_of(definition: Definition) -> str:
     body = _body(definition.results, tuple(definition.statements))
     if definition.places is None:
         return f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n{body}"
-    parts = (*definition.results, *(expr for _, expr in definition.statements))
-    used = set[sp.Symbol]().union(*(sp.sympify(expr).free_symbols for expr in parts)) & definition.places.keys()
-    places = sorted((definition.places[symbol], symbol.name) for symbol in used)
+    parts = _parts(*map(sp.sympify, definition.results), *(expr for _, expr in definition.statements))
+    places = sorted((definition.places[symbol], symbol.name) for symbol in parts & definition.places.keys())
     named = "".join(f"    {name} = given[{i}]\n" for i, name in places)
     return f"def {definition.name}(*given):\n{named}{body}"
+
+
+def _parts(*expressions: sp.Basic) -> set[sp.Basic]:
+    """Expressions and all their parts, each visited once."""
+    found, waiting = set[sp.Basic](), list(expressions)
+    while waiting:
+        if (expr := waiting.pop()) not in found:
+            found.add(expr)
+            waiting += expr.args
+    return found
 
 
 @lru_cache(maxsize=4096)  # the modes of a large model have most of their routines in common

@@ -26,11 +26,12 @@ WIDEST = 16  # terms or factors of one statement
 class Cut:
     """Expressions cut down to statements of bounded size, in the order of computation.
 
-    With ``powers`` the base of a power that is printed as a product is a name, which can be repeated at no cost.
+    With ``powers`` the base of a power that is printed as a product is a name, which can be repeated at no cost. With
+    ``whole`` each unknown of linear equations is a statement, which is left to a later cut to solve.
     """
 
-    def __init__(self, letter: str, powers: bool = False) -> None:
-        self._powers = powers
+    def __init__(self, letter: str, powers: bool = False, whole: bool = False) -> None:
+        self._powers, self._whole = powers, whole
         self.statements: list[Statement] = []
         self._letter = letter
         self._names: dict[sp.Basic, sp.Symbol] = {}
@@ -65,7 +66,8 @@ class Cut:
     def _node(self, expr: sp.Basic) -> tuple[sp.Basic, int]:
         parts = [self._cut(a) for a in expr.args]
         if isinstance(expr, solution):
-            return self._solved(expr.func(*(self.name(part) for part, _ in parts))), 1
+            unknown = expr.func(*(self.name(part) for part, _ in parts))
+            return self.name(unknown) if self._whole else self._solved(unknown), 1
         if self._powers and expr.is_Pow and expr.exp.is_Integer and abs(expr.exp) <= LARGEST_PRODUCT:
             parts = [(self.name(part), 1) if abs(expr.exp) > 1 else (part, size) for part, size in parts]
         if expr.is_Pow and expr.base.is_Pow:
@@ -102,18 +104,21 @@ class Gradient:
 
     For each expression, ``sparse`` has its derivatives by those arguments where they are not zero, in the arguments'
     order, and ``rows`` those by all arguments. ``statements`` are the names in them, in the order of computation; none
-    where the expressions are small.
+    where the expressions are small. With ``whole`` unknowns of linear equations, and their derivatives, are left to a
+    later cut to solve.
     """
 
-    def __init__(self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol], letter: str = "g") -> None:
+    def __init__(
+        self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol], letter: str = "g", whole: bool = False
+    ) -> None:
         self._arguments = arguments
         self._order = {argument: i for i, argument in enumerate(arguments)}
         given = tuple(expressions)
-        self._cut = Cut(letter)
+        self._cut = Cut(letter, whole=whole)
         small = [self._cut.down(e) for e in given]
         if self._cut.statements:  # what comes more than once is differentiated once
             common, small = shared(given, f"{letter}_")
-            self._cut = Cut(letter)
+            self._cut = Cut(letter, whole=whole)
             for symbol, expr in common:
                 self._cut.define(symbol, expr)
             small = [self._cut.down(e) for e in small]
@@ -128,6 +133,8 @@ class Gradient:
         return tuple(tuple(row.get(a, sp.S.Zero) for a in self._arguments) for row in self.sparse)
 
     def _row(self, expr: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
+        if isinstance(expr, solution):
+            return self._row_of_solution(expr)
         present = moving(expr)
         direct = {a: derivative(expr, a) for a in present & self._order.keys()}
         through = present & self._slopes.keys()
@@ -136,6 +143,22 @@ class Gradient:
             for argument, inner in self._slopes[symbol].items():
                 direct[argument] = direct.get(argument, sp.S.Zero) + slope * inner
         return {a: direct[a] for a in sorted(direct, key=self._order.__getitem__) if direct[a] != 0}
+
+    def _row_of_solution(self, expr: solution) -> dict[sp.Symbol, sp.Expr]:
+        """The derivatives of an unknown of A x = b: those of x solve A x' = b' - A' x."""
+        place, rows, constants = expr.system
+        unknowns = [self._cut.name(solution(sp.Integer(c), *expr.args[1:])) for c in range(len(rows))]
+        moved = [[self._row(entry) for entry in (*row, b)] for row, b in zip(rows, constants, strict=True)]
+        present = set[sp.Symbol]().union(*(slopes for row in moved for slopes in row))
+        found: dict[sp.Symbol, sp.Expr] = {}
+        for a in sorted(present, key=self._order.__getitem__):
+            right: list[sp.Expr] = []
+            for *entries, b in moved:
+                through = (slopes[a] * x for slopes, x in zip(entries, unknowns, strict=True) if a in slopes)
+                right.append(self._cut.name(b.get(a, sp.S.Zero) - sp.Add(*through)))
+            if any(right):
+                found[a] = solution(sp.Integer(place), *expr.args[1 : -len(rows)], *right)
+        return found
 
 
 def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Statement]:

@@ -15,7 +15,7 @@ Slopes = dict[sp.Symbol, sp.Expr]
 
 def slopes(expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol]) -> list[Slopes]:
     """The derivatives of each expression by those arguments where they are not zero."""
-    found = Gradient([sp.sympify(e) for e in expressions], arguments, letter="slope ")
+    found = Gradient([sp.sympify(e) for e in expressions], arguments, letter="slope ", whole=True)
     meaning: dict[sp.Basic, sp.Basic] = {}
     done: dict[sp.Basic, sp.Basic] = {}
     for name, expr in found.statements:
