@@ -92,6 +92,7 @@ def search(query: Query) -> SearchResult:
         for end in query.ends:
             for start in query.starts:
                 _Search(query, start, end, found).run()
+    found.lower, found.cut = np.maximum(found.lower, 0.0), np.maximum(found.cut, 0.0)  # bounds less a strip's depth
     return found
 
 

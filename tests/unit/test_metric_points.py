@@ -53,6 +53,26 @@ def test_oscillator_distances_at_the_stop(oscillator, p, q, expected):
     assert found.certified == "certified"
 
 
+# Three spheres at contact, the first with speed 1: strips 1e-3 deep, and how far their ends are from places at rest.
+EXCHANGES = [
+    ("first", SpacePoint("row", (0, 1, 1, 0, 2, 0, 3, 0)), 1e-3),
+    ("first", SpacePoint("row", (0, 0, 1, 1, 2, 0, 3, 0)), 0.0),
+    ("second", SpacePoint("row", (0, 1, 1, 0, 2, 0, 3, 0)), 0.0),
+    ("second", SpacePoint("row", (0, 0, 1, 1, 2, 0, 3, 0)), 1e-3),
+    ("third", SpacePoint("row", (0, 1, 1, 0, 2, 0, 3, 0), "third", 5e-4), 5e-4),
+]
+
+
+@pytest.mark.parametrize("hops", [0, 1, None])
+@pytest.mark.parametrize(("edge", "q", "expected"), EXCHANGES)
+def test_the_end_of_a_strip_costs_what_is_left_of_it(edge, q, expected, hops):
+    p = SpacePoint("row", (0, 1, 1, 0, 2, 0, 3, 0), edge, 1e-3)
+    found = distance(space_of("gallery/cascade"), p, q, relaxation=1e-3, hops=hops).interval
+    assert found.lower <= expected * (1 + 1e-9) and (
+        found.upper == pytest.approx(expected, abs=2e-12) or hops in (0, 1)
+    )
+
+
 @pytest.mark.parametrize(("p", "q", "expected"), AT_THE_STOP)
 def test_passages_of_the_relaxed_space_cost_the_relaxation(oscillator, p, q, expected):
     found = distance(oscillator, SpacePoint("free", p), SpacePoint("free", q), relaxation=1e-3)
