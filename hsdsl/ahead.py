@@ -2,7 +2,7 @@
 
 The other process is a copy of this one from before anything large was loaded. It answers with the program or with the
 errors of the model; where it ends without an answer, this process does the work itself. Large models are lowered in
-two processes. Compiled code is left in the cache; the other process makes it even where this one ends before.
+two processes. Then it makes what is missing in the cache of compiled code, even where this process ends before.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -39,7 +38,6 @@ class Lowered(NamedTuple):
 
 
 Answer = Lowered | ModelError | None
-UnderWay = Callable[[], bool]  # whether compiled code is still being made
 LARGE = 0.03  # seconds to elaborate a model, from which on a copy takes less time than half of the lowering
 NICE = 5  # the run that needs no compiled code goes first
 # what pydantic and SymPy load where they first look for plugins and tensors, of which no model has any: for nothing
@@ -55,7 +53,6 @@ class _Copy(Generic[Result]):
 
     process: int
     answer: int
-    goes_on: bool  # when it has answered
 
     def wait(self) -> Result | None:
         """Its answer; None where it ends without one."""
@@ -80,6 +77,7 @@ class _Copy(Generic[Result]):
 
 _begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
 _seen: list[ModelFiles] = []
+_going_on: list[int] = []  # copies that have answered
 
 
 def begin(files: ModelFiles, compiled: bool = True) -> None:
@@ -90,11 +88,6 @@ def begin(files: ModelFiles, compiled: bool = True) -> None:
     if _saves_time() and not program_cache.is_kept(files):
         with suppress(OSError):  # there may be no more processes
             _begun.append((files, _copy(lambda: _lowered(files), _compile if compiled else None)))
-
-
-def begun() -> bool:
-    """Whether another process lowers a model, and compiles what runs it if that is needed."""
-    return bool(_begun)
 
 
 def begin_run(words: list[str]) -> None:
@@ -117,8 +110,8 @@ def _saves_time() -> bool:
     )
 
 
-def taken(files: ModelFiles, needed: Sequence[str] = ()) -> tuple[Lowered, UnderWay | None] | None:
-    """The programs of a model that was begun, and whether the one that runs is being compiled; None if there is none.
+def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
+    """The programs of a model that was begun; None if there are none.
 
     Modules that are needed afterwards are imported while the other process works.
 
@@ -129,22 +122,26 @@ def taken(files: ModelFiles, needed: Sequence[str] = ()) -> tuple[Lowered, Under
             import_module(name)
         answer = one[1].wait()
         _begun.remove(one)
-        if isinstance(answer, Lowered) and one[1].goes_on:
+        if isinstance(answer, Lowered):
             os.close(one[1].answer)
-            return answer, partial(_goes_on, one[1].process)
+            _going_on.append(one[1].process)
+            return answer
         one[1].end()
-        if isinstance(answer, ModelError):
+        if answer is not None:
             raise answer
-        return None if answer is None else (answer, None)
     return None
 
 
-def _goes_on(process: int) -> bool:
-    """Whether a copy of this process has not ended."""
-    try:
-        return os.waitpid(process, os.WNOHANG)[0] == 0
-    except ChildProcessError:
-        return False
+def compiling() -> bool:
+    """Whether another process compiles what it has lowered for this one."""
+    for process in [*_going_on]:
+        try:
+            ended = os.waitpid(process, os.WNOHANG)[0]
+        except ChildProcessError:  # this process keeps no ends of others
+            ended = True
+        if ended:
+            _going_on.remove(process)
+    return bool(_going_on)
 
 
 def _copy(work: Callable[[], Result], then: Callable[[Result], object] | None = None) -> _Copy[Result]:
@@ -162,7 +159,7 @@ def _copy(work: Callable[[], Result], then: Callable[[Result], object] | None = 
         if process == 0:
             os.close(answer)  # else a large answer is waited with for ever where the reader has ended
             _work(work, to_answer, then)
-        return _Copy(process, answer, then is not None)
+        return _Copy(process, answer)
     finally:
         os.close(to_answer)
 
@@ -182,19 +179,19 @@ def _work(work: Callable[[], Result], to_answer: int, then: Callable[[Result], o
             stream.write(content)
         if then is not None:
             ctypes.CDLL(None).prctl(1, 0)
-            _leave_terminal()
+            _leave()
             then(answer)
     finally:
         os._exit(0)
 
 
-def _leave_terminal() -> None:
-    """Keep no stream open whose other end waits for it to be closed, get no Ctrl-C, and let others work first."""
+def _leave() -> None:
+    """Keep nothing open that others wait for, be it a pipe or a lock, get no Ctrl-C, and let others work first."""
     os.setpgid(0, 0)
     os.nice(NICE)
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for stream in range(3):
-        os.dup2(nothing, stream)
+    os.closerange(0, 1 + max(map(int, os.listdir("/proc/self/fd"))))
+    for _ in range(3):
+        os.open(os.devnull, os.O_RDWR)
 
 
 def _both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
@@ -248,15 +245,16 @@ def _lowered(files: ModelFiles) -> Answer:
 
 
 def _compile(lowered: Answer) -> None:
-    """Compile the program that runs, for the cache."""
-    from hsdsl.runtime.library import NoCompiler, loop
-    from hsdsl.runtime.programs import compiled
+    """Compile the program that runs, for the cache; where there is none, let a run that is shorter than this end."""
+    import time
+
+    from hsdsl.runtime import programs
+    from hsdsl.runtime.compiler import NoCompiler
 
     if isinstance(lowered, Lowered):
-        with applied(lowered.files.limits):
-            for make in (partial(compiled, lowered.sliding or lowered.program), loop):
-                with suppress(NoCompiler):  # the run that needs it reports the failure
-                    make()
+        with applied(lowered.files.limits), suppress(NoCompiler):  # the run that needs it reports the failure
+            if not programs.keep(lowered.sliding or lowered.program):
+                time.sleep(time.process_time())
 
 
 @atexit.register

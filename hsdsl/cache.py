@@ -142,9 +142,13 @@ def making(kind: str, key: str) -> AbstractContextManager[None]:
     """Let one process at a time make an entry, where the cache can be written: others wait and find it."""
     from hsdsl.unfinished import locked
 
+    return locked(folder() / kind / key) if can_keep(kind, key) else nullcontext()
+
+
+def can_keep(kind: str, key: str) -> bool:
+    """Whether an entry may be made and there is a folder for it."""
     entry = folder() / kind / key
-    usable = all(private(place) is None for place in (folder(), entry.parent, entry))
-    return locked(entry) if usable else nullcontext()
+    return all(private(place) is None for place in (folder(), entry.parent, entry))
 
 
 def is_made(kind: str, key: str) -> bool:

@@ -55,12 +55,12 @@ def locked(folder: Path) -> Generator[None]:
 
 
 def is_locked(folder: Path) -> bool:
-    """Whether another process locks a folder at this moment."""
-    with suppress(FileNotFoundError, PermissionError):
+    """Whether another process locks a folder at this moment; those who look do not see each other."""
+    with suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
             if fcntl is not None:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
         except BlockingIOError:
             return True
         finally:

@@ -21,7 +21,6 @@ from hsdsl.progress import running
 
 if TYPE_CHECKING:
     from hsdsl.execution import Execution, Stop
-    from hsdsl.model import Model as LoadedModel
     from hsdsl.model.stream import Streamed
 
 STOPPED = 3
@@ -63,7 +62,9 @@ def run(
         text = read_bytes(model)
         if outputs is None and plot is None and animate is None and experiment.in_numbers():
             ahead.begin(ModelFiles.read(model, None, text), engine != "python" and precision is None)
-        loaded = _load(model, text, engine, precision, experiment.scheme)
+        from hsdsl.model import load
+
+        loaded = load(model, text=text)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
         shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
@@ -101,14 +102,6 @@ def _check_files(out: Path | None, plot: Path | None, animate: Path | None, outp
         check_target(path, name, WRITES[name], WRITES)
     if out is not None and out.suffix.lower() == ".npz" and outputs is not None:
         raise UsageError("an .npz file holds the whole execution; --outputs chooses columns of .csv and .parquet")
-
-
-def _load(path: Path, text: bytes, engine: str, precision: int | None, scheme: str | None) -> LoadedModel:
-    """Load a model, and its compiled code at the same time."""
-    from hsdsl.model import engines, load
-
-    engines.begin(engine, precision, scheme)
-    return load(path, text=text)
 
 
 def _answer(

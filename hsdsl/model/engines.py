@@ -12,18 +12,18 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
-from math import inf
+from functools import cache, partial
 
 from hsdsl import ahead
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
 from hsdsl.program import Program
-from hsdsl.runtime import kernel, library, programs
-from hsdsl.runtime.compiler import NoCompiler, find_compiler
+from hsdsl.runtime import kernel, programs
+from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.runtime.structures import SCHEMES
 from hsdsl.simulate import Settings
+from hsdsl.simulate.plan import Pending
 
 ENGINES = ("auto", "c", "python")
 
@@ -34,42 +34,30 @@ def check(engine: str) -> None:
         raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
 
 
-def begin(engine: str, precision: int | None, scheme: str | None) -> None:
-    """Compile the loop while a model is read, where the run may need it and no other process does so."""
-    if engine != "python" and precision is None and (scheme or SCHEMES[0]) in SCHEMES and not ahead.begun():
-        library.begin()
-
-
-def pending(
-    program: Program, settings: Settings, precision: int | None, compiling: Callable[[], bool] | None
-) -> Callable[[], bool] | None:
-    """Whether other processes still make what can run a program; None where there is nothing to wait for.
-
-    ``compiling`` says it of a process that was begun for it.
-    """
-    if _refusal(settings, precision) is None:
-        with suppress(NoCompiler):
-            find_compiler()  # what has none says so
-            compiling = compiling or programs.under_way(program)
-            return compiling if compiling() else None
-    return None
-
-
-def worth(spent: float) -> float:
-    """How many seconds the Python loop may take to make a run whose model took so long to read.
-
-    That is about how long the compiler takes for the model; the compiled loop, where it is not kept, takes longer.
-    """
-    return spent if library.is_kept(library.LOOP[0]) else inf
-
-
 def choose(
-    engine: str, settings: Settings, precision: int | None, make: Callable[[], CompiledModel]
-) -> CompiledModel | None:
+    engine: str,
+    settings: Settings,
+    precision: int | None,
+    make: Callable[[], CompiledModel],
+    program: Program | None = None,
+) -> CompiledModel | Pending | None:
     """The compiled model that a run is for, None where the Python loop is to run it.
+
+    Of a ``program`` that other processes may compile at the moment it need not be there yet.
 
     Raises UsageError: ``c`` is given and cannot serve.
     """
+    take = partial(_taken, engine, settings, precision, make)
+    if program is not None and engine == "auto" and _refusal(settings, precision) is None:
+        with suppress(NoCompiler):  # what needs the compiler says so
+            elsewhere = programs.under_way(program)
+            return Pending(lambda: ahead.compiling() or elsewhere(), take)
+    return take()
+
+
+def _taken(
+    engine: str, settings: Settings, precision: int | None, make: Callable[[], CompiledModel]
+) -> CompiledModel | None:
     if engine == "python":
         return None
     why = _refusal(settings, precision)

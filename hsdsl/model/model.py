@@ -198,8 +198,8 @@ class Model:
         settings : mapping, optional
             Settings below the ones above but above the file's (what ``--set experiment.NAME`` reaches).
         engine : {"auto", "c", "python"}
-            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler, unless a
-            short run is made sooner while another process compiles the model.
+            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler, unless the
+            run is made sooner while another process compiles the model.
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
         outputs : sequence of str, optional

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from hsdsl import ahead, program_cache
@@ -28,15 +28,12 @@ from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, Problem, prepare
 from hsdsl.simulate.input_segments import Timeline, UnorderedTimes, make_timeline
-from hsdsl.simulate.plan import Pending
 
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
 
 # what compiles, runs and reports a model
 _RUNNING = ("pickle", "hsdsl.backends.c", "hsdsl.runtime.process", "hsdsl.simulate.verdict", "hsdsl.report")
-
-_OF_THIS_PROCESS = ("system", "sliding", "compiling", "_compiled", "kernels")
 
 
 def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Pipeline:
@@ -48,13 +45,12 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
         program, files = cached
         return Pipeline(None, time.perf_counter() - began, files, program)
     lowered = ahead.taken(files, _RUNNING)
-    if lowered is not None and _method_exists(lowered[0].program):
-        (program, sliding, files), compiling = lowered
+    if lowered is not None and _method_exists(lowered.program):
+        program, sliding, files = lowered
         made = Pipeline(None, time.perf_counter() - began, files, program)
         made.keep(program)
         if sliding is not None:
             made.keep(sliding, (SLIDING,))
-        (made if sliding is None else made.sliding).compiling = compiling
         return made
     system = _elaborated(files)
     return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
@@ -92,7 +88,6 @@ class Pipeline:
         if program is not None:
             self.program = program
         self._files, self._part, self._left_out = files, part, left_out
-        self.compiling: Callable[[], bool] | None = None  # whether a process begun for the program goes on
         self.seconds = {"load": load_seconds, "compile": 0.0}
         self._compiled: CompiledModel | NoCompiler | None = None
         self.kernels: dict[int | None, PythonKernel] = {}
@@ -100,14 +95,12 @@ class Pipeline:
     def __getstate__(self) -> dict[str, Any]:
         program = self.program  # needed first by whoever gets it, and costly
         state = {
-            key: value
-            for key, value in vars(self).items()
-            if key not in ("system", "sliding", "compiling", "_compiled", "kernels")
+            key: value for key, value in vars(self).items() if key not in ("system", "sliding", "_compiled", "kernels")
         }
         return state | {"program": program} | ({"system": self.system} if self._files is None else {})
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        self.__dict__.update(state, compiling=None, _compiled=None, kernels={})
+        self.__dict__.update(state, _compiled=None, kernels={})
 
     @property
     def files(self) -> ModelFiles | None:
@@ -240,12 +233,8 @@ class Pipeline:
             settings = automatic.chosen(settings, self.program, values.kernel, timeline, mode, x)
         settings = following_digits(settings, options, values.kernel.arithmetic)
         problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x)
-        take = partial(engines.choose, engine, settings, precision, self._compile)
-        if not wait and engine == "auto" and self._compiled is None:
-            compiling = engines.pending(self.program, settings, precision, self.compiling)
-            if compiling is not None:
-                return prepare(problem, None, Pending(compiling, take, engines.worth(self.seconds["load"])))
-        return prepare(problem, take())
+        awaited = None if wait or self._compiled is not None else self.program
+        return prepare(problem, engines.choose(engine, settings, precision, self._compile, awaited))
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """The inputs over time."""

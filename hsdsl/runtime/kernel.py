@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Hashable
 from functools import cache
-from threading import Lock
 from typing import Any
 
 from hsdsl.program import Program
@@ -13,20 +12,13 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.library import loop
 from hsdsl.runtime.programs import SYMBOL, compiled
 
-_loading = Lock()
 
-
+@cache
 def runtime() -> ctypes.CDLL:
     """The hand-written runtime; a run in it leaves the interpreter free.
 
     Raises NoCompiler: there is no compiler, or it fails.
     """
-    with _loading:  # another thread may compile it: see `library.begin`
-        return _runtime()
-
-
-@cache
-def _runtime() -> ctypes.CDLL:
     library = loop()
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None

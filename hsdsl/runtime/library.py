@@ -12,13 +12,11 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from contextvars import copy_context
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
-from threading import Thread
 
 from hsdsl import limits
-from hsdsl.cache import find, is_made, keep, key_of, making
+from hsdsl.cache import can_keep, find, is_made, keep, key_of, making
 from hsdsl.names import shown
 from hsdsl.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
 
@@ -32,7 +30,6 @@ GIVEN_UP = "given-up"  # entries for models that took too long to compile: the s
 LOOP = '#include "library.c"\n', "hs_simulate"  # its text and symbol
 EFFORT: Effort = "-O1"  # -O2 compiles 1.5 times as long, for code that is a hundredth faster
 _OPTIONS = " ".join((EFFORT, *FLAGS))
-_here: set[str] = set()  # what this process compiles or waits for
 
 
 def loop_object(folder: Path) -> Path:
@@ -73,18 +70,6 @@ def loop() -> ctypes.CDLL:
     return load(text, symbol, lambda: [text])
 
 
-def begin() -> None:
-    """Compile the loop in another thread, unless it was compiled before."""
-
-    def compile_loop() -> None:
-        with suppress(NoCompiler):  # the run that needs it reports the failure
-            loop()
-
-    with suppress(NoCompiler):
-        if not is_kept(LOOP[0]) and not made_elsewhere(LOOP[0])():
-            Thread(target=copy_context().run, args=(compile_loop,), daemon=True).start()
-
-
 def _shipped(content: str) -> Path:
     """Where a library would be that came with this package."""
     return SHIPPED / f"{key_of(content, _our_text(), _OPTIONS, _processor())}.so"
@@ -107,7 +92,6 @@ def load(content: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctyp
     loaded = _kept(key)
     if loaded is not None:
         return loaded
-    _here.add(key)
     with making(KIND, key):
         return _kept(key) or _made(compiler, key, symbol, source)
 
@@ -124,12 +108,21 @@ def _loaded(path: Path) -> ctypes.CDLL | None:
         return None  # made for something else than what runs now: it is made again
 
 
-def is_kept(content: str) -> bool:
-    """Whether the library of ``content`` was compiled before, or came with this package.
+def is_missing(content: str) -> bool:
+    """Whether the library of ``content`` is not there, and no process makes it.
 
     Raises NoCompiler: there is no compiler.
     """
-    return _shipped(content).exists() or find(KIND, _key(content, find_compiler())) is not None
+    key = _key(content, find_compiler())
+    return not _shipped(content).exists() and find(KIND, key) is None and not is_made(KIND, key)
+
+
+def can_be_kept(content: str) -> bool:
+    """Whether the library of ``content`` will be there for other processes.
+
+    Raises NoCompiler: there is no compiler.
+    """
+    return can_keep(KIND, _key(content, find_compiler()))
 
 
 def made_elsewhere(content: str) -> Callable[[], bool]:
@@ -137,8 +130,7 @@ def made_elsewhere(content: str) -> Callable[[], bool]:
 
     Raises NoCompiler: there is no compiler.
     """
-    key = _key(content, find_compiler())
-    return lambda: key not in _here and is_made(KIND, key)
+    return partial(is_made, KIND, _key(content, find_compiler()))
 
 
 def _key(content: str, compiler: Compiler) -> str:

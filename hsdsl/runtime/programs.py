@@ -8,7 +8,7 @@ from collections.abc import Callable
 from hsdsl import limits
 from hsdsl.program import Program
 from hsdsl.runtime.compiler import NoCompiler, TooSlow
-from hsdsl.runtime.library import LOOP, load, made_elsewhere
+from hsdsl.runtime.library import LOOP, can_be_kept, is_missing, load, loop, made_elsewhere
 
 SYMBOL = "hs_the_model"
 
@@ -22,6 +22,21 @@ def compiled(program: Program) -> ctypes.CDLL:
         return load(_content(program), SYMBOL, lambda: _source(program))
     except TooSlow as error:
         raise NoCompiler(f"{error}; {_longest(program)}") from None
+
+
+def keep(program: Program) -> bool:
+    """Compile a program and the loop for the cache, unless they are there or other processes do; False if it is closed.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    content = _content(program)
+    if not can_be_kept(content):
+        return False
+    if is_missing(content):
+        compiled(program)
+    if is_missing(LOOP[0]):
+        loop()
+    return True
 
 
 def under_way(program: Program) -> Callable[[], bool]:

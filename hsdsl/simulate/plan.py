@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 from hsdsl.execution import Array, Execution, Stop
@@ -49,25 +49,22 @@ SCHEMES: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
     "paoli-schatzman": _paoli_schatzman,
 }
 Watch = Callable[[Progress], None]
-EARLY = 0.1  # of the time that a run is worth: how long it will take is not judged before
 
 
-@dataclass(frozen=True)
+@dataclass
 class Pending:
-    """Compiled code that another process makes; ``take`` waits for it and may find that there is none.
-
-    ``worth`` is how many seconds a run may take that does not wait.
-    """
+    """Compiled code that other processes make; when they do no more, it is taken, and there may be none."""
 
     under_way: Callable[[], bool]
     take: Callable[[], CompiledModel | None]
-    worth: float
+    compiled: CompiledModel | None = None
+    taken: bool = False
 
-    def overtakes(self, began: float, run: Progress) -> bool:
-        """Whether the code is there, or a run that began then is expected to take longer than it is worth."""
-        passed = time.perf_counter() - began
-        late = passed > EARLY * self.worth and passed * float(run.until) > self.worth * float(run.now)
-        return late or not self.under_way()
+    def overtakes(self) -> bool:
+        """Whether the code is there."""
+        if not self.taken and not self.under_way():
+            self.compiled, self.taken = self.take(), True
+        return self.compiled is not None
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +87,16 @@ class Prepared(Problem):
 
         Raises BecomesStiff: by the judge.
         """
-        spent = dict(seconds or {})
+        spent, began = dict(seconds or {}), time.perf_counter()
         try:
             if self.plan is not None:
                 execution = self._by_compiled_loop(self.plan, watch, spent)
             else:
                 execution = self._by_python_loop(self._fresh(), watch, spent)
         except Overtaken:
-            assert self.pending is not None
-            faster = prepare(self.with_settings(self.settings), self.pending.take())
+            faster = self.prepared_with(self.settings)
             faster.judges.extend(self.judges)
+            spent["compile"] = spent.get("compile", 0.0) + time.perf_counter() - began
             return faster.simulate(watch, spent)
         self.judges.clear()
         return execution
@@ -125,7 +122,7 @@ class Prepared(Problem):
 
     def prepared_with(self, settings: Settings) -> Prepared:
         """Prepare the same problem with other settings."""
-        return prepare(self.with_settings(settings), self.plan and self.plan.compiled, self.pending)
+        return prepare(self.with_settings(settings), self.pending if self.plan is None else self.plan.compiled)
 
     @cached_property
     def _about(self) -> dict[str, Any]:
@@ -145,7 +142,7 @@ class Prepared(Problem):
         recorder = Recorder(
             arithmetic, settings.until, degree, outputs, room,
             scales=dict(settings.scale), modes=modes, review=self._review(),
-            overtaken=self.pending and partial(self.pending.overtakes, time.perf_counter()),
+            overtaken=self.pending and self.pending.overtakes,
         )  # fmt: skip
         problem = vars(self.with_settings(settings))
         return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder)
@@ -182,8 +179,8 @@ class Prepared(Problem):
         return written(self._about, under_way, whole, stop, spent, self.again)
 
 
-def prepare(problem: Problem, compiled: CompiledModel | None = None, pending: Pending | None = None) -> Prepared:
-    """Prepare a run, by the compiled loop where ``compiled`` is given or, if it is sooner there, ``pending``."""
-    return Prepared(
-        **vars(problem), plan=None if compiled is None else CompiledPlan(problem, compiled), pending=pending
-    )
+def prepare(problem: Problem, code: CompiledModel | Pending | None = None) -> Prepared:
+    """Prepare a run by compiled code; by the Python loop where there is none, or until it is there."""
+    pending = code if isinstance(code, Pending) and not code.overtakes() else None
+    compiled = code.compiled if isinstance(code, Pending) else code
+    return Prepared(**vars(problem), plan=compiled and CompiledPlan(problem, compiled), pending=pending)

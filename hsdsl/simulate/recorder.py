@@ -127,7 +127,7 @@ class Recorder:
     scales: dict[str, Number] = field(default_factory=dict[str, Number])  # of states in the arcs before the last
     modes: tuple[str, ...] = ()  # of the model, in order
     review: Review | None = None
-    overtaken: Callable[[Progress], bool] | None = None  # by compiled code: looked at with every row
+    overtaken: Callable[[], bool] | None = None  # by compiled code: looked at with every row
 
     def __post_init__(self) -> None:
         self.room.due, self.room.look = self._due(), self._look
@@ -137,7 +137,7 @@ class Recorder:
         return reviewed if self.overtaken is None else min(reviewed, self.room.taken + 1)
 
     def _look(self) -> float:
-        if self.overtaken is not None and self.overtaken(self):
+        if self.overtaken is not None and self.overtaken():
             raise Overtaken
         if self.review is not None and self.room.taken == self.review.due:
             arc = self.arcs[-1]

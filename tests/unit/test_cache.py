@@ -26,9 +26,14 @@ from hsdsl import cache, program_cache
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import ModelError
 from hsdsl.files import ModelFiles
-from hsdsl.model import engines
 from hsdsl.runtime import kernel, library
 from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.unfinished import is_locked
+
+try:
+    import fcntl
+except ImportError:
+    fcntl = None
 
 ROOT = Path(__file__).parents[2]
 MODELS = sorted((ROOT / "models").glob("*.yaml"))
@@ -177,7 +182,7 @@ def test_a_foreign_library_is_not_loaded(depth, monkeypatch: pytest.MonkeyPatch,
         foreign.write_bytes(b"foreign")
         (folder / library.KIND, foreign.parent, foreign)[depth].chmod(0o777)
     monkeypatch.setattr(library.ctypes, "CDLL", lambda p, load=library.ctypes.CDLL: (loaded.append(p), load(p))[1])
-    kernel._runtime.cache_clear()
+    kernel.runtime.cache_clear()
     CompiledModel(program)
     assert loaded and not any(Path(path).stem == cache._checksum(b"foreign") for path in loaded)
     assert ("can be written by other users" in capsys.readouterr().err) == (depth < 2)
@@ -360,30 +365,13 @@ def test_a_run_of_a_model_seen_before_imports_no_loop_and_no_summary(
 
 
 @needs_compiler
-def test_the_runtime_is_compiled_while_a_model_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
-    begun: list[str | None] = []
-    for engine, precision, scheme in (
-        ("auto", None, None),
-        ("c", None, "relaxed"),
-        ("auto", None, "paoli-schatzman"),
-        ("python", None, "located"),
-        ("auto", 50, "located"),
-    ):
-        monkeypatch.setattr(engines.library, "begin", lambda scheme=scheme: begun.append(scheme))
-        engines.begin(engine, precision, scheme)
-    assert begun == [None, "relaxed"]
-
-
-@needs_compiler
 def test_the_runtime_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = re.findall(r"\blibrary\.(hs_\w+)\.", inspect.getsource(kernel._runtime))
+    names = re.findall(r"\blibrary\.(hs_\w+)\.", inspect.getsource(kernel.runtime))
     text = "".join(f'__attribute__((visibility("default"))) void {name}(void) {{}}\n' for name in {*names})
     monkeypatch.setattr(library, "LOOP", (text, "hs_simulate"))  # which takes no seconds to compile
-    kernel._runtime.cache_clear()
-    library.begin()
-    assert kernel.runtime() is kernel.runtime()
-    assert not library.is_kept("nothing") and library.is_kept(text)
-    kernel._runtime.cache_clear()
+    kernel.runtime.cache_clear()
+    assert library.is_missing(text) and kernel.runtime() is kernel.runtime() and not library.is_missing(text)
+    kernel.runtime.cache_clear()
 
 
 @needs_compiler
@@ -398,3 +386,15 @@ def test_processes_that_begin_together_compile_once(tmp_path):
     assert [process.wait() for process in begun] == [0, 0]
     libraries = [line for line in log.read_text().splitlines() if "-shared" in line]
     assert len(libraries) == 2  # the loop and the model
+
+
+@pytest.mark.skipif(fcntl is None, reason="there are no locks of folders")
+def test_who_looks_at_a_lock_is_not_taken_for_its_owner(tmp_path):
+    folder = os.open(tmp_path, os.O_RDONLY)
+    assert not is_locked(tmp_path)
+    fcntl.flock(folder, fcntl.LOCK_SH)  # as one does who looks
+    assert not is_locked(tmp_path)
+    fcntl.flock(folder, fcntl.LOCK_EX)
+    assert is_locked(tmp_path)
+    os.close(folder)
+    assert not is_locked(tmp_path) and not is_locked(Path(__file__) / "compiled")

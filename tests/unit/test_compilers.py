@@ -51,7 +51,7 @@ WRONG = {
 @pytest.fixture(autouse=True)
 def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Nothing is compiled, nothing has been printed, and a compiler has the fifth of a second."""
-    kernel._runtime.cache_clear()
+    kernel.runtime.cache_clear()
     monkeypatch.setattr(process, "PATIENCE", 0.2)
     monkeypatch.setattr(compiler, "TRIAL", 60.0)  # what compiles may take long where much else runs
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
