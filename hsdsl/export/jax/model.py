@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
-from itertools import combinations
 
 from hsdsl.backends.c.source import width
 from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
@@ -14,7 +12,7 @@ from hsdsl.export.routines import data_names, definitions, mode_definitions, par
 from hsdsl.export.source import Source
 from hsdsl.integrators import ButcherTableau
 from hsdsl.integrators.numbers import table_numbers
-from hsdsl.program import HELD, Program
+from hsdsl.program import ModeProgram, Program
 from hsdsl.simulate import Problem
 
 
@@ -50,10 +48,6 @@ def _start(problem: Problem, data: dict[str, str]) -> str:
     return "\n".join(["def initial_state(p):", *lines, f"    return padded([{', '.join(numbers)}], SIZES[0])", ""])
 
 
-MOST_TOGETHER = 3  # guards of a mode whose motions along several of them are there, each set for itself
-MOST_HELD = 64  # of a mode with more such guards no motion along them is there: a run stops at the end of a Zeno tail
-
-
 def model_text(source: Source, table: ButcherTableau) -> str:
     """All of it."""
     program = source.problem.program
@@ -70,28 +64,6 @@ def model_text(source: Source, table: ButcherTableau) -> str:
     return "\n\n".join(parts)
 
 
-@dataclass(frozen=True)
-class Motion:
-    """What flows: number ``flow`` of `Program.flows`, of the mode ``owner``, in contact with the guards of ``held``."""
-
-    owner: int
-    flow: int
-    held: frozenset[int] = frozenset()
-
-
-def motions(source: Source) -> list[Motion]:
-    """The modes and, where a run has them, their motions along a guard, along several where these are few."""
-    program = source.problem.program
-    found = [Motion(i, i) for i in range(len(program.modes))]
-    for i, mode in enumerate(program.modes if source.problem.settings.completion != "none" else ()):
-        edges = [k for k, edge in enumerate(mode.edges) if edge.contact is not None]
-        most = MOST_TOGETHER if len(edges) <= MOST_TOGETHER else 1 if len(edges) <= MOST_HELD else 0
-        for count in range(1, most + 1):
-            assert mode.held is not None or not edges
-            found += [Motion(i, mode.held or 0, frozenset(few)) for few in combinations(edges, count)]
-    return found
-
-
 def _functions(source: Source) -> Iterable[str]:
     program = source.problem.program
     data = {name: f"p[{i}]" for i, name in enumerate(data_names(program))}
@@ -102,7 +74,7 @@ def _functions(source: Source) -> Iterable[str]:
 
 
 def _tables(source: Source) -> str:
-    program, found = source.problem.program, motions(source)
+    program = source.problem.program
     surfaces = max(1, *(len(mode.surfaces) for mode in program.flows))
     wide = max(1, width(program))
     states = program.all_states
@@ -114,36 +86,43 @@ def _tables(source: Source) -> str:
             target = tuple(map(states.index, edge.target_states))
             edges.append(
                 f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
-                f"{edge.counts}, SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}, "
+                f"{edge.counts}, {edge.changes}, SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}, "
                 f"mode_{mode.held if edge.branched else j}_reset_{k}),"
             )
-    texts = [_mode(motion, found, program, numbers) for motion in found]
+    found = flows(source)
+    texts = [_mode(j, program, own, numbers, len(found)) for j, own in enumerate(found)]
     lines += ["MODES = (", *texts, ")", "EDGES = (", *edges, ")"]
     return "\n".join(lines) + "\n"
 
 
-def _mode(motion: Motion, motions: list[Motion], program: Program, numbers: list[tuple[int, ...]]) -> str:
-    j, held, owner = motion.flow, motion.held, program.modes[motion.owner]
-    mode, states, own = program.flows[j], program.all_states, numbers[motion.owner]
+def flows(source: Source) -> list[int]:
+    """For each of the flows that a run has the number of its mode: the modes, then those with motion along guards."""
+    program = source.problem.program
+    owners = {mode.held: j for j, mode in enumerate(program.modes) if mode.held is not None}
+    none = source.problem.settings.completion == "none"
+    return [owners.get(j, j) for j in range(len(program.modes if none else program.flows))]
+
+
+def _mode(j: int, program: Program, owner: int, numbers: list[tuple[int, ...]], count: int) -> str:
+    mode, states = program.flows[j], program.all_states
     listed = [_names(j, [f"{kind}_{k}" for k in mode.surfaces]) for kind in ("gradient", "rate")]
     parts = "".join(f"{_names(j, names)}, " for names in mode.conditions)
-    places = {(each.owner, each.held): i for i, each in enumerate(motions)}
-    edge_of = {edge.contact: k for k, edge in enumerate(owner.edges) if edge.contact is not None}
-    ends = [None if edge.releases is None else edge_of[edge.releases] for edge in mode.edges]
-    edges = (*own, *(own[k] for k in ends[len(own) :] if k is not None))
-    contacts = tuple(
-        -1 if k in held or k >= len(own) else places.get((motion.owner, held | {k}), -1) for k in range(len(edges))
-    )
-    last = max(held, default=-1)
-    before = places[motion.owner, held - {last}]
-    order = 0 if last < 0 else owner.edges[last].push_order
-    contact = contacts, tuple(k in held for k in ends), before, last, order
-    flags = f", {tuple(float(HELD) if k in held else 0.0 for k in edge_of.values())}" if held else ""
+    contact = _contact(program.modes[owner], mode, owner, numbers[owner], count)
     return (
-        f"    mode_of({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {edges}, {contact},\n"
+        f"    mode_of({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {contact},\n"
         f"            SIZES, mode_{j}_flow, mode_{j}_surfaces, mode_{j}_magnitudes, {', '.join(listed)},\n"
-        f"            ({parts}), mode_{j}_outputs{flags}),"
+        f"            ({parts}), mode_{j}_outputs),"
     )
+
+
+def _contact(owner: ModeProgram, mode: ModeProgram, j: int, own: tuple[int, ...], count: int) -> str:
+    """The fields of a mode from ``edges`` to ``orders``; those behind a mode's own edges are of what they release."""
+    held = -1 if owner.held is None or not owner.held < count else owner.held
+    places = [-1 if edge.contact is None or held < 0 else edge.contact for edge in owner.edges]
+    ends = [-1 if edge.releases is None else edge.releases for edge in mode.edges]
+    edges = (*own, *(own[places.index(place)] for place in ends[len(own) :]))
+    orders = tuple(edge.push_order for edge in owner.edges)
+    return f"{edges}, {len(mode.surfaces) - len(edges)}, {j}, {held}, {tuple(places)}, {tuple(ends)}, {orders}"
 
 
 def _names(j: int, names: Iterable[str]) -> str:
@@ -175,7 +154,8 @@ def _experiment(source: Source, table: ButcherTableau, fixed: dict[str, str]) ->
         "order": table.error_order, "scale": scale,
     }  # fmt: skip
     lines = [
-        f"MODEL = Model(MODES, EDGES, STATES, SIZES[0], {_strings(program.outputs)}, METHOD, timeline)",
+        f"MODEL = Model(MODES, EDGES, STATES, SIZES[0], {_strings(program.outputs)}, METHOD, timeline, "
+        f"{program.contact_count}, {settings.until})",
         "CONFIG = Config(", *(f"    {name}={value}," for name, value in fields.items()), ")",
         f"FIXED = {{{', '.join(f'{name!a}: {why!a}' for name, why in fixed.items())}}}",
         f"EXPERIMENT = Experiment(MODEL, CONFIG, {_strings(program.parameters)}, FIXED, parameter_values, "

@@ -1,5 +1,5 @@
 # pyright: basic
-"""Motion along a guard that holds a state, at rest where that is none, and Zeno tails that end in it."""
+"""Motion along guards that hold a state, at rest where that is none, and Zeno tails that end in it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,31 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from .functions import chosen, frozen, keeping, when
-from .lane import STEP, ZENO, contraction, noticed, sampled, scales_here, stopped
-from .model import Bound, noise_of
+from .control import NOTHING
+from .functions import chosen, frozen, keeping, when, with_derivatives_of
+from .lane import (
+    BOUNDARY,
+    END,
+    FREE,
+    STEP,
+    TOUCH,
+    ZENO,
+    contraction,
+    flown,
+    noticed,
+    of_contacts,
+    releasing,
+    sampled,
+    scaled,
+    sizes_here,
+    stopped,
+)
+from .model import HELD, LOOKED_AT, Bound, noise_of
 from .steps import at
-from .surfaces import UNIT
+from .surfaces import UNIT, after_reset, keeps
 
-SAME_UNITS, ZERO_UNITS, MOST_ROUNDS, CORRECTIONS, QUADRUPLINGS = 4, 16, 60, 8, 28
+ZERO_UNITS, FURTHER = 16, 16
+MOST_ROUNDS, MOST_CORRECTIONS_TO_GUARD, MOST_LEAP = 60, 4, 16
 PARALLEL = 1e-6
 
 
@@ -25,184 +43,377 @@ def takes_back(slope, back):
     return (share < 0) & (off <= PARALLEL * jnp.abs(share) * jnp.abs(slope)).all()
 
 
-def after_reset(model, bound, mode, k, t, x):
-    """Where edge k leads at a slow impact, but for states that it counts with."""
-    edge = model.of(model.edge, mode)[k]
-    return jnp.where(model.of(model.counts, edge), x, bound.routines.slow(edge, bound.p, t, x))
+def levels(model, lane, held, looked=False):
+    """Numbers of contacts, of the edges ``held`` of a mode, and of those ``looked`` at."""
+    place = model.of(model.contact, model.of(model.owner, lane.mode))
+    place = jnp.where(place >= 0, place, model.C)
+    numbers = jnp.where(held, HELD, jnp.where(looked, LOOKED_AT, 0.0))
+    return jnp.zeros(model.C).at[place].max(numbers, mode="drop")
 
 
-def keeps(model, bound, lane, k, t, x):
-    """Whether edge k leaves the state where it is, and its `if` holds there or next along the flow."""
-    scales = scales_here(model, lane)
-    still = (jnp.abs(after_reset(model, bound, lane.mode, k, t, x) - x) <= SAME_UNITS * UNIT * scales).all()
-    return still & is_possible(model, bound, lane.mode, k, t, x, scales)
+def in_touch(model, lane):
+    """The edges of a mode whose guards hold the state."""
+    place = model.of(model.contact, model.of(model.owner, lane.mode))
+    return (place >= 0) & (jnp.append(lane.contacts, 0.0)[place] == HELD)
 
 
-def is_possible(model, bound, mode, k, t, x, scales):
-    """Whether the `if` of edge k holds at a point, or next along the flow."""
-    next_to = pressed(model, bound, mode, k, t, x, scales)
-    return bound.facts(mode, t, x).conditions[k] | bound.facts(mode, t, next_to).conditions[k]
+def flow_along(model, bound, lane, held, t, x):
+    """The flow along the guards of some edges, the mode's own where there are none."""
+    owner = model.of(model.owner, lane.mode)
+    mode = jnp.where(held.any(), model.of(model.held, owner), owner)
+    return bound.touching(levels(model, lane, held)).flow(mode, t, x)
 
 
-def pressed(model, bound, mode, k, t, x, scales):
-    """Where the flow takes a state: off by round-off where the reset of edge k moves it."""
-    slope = bound.flow(mode, t, x)
-    slopes = jax.jvp(lambda x: after_reset(model, bound, mode, k, t, x) - x, (x,), (slope,))[1]
-    moved = (slopes != 0) & (slope != 0)
-    after = jnp.where(moved, ZERO_UNITS * UNIT * scales / jnp.abs(jnp.where(slope == 0, 1.0, slope)), 0.0).max()
-    after = jnp.where(after > 0, after, UNIT * (bound.end - t))  # where these states have been zero only
-    return x + after * slope
+def is_possible(model, bound, lane, k, t, x, touched=False):
+    """Whether the `if` of edge k holds at a point, or next along the flow that the guards of other edges leave."""
+    owner, next_to = model.of(model.owner, lane.mode), pressed(model, bound, lane, k, t, x, touched)
+    both = bound.facts(owner, jnp.stack([t, t]), jnp.stack([x, next_to]))
+    return both.conditions[:, k].any()
 
 
-def is_tangent(model, bound, lane, k, t, x):
-    """Whether the flow is tangent to surface k, to round-off."""
-    rows = jax.jacfwd(lambda x: bound.flow(lane.mode, t, x))(x)
-    sizes = jnp.abs(bound.flow(lane.mode, t, x)) + jnp.abs(rows) @ scales_here(model, lane)
+def pressed(model, bound, lane, k, t, x, touched=False):
+    """Where the flow presses a state, by what the guard of edge k takes away of the flow that others' guards leave."""
+    owner, own = model.of(model.owner, lane.mode), jnp.arange(model.M) == k
+    others = touched & ~own
+    slope = flow_along(model, bound, lane, others, t, x)
+    left = flow_along(model, bound, lane, others | own, t, x)
+    slope = jnp.where(model.of(model.contact, owner)[k] >= 0, slope - left, slope)
+    moved = model.of(model.changes, model.of(model.edge, owner)[k]) & (slope != 0)
+    sizes = sizes_here(model, lane)
+    after = jnp.where(moved, ZERO_UNITS * UNIT * sizes / jnp.abs(jnp.where(slope == 0, 1.0, slope)), 0.0).max()
+    return x + jnp.where(after > 0, after, UNIT * model.until) * slope  # the latter for states that were zero only
+
+
+def kept_by(model, bound, lane, surfaces, t, x):
+    """The edges of some surfaces whose guards hold the state where the flow presses on them: resets keep it there."""
     facts = bound.facts(lane.mode, t, x)
-    gradient = facts.gradients[k]
-    size = jnp.abs(gradient[0]) + jnp.abs(gradient[1:]) @ sizes
-    return jnp.abs(facts.rates[k]) <= ZERO_UNITS * UNIT * size
+    rows = jax.jacfwd(lambda x: bound.flow(lane.mode, t, x))(x)
+    sizes = jnp.abs(bound.flow(lane.mode, t, x)) + jnp.abs(rows) @ sizes_here(model, lane)
+    size = jnp.abs(facts.gradients[:, 0]) + jnp.abs(facts.gradients[:, 1:]) @ sizes
+    tangent = jnp.abs(facts.rates) <= ZERO_UNITS * UNIT * size
+    may = surfaces & (model.of(model.contact, lane.mode) >= 0)
+    still = jax.vmap(lambda k: keeps(model, bound, lane, k, t, x))(jnp.arange(model.M))
+    return may & still & ((model.of(model.order, lane.mode) == 1) | tangent)
 
 
-def presses(model, bound, lane, k, t, x):
-    """Whether a state's flow presses on the guard of edge k, and its reset keeps the state."""
-    contact = model.of(model.contact, lane.mode)[k]
-    held = jnp.maximum(contact, 0)
-    facts = bound.facts(held, t, x)
-    inside = (facts.values < -noise_of(facts, t, x, 0.0))[k]
-    first = jnp.asarray(model.push_order)[held] == 1
-    on = (contact >= 0) & keeps(model, bound, lane, k, t, x) & inside
-    return on & (first | is_tangent(model, bound, lane, k, t, x))
+def looked(model, bound, lane, held, others):
+    """The routines, mode and lane that look at the pushes on guards while those ``held`` hold the state."""
+    contacts = levels(model, lane, held, others)
+    mode = model.of(model.held, model.of(model.owner, lane.mode)).astype(jnp.int32)
+    return bound.touching(contacts), lane._replace(mode=mode, contacts=contacts)
+
+
+def pushes(model, bound, lane, holding, kept, t, x):
+    """Those of some guards that the flow presses on while those ``holding`` hold it; whether it has a value there."""
+    there, held = looked(model, bound, lane, holding, kept)
+    facts = there.facts(held.mode, t, x)
+    r, noise = facts.values, noise_of(facts, t, x, scaled(model, held))
+    falls = lifts_next(model, there, held, kept, t, x)
+    without, at_none = looked(model, bound, lane, jnp.zeros_like(kept), kept)
+    holds = without.facts(at_none.mode, t, x).conditions
+    holds |= jax.vmap(lambda k: is_possible(model, bound, lane, k, t, x, holding))(jnp.arange(model.M))
+    return kept & holds & ((r < -noise) | ((r <= noise) & ~falls)), ~(jnp.isnan(r) & kept).any()
+
+
+def lifts_next(model, bound, held, kept, t, x):
+    """Whether the push on a guard, zero now, is first negative where the flow makes it differ from zero."""
+
+    def further(state):
+        t, x, after, open_, lifts = state
+        time = held.t + after
+        x = x + (time - t) * bound.flow(held.mode, t, x)
+        facts = bound.facts(held.mode, time, x)
+        differs = open_ & (jnp.abs(facts.values) > noise_of(facts, time, x, scaled(model, held)))
+        return time, x, after * FURTHER, open_ & ~differs, lifts | (differs & (facts.values > 0))
+
+    state = t, x, jnp.asarray(UNIT * model.until), kept, jnp.zeros_like(kept)
+    return lax.while_loop(lambda s: s[3].any() & (held.t + s[2] < bound.end), further, state)[4]
+
+
+def pressing(model, bound, lane, kept, t, x):
+    """Those of some guards that hold the state together, and whether that is one choice."""
+
+    def again(state):
+        _, holding, _, turn = state
+        found, has = pushes(model, bound, lane, holding, kept, t, x)
+        return holding, found, has, turn + 1
+
+    def goes_on(state):
+        before, holding, has, turn = state
+        return has & (before != holding).any() & (turn < kept.sum() + 2) & ((turn == 0) | (kept.sum() > 1))
+
+    before, holding, has, _ = lax.while_loop(goes_on, again, (~kept, kept, kept.any(), jnp.zeros((), int)))
+    return holding & has, ~kept.any() | (has & ((before == holding).all() | (kept.sum() == 1)))
 
 
 def into_contact(model, p, lane, mask):
-    """Let a guard that a state is on hold it, if it does."""
-    bound, still = Bound(model, frozen(p), frozen(lane.segment)), frozen(lane)
-    may = mask & lane.active & (model.of(model.contact, lane.mode) >= 0)
+    """Let the guards that a state is on hold it, where they do; stop where they have no one motion."""
+    still = frozen(lane)
+    bound = Bound(model, frozen(p), still.segment)
+    may = still.active & (model.of(model.contact, lane.mode) >= 0)
 
-    def pressed():
-        return jax.vmap(lambda k: presses(model, bound, still, k, still.t, still.x))(jnp.arange(model.M))
+    def look():
+        t, x = still.t, still.x
+        holding, one = pressing(model, bound, still, kept_by(model, bound, still, may, t, x), t, x)
+        flows = ~jnp.isnan(flow_along(model, bound, still, holding, t, x)).any()
+        return holding, one & (flows | (holding.sum() < 2))
 
-    found = may & when(may.any(), pressed, may)
-    k = jnp.argmax(found)
-    contact = jnp.maximum(model.of(model.contact, lane.mode)[k], 0).astype(jnp.int32)
-    known = model.of(model.of_owner, contact)
-    active = (known >= 0) & lane.active[known] & (jnp.arange(model.M) != k)
-    held = lane._replace(mode=contact, held=k.astype(jnp.int32), active=active, emerging=jnp.zeros_like(lane.emerging))
-    return chosen(found.any(), held, lane)
+    holding, one = when(mask & may.any(), look, (jnp.zeros_like(may), jnp.asarray(True)))
+    return lane_along(model, bound, lane, holding, one, mask)
 
 
-def out_of_contact(model, lane, mask):
-    """A run in its mode itself again, on the guard that held it."""
-    known = model.of(model.in_contact, lane.mode)
-    active = ((known >= 0) & lane.active[known]) | (jnp.arange(model.M) == lane.held)
-    free = lane._replace(
-        mode=model.of(model.owner, lane.mode).astype(jnp.int32), held=jnp.full_like(lane.held, -1), active=active,
-        emerging=jnp.zeros_like(lane.emerging),
+def lane_along(model, bound, lane, holding, one, mask):
+    """A run that goes on along the guards of edges ``holding``, in its mode itself where there are none."""
+    known = model.of(model.of_owner, jnp.maximum(model.of(model.held, lane.mode), 0))
+    along = lane._replace(
+        mode=model.of(model.held, lane.mode).astype(jnp.int32), contacts=levels(model, lane, holding),
+        active=(known >= 0) & (lane.active & ~holding)[known], emerging=jnp.zeros_like(lane.emerging),
     )  # fmt: skip
-    return chosen(mask & (lane.held >= 0), free, lane)
+    after = jnp.where(lane.t < bound.end, STEP, jnp.where(bound.last, END, BOUNDARY)).astype(jnp.int32)
+    found = chosen(holding.any(), along, lane)._replace(phase=after, began=frozen(lane.t))
+    return chosen(mask, stopped(found, ~one, ZENO), lane)
+
+
+def out_of_contact(model, bound, lane, t, x, reached):
+    """A run in its mode itself again, on the guards that held it, and without what steps along them were off by.
+
+    It stays on those that it has ``reached``.
+    """
+    owner, touched = model.of(model.owner, lane.mode).astype(jnp.int32), in_touch(model, lane)
+    places = model.of(model.of_held, owner)
+    active = ((places >= 0) & (lane.active & ~releasing(model, lane))[places]) | touched
+    free = lane._replace(
+        mode=owner, contacts=jnp.zeros_like(lane.contacts), active=active, emerging=jnp.zeros_like(lane.emerging)
+    )
+    still, time, point = frozen(free), frozen(t), frozen(x)
+
+    def look():
+        q = in_turn(lambda k, x: onto_guard(model, bound, still, k, time, x), touched | reached, point)
+        q = in_turn(lambda k, x: fixed_point(model, bound, still, k, time, x), touched, q)
+        same = jax.vmap(lambda k: keeps(model, bound, still, k, time, q))(jnp.arange(model.M))
+        return jnp.where((same | ~touched).all(), q, point)
+
+    return free, keeping(when(touched.any(), look, point), x)
 
 
 def let_go(model, config, p, lane, event):
-    """End a contact at an event that does; what is left of events are transitions."""
-    ends = event.mask & model.of(model.releases, lane.mode)[event.k]
-    bound = Bound(model, frozen(p), lane.segment)
-    t, x, owner = frozen(event.t), frozen(event.x), model.of(model.owner, lane.mode)
-    slope, scales = bound.flow(lane.mode, t, x), scales_here(model, lane)
-    after = jnp.minimum(UNIT * config.until * 4.0 ** jnp.arange(QUADRUPLINGS), bound.end - t)
+    """Leave guards that hold a state at an event, or where a segment of inputs ends; return other events."""
+    bound, still = Bound(model, frozen(p), lane.segment, lane.contacts), frozen(lane)
+    touched, ends = in_touch(model, still), event.mask & releasing(model, still)[event.k]
+    leaves = touched.any() & (event.mask | (lane.phase == BOUNDARY))
+    t, x = jnp.where(event.mask, event.t, lane.t), jnp.where(event.mask, event.x, lane.x)
+    own = event.k < model.of(model.is_edge, model.of(model.owner, lane.mode)).sum()
+    late, frees = behind_end(model, config, bound, still, event.k, frozen(t), frozen(x), ends & ~own)
+    point = x + late * bound.flow(still.mode, frozen(t), frozen(x))
+    facts, moved = bound.facts(still.mode, frozen(t) + late, frozen(point)), frozen(t) + late
+    on = still.active & (jnp.abs(facts.values) <= noise_of(facts, moved, frozen(point), scaled(model, still)))
+    later = lane._replace(active=jnp.where(ends, on, lane.active))
+    reached = (jnp.arange(model.M) == event.k) & event.mask & ~ends
+    free, q = out_of_contact(model, Bound(model, frozen(p), lane.segment), later, t + late, point, reached)
+    nothing = ends & own & (still.began == frozen(t))  # to round-off it neither holds the state nor lets go
+    free = free._replace(active=free.active & ~(nothing & (jnp.arange(model.M) == event.k)))
+    begins = {"clear": jnp.asarray(False), "halvings": jnp.zeros_like(lane.halvings), "trial": lane.h,
+              "terms": jnp.zeros_like(lane.terms)}  # fmt: skip
+    on_again = later._replace(t=t + late, x=point, phase=jnp.int32(STEP), **begins)
+    free_again = free._replace(
+        t=t + late, x=q, phase=jnp.int32(TOUCH), scale=event.sizes, entered_x=frozen(q), **begins
+    )
+    at_boundary = free._replace(x=q)
+    after = chosen(ends, chosen(frees | own, free_again, on_again), at_boundary)
+    after = noticed(model, chosen(leaves & (ends | ~event.mask), after, lane), frozen(lane.x))
+    goes = event.mask & ~ends
+    return after, event._replace(mask=goes, x=jnp.where(goes & leaves, q, event.x), held=touched)
 
-    def look(s):
-        """Whether an `if` ends, and whether the surface is above round-off."""
+
+def behind_end(model, config, bound, lane, k, t, x, needed):
+    """How far behind the end of a part of an `if` a point is, at which surface k is above round-off; whether one ends.
+
+    The ends of other parts of it may not be reached yet.
+    """
+    touched, most = in_touch(model, lane), UNIT**0.5 * config.until  # further on a line is no motion
+    place = model.of(model.releases, lane.mode)[k]
+    own = jnp.argmax(touched & (model.of(model.contact, model.of(model.owner, lane.mode)) == place))
+    slope, left = bound.flow(lane.mode, t, x), bound.end - t
+
+    def further(state):
+        after, _, _, _ = state
+        s = jnp.minimum(after, left)
         time, point = t + s, x + s * slope
-        ahead = bound.facts(lane.mode, time, pressed(model, bound, owner, lane.held, time, point, scales))
-        above = ahead.values[event.k] > noise_of(ahead, time, point, 0.0)[event.k]
-        return ~is_possible(model, bound, owner, lane.held, time, point, scales), above
+        may = jax.vmap(lambda j: is_possible(model, bound, lane, j, time, point, touched))(jnp.arange(model.M))
+        ended = (touched & ~may).any()
+        ahead = bound.facts(lane.mode, time, pressed(model, bound, lane, own, time, point, touched))
+        facts = bound.facts(lane.mode, time, point)
+        above = ahead.values[k] > noise_of(facts, time, point, scaled(model, lane))[k]
+        return after * 2, s, ended, ~ended & ~above & (after < most) & (s < left)
 
-    ended, above = jax.vmap(look)(after)
-    first, own = jnp.argmax(ended | above | (t + after >= bound.end)), event.k == lane.held
-    late, frees = jnp.where(own, 0.0, after[first]), own | ended[first]
-    t, x = t + frozen(late), x + frozen(late) * slope
-    facts, scale = bound.facts(lane.mode, t, x), jnp.where(lane.active[:, None], lane.scale, 0.0)
-    here = noticed(model, lane, frozen(event.x))._replace(
-        t=event.t + late, x=event.x + late * slope, trial=lane.h, clear=jnp.asarray(False), phase=jnp.int32(STEP),
-        active=lane.active & (jnp.abs(facts.values) <= noise_of(facts, t, x, scale)),
-        halvings=jnp.zeros_like(lane.halvings), terms=jnp.zeros_like(lane.terms),
-    )  # fmt: skip
-    free = out_of_contact(model, here, jnp.asarray(True))
-    free = free._replace(scale=event.sizes, entered_x=frozen(here.x))
-    lane = chosen(ends, chosen(frees, free, here), lane)
-    return lane, event._replace(mask=event.mask & ~ends)
+    state = jnp.asarray(UNIT * config.until), jnp.zeros(()), jnp.asarray(False), needed
+    _, s, ended, _ = lax.while_loop(lambda s: s[3], further, state)
+    return s, ended
 
 
-def fixed_point(reset, x, needed):
-    """The point that repeated resets run to (Aitken's acceleration, by component)."""
+def limit(step, x, several=True):
+    """The point that repeated steps run to: by Aitken's acceleration of each state, if the step after it is shorter.
 
-    def accelerate(_, x):
-        one = reset(x)
-        two = reset(one)
-        bend = two - 2 * one + x
-        further = jnp.where(bend == 0, two, x - (one - x) * (one - x) / jnp.where(bend == 0, 1.0, bend))
-        return jnp.where((one == x).all(), x, further)
+    Each turn of the loop makes one step, of three; all but the first only where ``several``.
+    """
 
-    found = when(needed, lambda: lax.fori_loop(0, MOST_ROUNDS, accelerate, frozen(x)), frozen(x))
-    return keeping(found, accelerate(0, x))
+    def again(state):
+        x, one, two, leap, turn, _ = state
+        part, new = turn % 3, step(jnp.where(turn % 3 == 0, x, jnp.where(turn % 3 == 1, one, leap)))
+        shorter = (jnp.abs(new - leap) <= jnp.abs(two - one)).all()
+        later = jnp.where(shorter, new, two)
+        later = jnp.where(part == 2, jnp.where(jnp.abs(later) > NOTHING, later, 0.0), x)
+        goes = several & ((part != 0) | (new != x).any())
+        one, two = jnp.where(part == 0, new, one), jnp.where(part == 1, new, two)
+        return jnp.where(several, later, new), one, two, jnp.where(part == 1, leapt(x, one, two), leap), turn + 1, goes
+
+    state = x, x, x, x, jnp.zeros((), int), jnp.asarray(True)
+    return lax.while_loop(lambda s: s[5] & (s[4] < 3 * MOST_ROUNDS), again, state)[0]
 
 
-def onto_guard(bound, lane, k, t, x, scales):
-    """A point near a guard taken to it, each state in proportion to its scale."""
+def leapt(x, one, two):
+    """Where acceleration leads from three points."""
+    bend = two - 2 * one + x
+    slow = (bend != 0) & (jnp.abs(two - one) <= jnp.abs(one - x)) & (jnp.abs(two - one) <= MOST_LEAP * jnp.abs(bend))
+    return jnp.where(slow, x - (one - x) / jnp.where(bend == 0, 1.0, bend) * (one - x), two)
 
-    def correct(_, x):
-        facts = bound.facts(lane.mode, t, x)
-        r, gradient = facts.values[k], facts.gradients[k, 1:]
-        near = jnp.abs(r) <= noise_of(facts, t, x, 0.0)[k]
+
+def one_after_another(taken, mask, x):
+    """What edges, one after another, take a state to."""
+    return lax.fori_loop(0, len(mask), lambda k, x: jnp.where(mask[k], taken(k, x), x), x)
+
+
+def in_turn(taken, mask, x):
+    """The point that a state runs to which several edges, in turn, take to what one of them keeps."""
+    return limit(lambda x: one_after_another(taken, mask, x), x, mask.sum() > 1)
+
+
+def fixed_point(model, bound, lane, k, t, x):
+    """The point that repeated resets run to."""
+    return limit(lambda x: after_reset(model, bound, lane, k, t, x), x)
+
+
+def onto_guard(model, bound, lane, k, t, x):
+    """A point near a guard taken to it, as near as numbers are, each state in proportion to its scale."""
+    scales = sizes_here(model, lane)
+
+    def correct(state):
+        x, r, turn, _ = state
+        gradient = bound.facts(lane.mode, t, x).gradients[k, 1:]
         weights = gradient * scales * scales
         across = gradient @ weights
-        return jnp.where(near | ~(across > 0), x, x - r / jnp.where(across > 0, across, 1.0) * weights)
+        nearer = x - r / jnp.where(across > 0, across, 1.0) * weights
+        left = bound.surfaces(lane.mode, t, nearer)[k]
+        goes = (across > 0) & (jnp.abs(left) < jnp.abs(r))
+        return jnp.where(goes, nearer, x), jnp.where(goes, left, r), turn + 1, goes
 
-    return lax.fori_loop(0, CORRECTIONS, correct, x)
-
-
-def limit_of(model, p, lane, k, end, left, needed):
-    """The point that a tail runs to: kept by resets, moved along the guard to its end, and kept by resets there."""
-    bound, whole = Bound(model, frozen(p), lane.segment), Bound(model, p, lane.segment)
-    contact = model.of(model.contact, lane.mode)[k]
-    q = fixed_point(lambda x: after_reset(model, whole, lane.mode, k, lane.t, x), lane.x, needed)
-    still, t = frozen(q), frozen(lane.t)
-    moved = still + left * bound.flow(jnp.maximum(contact, 0), t, still)
-    moved = onto_guard(bound, lane, k, end, moved, scales_here(model, frozen(lane)))
-    q = jnp.where(contact >= 0, keeping(moved, q), q)
-    then = keeping(end, lane.t)
-    return fixed_point(lambda x: after_reset(model, whole, lane.mode, k, then, x), q, needed)
+    state = x, bound.surfaces(lane.mode, t, x)[k], jnp.zeros((), int), jnp.asarray(True)
+    return lax.while_loop(lambda s: s[3] & (s[2] < MOST_CORRECTIONS_TO_GUARD), correct, state)[0]
 
 
-def close_tail(model, config, p, lane, record, mask):
+def limit_of(model, config, bound, lane, touched, edges, end):
+    """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
+    first = jnp.argmax(edges)
+    along = model.of(model.contact, lane.mode)[first] >= 0
+
+    def kept(t, x):
+        return in_turn(lambda k, x: fixed_point(model, bound, lane, k, t, x), edges, x)
+
+    q, h = kept(lane.t, lane.x), end - lane.t
+    slope = flow_along(model, bound, lane, touched | edges, lane.t, q)
+    turned = flow_along(model, bound, lane, touched | edges, end, q + h * slope)
+    moved = in_turn(lambda k, x: onto_guard(model, bound, lane, k, end, x), edges, q + h * (slope + turned) / 2)
+    q = kept(end, jnp.where(along, moved, q))
+    facts = bound.facts(lane.mode, end, q)
+    on = (jnp.abs(facts.values) <= noise_of(facts, end, q, lane.scale)) | ~edges
+    return q, on.all() & (~along | is_near(model, config, bound, lane, edges))
+
+
+def is_near(model, config, bound, lane, edges):
+    """Whether what edges take back, each of its guard or of the rate of that, is no more than pushes make in a while.
+
+    The while is the relaxation: so near is the limit.
+    """
+    there, held = looked(model, bound, lane, jnp.zeros_like(edges), edges)
+    sizes, facts = there.facts(held.mode, lane.t, lane.x).magnitudes, bound.facts(lane.mode, lane.t, lane.x)
+    last = jnp.where(model.of(model.order, lane.mode) == 1, facts.values, facts.rates)
+    return ((jnp.abs(last) <= config.relaxation * sizes) | ~edges).all()
+
+
+def meets_another(bound, lane, t, x, edges):
+    """Whether a surface other than those of edges is passed on the way to a limit."""
+    facts, first = bound.facts(lane.mode, t, x), bound.facts(lane.mode, lane.t, lane.x)
+    before = noise_of(first, lane.t, lane.x, jnp.where(lane.active[:, None], lane.scale, 0.0))
+    after = noise_of(facts, t, x, jnp.where(lane.active[:, None], lane.scale, 0.0))
+    return ((facts.values > after) & ~(first.values > before) & ~edges).any()
+
+
+def nearly_over(model, config, lane):
+    """Whether a tail ends within the relaxation, its edges, and a bound of what is left of it."""
+    shrinks, flight, ratio = contraction(model, lane)
+    k = (model.of(model.edge, lane.mode) == lane.edges[-1]) & model.of(model.is_edge, lane.mode)
+    left = flight * ratio / (1 - jnp.where(ratio < 1, ratio, 0.0))
+    own, edges = of_contacts(model, lane)
+    late = flown(lane, lane.t)
+    several = own & (edges.sum() > 1) & (lane.count >= FREE) & (late <= config.relaxation)
+    found = jnp.where(shrinks, left <= config.relaxation, several)
+    return found, jnp.where(shrinks, k, edges), jnp.where(shrinks, left, late)
+
+
+def kept_next(model, p, lane, edges, t, x):
+    """Where repeated resets lead, for its derivatives."""
+    bound = Bound(model, p, lane.segment)
+
+    def leap(step, x):
+        return leapt(x, step(x), step(step(x)))
+
+    def kept(k, x):
+        return leap(lambda x: after_reset(model, bound, lane, k, t, x), x)
+
+    return leap(lambda x: one_after_another(kept, edges, x), x)
+
+
+def close_tail(model, config, p, lane, record, touched, mask):
     """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
     bound, still = Bound(model, frozen(p), lane.segment), frozen(lane)
-    shrinks, flight, ratio = contraction(still)
-    edge = jnp.maximum(still.loops[-1], 0)
-    k = jnp.argmax((model.of(model.edge, lane.mode) == edge) & model.of(model.is_edge, lane.mode))
-    left = flight * ratio / (1 - jnp.where(ratio < 1, ratio, 0.0))
-    end = still.t + left
-    near = mask & shrinks & model.of(model.loops, lane.mode)[k] & (left <= config.relaxation) & (end <= bound.end)
-    left, end = jnp.where(near, left, 0.0), jnp.where(near, end, still.t)  # elsewhere derivatives must exist, too
-    q = limit_of(model, p, lane, k, end, left, near)
-    limit = frozen(q)
-    facts, first = bound.facts(lane.mode, end, limit), bound.facts(lane.mode, still.t, still.x)
-    r, noise = facts.values, noise_of(facts, end, limit, still.scale)
-    before = noise_of(first, still.t, still.x, jnp.where(still.active[:, None], still.scale, 0.0))
-    others = (r > noise) & ~(first.values > before) & (jnp.arange(model.M) != k)
-    near = near & (jnp.abs(r[k]) <= noise[k]) & keeps(model, bound, still, k, end, limit)
-    none = near & (model.of(model.contact, lane.mode)[k] < 0)
-    pressed = when(near, lambda: presses(model, bound, still, k, end, limit), jnp.asarray(False))
-    goes = near & ~none & pressed & ~others.any()
-    length = jnp.where(goes, left, 1.0)
+    found, edges, left = nearly_over(model, config, still)
+    end = jnp.minimum(still.t + left, bound.end)
+    instant = (edges.sum() > 1) & (end == still.t)
+    k = jnp.argmax((model.of(model.edge, lane.mode) == still.edges[-1]) & model.of(model.is_edge, lane.mode))
+    near = mask & found & model.of(model.loops, lane.mode)[k] & ((end > still.t) | instant) & ~(touched | ~edges).all()
+
+    def look():
+        def nearer(state):
+            end, *_, turn = state
+            q, on = limit_of(model, config, bound, still, touched, edges, end)
+            again = on & meets_another(bound, still, end, q, edges) & (turn == 0)
+            return jnp.where(again, still.t, end), q, on, again, turn + 1
+
+        state = end, still.x, jnp.asarray(False), jnp.asarray(True), jnp.zeros((), int)
+        time, q, on, *_ = lax.while_loop(lambda s: s[3], nearer, state)
+        same = jax.vmap(lambda k: keeps(model, bound, still, k, time, q))(jnp.arange(model.M))
+        on = on & (same | ~edges).all()
+        none = on & (model.of(model.contact, lane.mode)[k] < 0) & is_possible(model, bound, still, k, time, q, touched)
+        goes = on & (model.of(model.contact, lane.mode)[k] >= 0)
+        goes = goes & (kept_by(model, bound, still, edges, time, q) == edges).all()
+        kept = kept_by(model, bound, still, touched | edges, time, q)
+        presses = (pressing(model, bound, still, kept, time, q)[0] & edges).any()
+        goes = goes & (instant | presses) & ~meets_another(bound, still, time, q, edges)
+        return time, q, none, goes
+
+    end, limit_at, none, goes = when(near, look, (end, still.x, jnp.asarray(False), jnp.asarray(False)))
+
+    end = keeping(end, lane.t)
+    q = with_derivatives_of(lambda *given: kept_next(model, *given))(limit_at, (p, still, edges, end, lane.x))
+    length = jnp.where(goes & (end > still.t), frozen(end) - still.t, 1.0)
     record = sampled(
         record, config, goes, lane.mode, lane.t, end,
         lambda times: jax.vmap(lambda time: at(lane.x, (q - lane.x)[None], (time - lane.t) / length))(times),
     )  # fmt: skip
-    lane = stopped(lane, none, ZENO)
-    active = (jnp.abs(r) <= noise) | (jnp.arange(model.M) == k)
-    rest = noticed(model, lane, limit)._replace(
-        t=keeping(end, lane.t), x=q, active=active, emerging=jnp.zeros_like(lane.emerging), entered_x=limit,
+    facts = bound.facts(lane.mode, frozen(end), limit_at)
+    r, noise = facts.values, noise_of(facts, frozen(end), limit_at, still.scale)
+    rest = noticed(model, lane, limit_at)._replace(
+        t=end, x=q, active=(jnp.abs(r) <= noise) | edges, emerging=jnp.zeros_like(lane.emerging), entered_x=limit_at,
+        phase=jnp.int32(TOUCH), terms=jnp.zeros_like(lane.terms),
     )  # fmt: skip
-    return chosen(goes, rest, lane), record
+    return chosen(goes, rest, stopped(lane, none, ZENO)), record, goes | none

@@ -6,7 +6,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from .contact import close_tail, into_contact, out_of_contact, takes_back
+from .contact import close_tail, in_touch, into_contact, takes_back
 from .functions import NAN, chosen, frozen
 from .lane import (
     BOUNDARY,
@@ -18,42 +18,43 @@ from .lane import (
     NOT_FINITE,
     RUNNING,
     STEP,
+    TOUCH,
     ZENO,
     noticed,
     repeats,
+    scaled,
     stopped,
 )
 from .model import Bound, noise_of
-from .verdicts import scaled
 
 
-def boundary(model, p, lane, here):
+def boundary(model, config, p, lane, here, held):
     """Go on behind a jump of an input, or end: a jump at the end is made, and a guard reached there fires.
 
-    Returns which runs have guards that may hold them from here on.
+    ``held`` are the edges whose guards the state was held by, ``here`` the `Facts` there.
     """
     mask, still = lane.phase == BOUNDARY, frozen(lane)
     bound = Bound(model, frozen(p), lane.segment)
-    noise = noise_of(here, still.t, still.x, scaled(still))
-    plain = model.of(model.is_edge, lane.mode) & ~model.of(model.conditional, lane.mode)
+    noise, values = noise_of(here, still.t, still.x, scaled(model, still)), bound.surfaces(still.mode, still.t, still.x)
+    plain = model.of(model.is_edge, lane.mode) & ~model.of(model.conditional, lane.mode) & ~held
+    touches = TOUCH if config.scheme == "located" and model.holds else STEP
     jump = lane._replace(
         phase=jnp.int32(ENTER), inside=plain & (here.values < -noise), since=jnp.asarray(0.0),
         reset_at=jnp.asarray(NAN), made=jnp.asarray(False), visited=lane.visited._replace(room=jnp.int32(0)),
+        stood=jnp.where(lane.active & ~lane.emerging, jnp.abs(values), 0.0),
     )  # fmt: skip
     kink = lane._replace(
-        phase=jnp.int32(STEP), segment=lane.segment + 1, entered_x=still.x, terms=jnp.zeros_like(lane.terms),
+        phase=jnp.int32(touches), segment=lane.segment + 1, entered_x=still.x, terms=jnp.zeros_like(lane.terms),
     )  # fmt: skip
-    ends = mask & bound.last
-    out = out_of_contact(model, lane, ends) if model.holds else lane
-    lane = chosen(ends, out._replace(phase=jnp.int32(END)), chosen(mask, chosen(bound.next_jumps, jump, kink), lane))
-    return lane, ends | (mask & ~bound.next_jumps)
+    end = lane._replace(phase=jnp.int32(END if touches == STEP else TOUCH))
+    return chosen(mask, chosen(bound.last, end, chosen(bound.next_jumps, jump, kink)), lane)
 
 
 def at_the_end(model, p, lane):
-    """A run at its end, unless it has to leave a guard that holds it, or may be held by one, first."""
+    """A run at its end, unless it has to leave guards that hold it, or may be held by one, first."""
     ends = (lane.phase == BOUNDARY) & Bound(model, frozen(p), lane.segment).last
     may_be_held = lane.active & (model.of(model.contact, lane.mode) >= 0)
-    ends = ends & ~may_be_held.any() & (lane.held < 0)
+    ends = ends & ~may_be_held.any() & ~lane.contacts.any()
     return lane._replace(phase=jnp.where(ends, END, lane.phase).astype(jnp.int32))
 
 
@@ -63,7 +64,8 @@ def met(model, bound, lane):
     then = jnp.where(jnp.isnan(lane.reset_at), t, lane.reset_at)
     both = bound.facts(mode, jnp.stack([t, then]), jnp.stack([x, x]))
     facts = jax.tree.map(lambda rows: rows[0], both)
-    values, rates, noise = facts.values, facts.rates, noise_of(facts, t, x, lane.scale)
+    values, rates = facts.values, facts.rates
+    noise = jnp.maximum(noise_of(facts, t, x, lane.scale), lane.stood)
     wide = jnp.maximum(noise, jnp.abs(rates) * lane.since)
     noise = jnp.where((lane.since > 0) & (jnp.abs(values) > noise), wide, noise)
     passed = (values > noise) & ~(both.values[1] > noise)
@@ -77,10 +79,10 @@ def enter(model, config, p, lane):
     mask = lane.phase == ENTER
     placed = noticed(model, lane, frozen(lane.x))._replace(
         segment=model.segment(frozen(p), frozen(lane.t)).astype(jnp.int32), entered_x=frozen(lane.x),
-        terms=jnp.zeros_like(lane.terms), held=jnp.full_like(lane.held, -1),
+        terms=jnp.zeros_like(lane.terms), contacts=jnp.zeros_like(lane.contacts),
         trial=lane.h, clear=jnp.asarray(False),
     )  # fmt: skip
-    bound, still = Bound(model, frozen(p), placed.segment), frozen(placed)
+    bound, still = Bound(model, frozen(p), placed.segment, placed.contacts), frozen(placed)
     values, beyond, active, emerging = met(model, bound, still)
     visited, again = repeats(still.visited, jnp.asarray(False), still.mode, still.x)
     own, priority = model.of(model.is_edge, lane.mode), model.of(model.priority, lane.mode)
@@ -109,19 +111,23 @@ def flowing(model, config, bound, lane, mask):
         dimension = jnp.asarray(model.dimension)
         alike = dimension[still.mode_before] == dimension[still.mode]
         slides = slides & (still.mode_before != still.mode) & ~(alike & undone)
+    flows = TOUCH if config.scheme == "located" and model.holds else STEP
     ready = lane._replace(
-        phase=jnp.where(lane.t < bound.end, STEP, BOUNDARY).astype(jnp.int32),
+        phase=jnp.where(lane.t < bound.end, flows, BOUNDARY).astype(jnp.int32),
         cascade=chosen(lane.made, cascade, lane.cascade), halvings=jnp.zeros_like(lane.halvings),
     )  # fmt: skip
     lane = chosen(mask, stopped(ready, slides, ZENO), lane)
-    return lane, mask & (lane.phase == STEP)
+    return lane, mask & (lane.stop == RUNNING)
 
 
-def held_on(model, config, p, lane, record, flows, touches):
-    """Runs that flow after a transition go to the end of a tail of them; those and others may be held by a guard."""
-    if model.loops.any():
-        lane, record = close_tail(model, config, p, lane, record, flows & lane.made)
+def held_on(model, config, p, lane, record, flows):
+    """Guards may hold runs that flow on; those that flow after a transition go to the end of a tail of them."""
+    entered, touched = lane, jnp.zeros_like(lane.active)
     if model.holds:
-        going = (lane.phase == STEP) | (lane.phase == END)
-        lane = into_contact(model, p, lane, (flows | touches) & going)
+        lane = into_contact(model, p, lane, lane.phase == TOUCH)
+        touched = in_touch(model, lane)
+    if model.loops.any():
+        after = flows & lane.made & (lane.stop == RUNNING)
+        ended, record, mask = close_tail(model, config, p, entered, record, touched, after)
+        lane = chosen(mask, ended, lane)
     return lane, record

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import jax
 import jax.numpy as jnp
 
 from .functions import INF, NAN, frozen
+from .model import HELD, LOOKED_AT
 
-STEP, CROSS, STUCK, BOUNDARY, END, ENTER, FIRE, DONE = range(8)  # what a lane does next
+STEP, CROSS, STUCK, BOUNDARY, END, ENTER, FIRE, TOUCH, DONE = range(9)  # what a lane does next
 RUNNING, UNTIL, FINAL, LEFT_DOMAIN, ZENO, LIMIT, NOT_FINITE, UNDERFLOW, STEPS = range(9)  # how it ended
 STOPS = (
     "running", "until", "final", "left_domain", "zeno", "transition_limit", "not_finite", "step_underflow", "steps"
@@ -34,8 +36,10 @@ class Lane(NamedTuple):
     ``scale`` has the sizes of the numbers that the state was computed from on entry, ``scales`` the largest that each
     state of the model has had. ``active`` and ``emerging`` are as in the reference loop. ``h`` is the step to try next,
     ``trial`` the one under way, halved ``halvings`` times. ``terms`` has the sizes of the terms of the last step.
-    ``held`` is the edge whose guard holds the state, or -1.
-    ``edge`` is that of the last transition, after which it ``resumed``, and ``slope`` the flow before it.
+    ``contacts`` has the numbers of contacts, `HELD` for those that hold the state since ``began``. ``stood`` is how far
+    off the surfaces of the mode the state was that it comes from. ``edge`` is that of the last transition, after which
+    it ``resumed``, and ``slope`` the flow before it; ``times``, ``waits``, ``edges`` and ``entries`` are of the last
+    ones.
     """
 
     phase: Any
@@ -68,7 +72,9 @@ class Lane(NamedTuple):
     accepted: Any
     rejected: Any
     stretch: Any
-    held: Any
+    contacts: Any
+    began: Any
+    stood: Any
     made: Any
     flowed: Any
     edge: Any
@@ -78,7 +84,8 @@ class Lane(NamedTuple):
     visited: Brent
     times: Any
     waits: Any
-    loops: Any
+    edges: Any
+    entries: Any
     count: Any
     steps: Any
 
@@ -110,8 +117,9 @@ def start(model, config, mode, x0):
         no, no, no, number(0.0), number(NAN), number(0.0), x0, jnp.zeros(w), one, one, jnp.asarray(False),
         integer(0), integer(0), integer(0),
         number(NAN), integer(0), integer(0), number(NAN), jnp.asarray(False), integer(0), integer(0), number(0.0),
-        integer(-1), jnp.asarray(False), jnp.asarray(False), integer(-1), jnp.zeros(w), integer(-1), brent, brent,
-        jnp.full(free, -INF), jnp.zeros(free), jnp.full(4, -1, jnp.int32), integer(0), integer(0),
+        jnp.zeros(model.C), number(0.0), jnp.zeros(m), jnp.asarray(False), jnp.asarray(False), integer(-1),
+        jnp.zeros(w), integer(-1), brent, brent, jnp.full(free, -INF), jnp.zeros(free), jnp.full(free, -1, jnp.int32),
+        jnp.zeros(free, bool), integer(0), integer(0),
     )  # fmt: skip
     kept, sampled = config.transitions, len(config.times)
     record = Record(
@@ -126,6 +134,23 @@ def scales_here(model, lane):
     """The scales of the states of the mode that a run is in; 0 behind them."""
     place = model.of(model.place, lane.mode)
     return jnp.where(place >= 0, lane.scales[place], 0.0)
+
+
+def sizes_here(model, lane):
+    """The same, or the sizes of the numbers that the state was computed from on entry."""
+    return jnp.maximum(scales_here(model, lane), lane.scale)
+
+
+def releasing(model, lane, least=HELD):
+    """The surfaces that end contacts which hold the state, or those of contacts that are looked at, too."""
+    place = model.of(model.releases, lane.mode)
+    return (place >= 0) & (jnp.append(lane.contacts, 0.0)[place] >= least)
+
+
+def scaled(model, lane):
+    """Sizes that round-off counts with, for each surface: of those the state was on when it entered, and of pushes."""
+    pushes = releasing(model, lane, LOOKED_AT)[:, None]
+    return jnp.where(pushes, sizes_here(model, lane), jnp.where(lane.active[:, None], lane.scale, 0.0))
 
 
 def noticed(model, lane, x):
@@ -182,10 +207,34 @@ def sampled(record, config, mask, mode, t0, t1, point):
     )
 
 
-def contraction(lane):
-    """Whether the last flights of one edge that leads back to its mode shrink, the last one, and the largest ratio."""
-    same = (lane.loops == lane.loops[0]).all() & (lane.loops[0] >= 0)
-    flights = jnp.diff(lane.times[-4:])
+def contraction(model, lane):
+    """Whether the last flights of the last edge, which leads back to its mode, shrink, the last, and the largest ratio.
+
+    Others that lead back to that mode may go meanwhile.
+    """
+    edge = lane.edges[-1]
+    same = jnp.asarray(model.source)[lane.edges] == jnp.asarray(model.source)[edge]
+    loops = (lane.edges >= 0) & jnp.asarray(model.returns)[lane.edges] & same & ~lane.entries
+    own = jnp.cumprod(loops[::-1]).astype(bool) & (lane.edges[::-1] == edge)
+    nth = jnp.cumsum(own)
+    times = jax.vmap(lambda n: lane.times[::-1][jnp.argmax(own & (nth == n))])(jnp.arange(4, 0, -1))
+    flights = jnp.diff(times)
     before, after = flights[:-1], flights[1:]
     ratio = jnp.where(before > 0, after / jnp.where(before > 0, before, 1.0), INF).max()
-    return same & (after[-1] > 0) & (ratio < 1), after[-1], ratio
+    return (nth[-1] > 3) & (flights > 0).all() & (ratio < 1), after[-1], ratio
+
+
+def flown(lane, t):
+    """The time of flow since the first of the last transitions."""
+    return t - lane.times[0] - lane.waits.sum()
+
+
+def of_contacts(model, lane):
+    """Whether the last transitions led back to the present mode, each by an edge whose guard can hold a state.
+
+    And the edges of the mode that they were.
+    """
+    own, known = model.of(model.edge, model.of(model.owner, lane.mode)), lane.edges >= 0
+    can = model.of(model.contact, model.of(model.owner, lane.mode)) >= 0
+    among = lane.edges[:, None] == jnp.where(can, own, -1)[None]
+    return (known & ~lane.entries & among.any(axis=1)).all(), (among & known[:, None]).any(axis=0)

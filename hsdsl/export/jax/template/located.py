@@ -11,12 +11,12 @@ import jax.numpy as jnp
 from jax import lax
 
 from .functions import INF, chosen, frozen
-from .lane import CROSS, LEFT_DOMAIN, stopped
+from .lane import CROSS, LEFT_DOMAIN, scaled, scales_here, stopped
 from .model import Bound, noise_of
 from .steps import slope_at, step
 from .surfaces import SCAN, closed, each_at, standing, states_at, ties
 from .transitions import Crossing, facts_here_and_at, passed_over, sizes_of
-from .verdicts import attempted, looked_along, motion, rising, scaled, terms_of
+from .verdicts import attempted, looked_along, motion, rising, terms_of
 
 JUMP_HALVINGS, NEWTON_STEPS = 40, 8
 
@@ -57,7 +57,7 @@ def settled(model, bound, lane, trial, shares):
         shares, best, least, over = state
         times, states = jax.vmap(point)(shares)
         facts = bound.facts(lane.mode, times, states)
-        r, noise = jnp.diagonal(facts.values), jnp.diagonal(noise_of(facts, times, states, scaled(lane)))
+        r, noise = jnp.diagonal(facts.values), jnp.diagonal(noise_of(facts, times, states, scaled(model, lane)))
         better = ~over & (jnp.abs(r) < least)
         best = chosen_rows(better | (turn == 0), (shares, times, states), best)
         least = jnp.where(better, jnp.abs(r), least)
@@ -77,9 +77,9 @@ def chosen_rows(mask, ours, theirs):
 
 def first_rises(model, bound, lane, trial, needed):
     """The first point of a step where each surface is crossed and its condition holds, if there is one."""
-    looked, slopes, level = looked_along(bound, lane, trial)
+    looked, slopes, levels = looked_along(model, bound, lane, trial)
     values, first = looked.shares.values, looked.first_noise
-    rows = rising(lane, values, slopes, first, level) & needed
+    rows = rising(lane, values, slopes, first, levels) & needed
     numbers, ends = jnp.arange(model.M), jnp.arange(SCAN + 1) / SCAN
     base = jnp.where(lane.active, values[0], 0.0)
 
@@ -94,7 +94,8 @@ def first_rises(model, bound, lane, trial, needed):
         open_ = rows.any(axis=0) & ~found
         part = jnp.argmax(rows, axis=0)
         low, high = ends[part], ends[part + 1]
-        above = (values[part + 1, numbers] - base) > level
+        above = (values[part + 1, numbers] - base) > levels[part, numbers]
+        level = jnp.where(above, levels[part, numbers], levels[0])
         top = jnp.where(above, high, crests(bound, lane, trial, low, high, open_ & ~above))
         height = values_at(top)
         rises = open_ & (height - base > level)
@@ -117,7 +118,7 @@ def first_rises(model, bound, lane, trial, needed):
 def located_crossing(model, config, p, lane):
     """What a step with a possible crossing leads to: a transition, the end at a wall, or nothing."""
     mask, mode = lane.phase == CROSS, lane.mode
-    still, bound = frozen(lane), Bound(model, frozen(p), lane.segment)
+    still, bound = frozen(lane), Bound(model, frozen(p), lane.segment, lane.contacts)
     trial = attempted(model, bound, still, still.trial)
     needed = model.of(model.is_edge | model.is_wall, mode) & mask
     found, points = first_rises(model, bound, still, trial, needed)
@@ -135,7 +136,11 @@ def located_crossing(model, config, p, lane):
     def sizes(first, state):
         terms = terms_of(model.method, trial.x, rows[0][first] * trial.h, trial.stages)
         between = jnp.maximum(jnp.maximum(sizes_of(still, trial.x, state), terms), still.terms)
-        return jnp.where(still.active[first], jnp.maximum(between, still.scale), between)
+        values, noise = rows[3].values[first], noise_of(rows[3], rows[1], rows[2], scaled(model, still))[first]
+        held = still.contacts.any()
+        stands = held | still.active[first] | (still.active & (jnp.abs(values) <= noise)).any()
+        between = jnp.where(stands, jnp.maximum(between, still.scale), between)
+        return jnp.where(held, jnp.maximum(between, scales_here(model, still)), between)
 
     crossing = Crossing(
         goes, guards, *rows[:3], here, rows[3], trial.t1, jnp.zeros(model.M), trial.h, trial, leaves, times[wall],

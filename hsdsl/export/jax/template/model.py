@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from copy import copy
+from dataclasses import dataclass
 from typing import Any
 
 import jax
@@ -51,14 +51,17 @@ class Routines:
     slow: Any
 
 
-class Model:
-    """Modes, edges, a timeline, and tables of them; M surfaces in the mode with most, W states."""
+LOOKED_AT, HELD = 1.0, 2.0  # what the number of a contact is, 0 for none
 
-    def __init__(self, modes, edges, states, width, outputs, method, timeline, surfaces=1):
+
+class Model:
+    """Modes, edges, a timeline, and tables of them; M surfaces in the mode with most, W states, C contacts."""
+
+    def __init__(self, modes, edges, states, width, outputs, method, timeline, contacts, until):
         self.modes, self.edges, self.states, self.outputs = modes, edges, states, outputs
-        self.method, self.timeline = method, timeline
-        self.W, self.S = max(width, 1), max(len(states), 1)
-        self.M = max(surfaces, *(len(mode.edges) + mode.walls for mode in modes))
+        self.method, self.timeline, self.until = method, timeline, until
+        self.W, self.S, self.C = max(width, 1), max(len(states), 1), contacts
+        self.M = max(1, *(len(mode.edges) + mode.walls for mode in modes))
         self.routines = Routines(
             with_derivatives([mode.flow for mode in modes]),
             with_derivatives([mode.surfaces for mode in modes]),
@@ -73,47 +76,38 @@ class Model:
     def _tabulate(self):
         modes, edges, shape = self.modes, self.edges, (len(self.modes), self.M)
         self.final = np.array([mode.final for mode in modes])
-        self.owner, self.push_order = np.array([m.owner for m in modes]), np.array([m.push_order for m in modes])
+        self.owner, self.held = np.array([mode.owner for mode in modes]), np.array([mode.held for mode in modes])
         self.dimension = np.array([len(mode.states) for mode in modes])
-        self.is_edge, self.is_wall, self.conditional, self.loops, self.releases = np.zeros((5, *shape), bool)
-        self.priority, self.edge = np.zeros((2, *shape), int)
-        self.contact, self.of_owner, self.in_contact = np.full((3, *shape), -1)
+        self.is_edge, self.is_wall, self.conditional, self.loops = np.zeros((4, *shape), bool)
+        self.priority, self.edge, self.order = np.zeros((3, *shape), int)
+        self.contact, self.releases, self.of_owner, self.of_held = np.full((4, *shape), -1)
         self.place = np.full((len(modes), self.W), -1)
         for j, mode in enumerate(modes):
             own, count = len(mode.edges), len(mode.edges) + mode.walls
             self.is_edge[j, :own] = True
             self.is_wall[j, own:count] = True
             self.place[j, : len(mode.states)] = mode.states
-            self.contact[j, :own], self.releases[j, :own] = mode.contacts, mode.releases
+            plain = len(mode.contacts)
+            self.contact[j, :plain], self.order[j, :plain] = mode.contacts, mode.orders
+            self.releases[j, :own] = mode.releases
             for k, number in enumerate(mode.edges):
                 edge = edges[number]
                 self.edge[j, k], self.priority[j, k] = number, edge.priority
-                self.conditional[j, k] = edge.conditional and not mode.releases[k]
+                self.conditional[j, k] = edge.conditional and k < plain
                 self.loops[j, k] = edge.target == mode.owner and edge.states == mode.states
-            if mode.owner != j:
-                self._relate(j, len(modes[mode.owner].edges), own, mode.walls)
+            self.of_owner[j, :plain] = self.of_held[mode.owner, :plain] = range(plain)
+            for k in range(mode.walls):  # behind what ends an `if`
+                self.of_owner[j, own + k], self.of_held[mode.owner, plain + k] = plain + k, own + k
         self.holds = bool((self.contact >= 0).any())
         self.target = np.array([edge.target for edge in edges] or [0])
-        self.counts = np.zeros((max(1, len(edges)), self.W), bool)
+        self.counts, self.changes = np.zeros((2, max(1, len(edges)), self.W), bool)
+        self.returns = np.array([edge.source == edge.target for edge in edges] or [False])
+        self.source = np.array([edge.source for edge in edges] or [0])
         for k, edge in enumerate(edges):
-            self.counts[k, list(edge.counts)] = True
+            self.counts[k, list(edge.counts)] = self.changes[k, list(edge.changes)] = True
         # whose outputs a run has behind an edge: a final mode without a flow keeps the states before, and these
         keepers = [e.source if e.states and not modes[e.target].states else e.target for e in edges]
         self.keeper = np.array(keepers or [0])
-
-    def _relate(self, j, edges, own, walls):
-        """The surfaces of a motion along a guard among those of its mode, and the other way round."""
-        for k in range(edges):
-            self.of_owner[j, k] = self.in_contact[j, k] = k
-        for k in range(walls):
-            self.of_owner[j, own + k], self.in_contact[j, edges + k] = edges + k, own + k
-
-    @cached_property
-    def free(self):
-        """The same without motions along guards, which the relaxed scheme has not."""
-        own = [mode for j, mode in enumerate(self.modes) if mode.owner == j]
-        modes = tuple(replace(mode, contacts=(-1,) * len(mode.contacts)) for mode in own)
-        return Model(modes, self.edges, self.states, self.W, self.outputs, self.method, self.timeline, self.M)
 
     @property
     def transparent(self):
@@ -131,14 +125,21 @@ class Model:
 
 
 class Bound:
-    """A model with the numbers of one segment of its inputs."""
+    """A model with the numbers of one segment of its inputs, and those of contacts (`HELD`, `LOOKED_AT`, 0)."""
 
-    def __init__(self, model, p, segment):
+    def __init__(self, model, p, segment, contacts=None):
         starts, ends, jumps, data = model.timeline(p)
         self.model, self.routines = model, model.routines
         self.end, self.last = ends[segment], segment + 1 >= len(starts)
         self.next_jumps = jumps[jnp.minimum(segment + 1, len(starts) - 1)]
-        self.p = jnp.concatenate([p, data[segment]])
+        self.own = jnp.concatenate([p, data[segment]])
+        self.p = jnp.concatenate([self.own, jnp.zeros(model.C) if contacts is None else contacts])
+
+    def touching(self, contacts):
+        """The same with other numbers of contacts."""
+        other = copy(self)
+        other.p = jnp.concatenate([self.own, contacts])
+        return other
 
     def flow(self, mode, t, x):
         """The flow, W numbers."""

@@ -16,9 +16,9 @@ from .functions import padded
 class Mode:
     """A mode: its name, the numbers of its states among those of all modes, and its routines.
 
-    ``owner`` is another mode's number where this one is the motion along the guard of its edge ``held``; ``releases``
-    says which of its edges end that, ``push_order`` which derivative presses. ``contacts`` are numbers of such motions,
-    -1 for none.
+    ``owner`` is another mode's number where this one is that with its motions along guards, ``held`` the number of that
+    one, or -1. ``contacts`` are the numbers of contacts of the owner's edges, -1 for none, ``releases`` of those that
+    this mode's edges end; ``orders`` say which derivative presses.
 
     A routine takes (p, t, x); vectors are as wide as in the widest mode. ``edges`` are numbers among all
     edges.
@@ -29,11 +29,11 @@ class Mode:
     final: bool
     edges: tuple[int, ...]
     walls: int
-    contacts: tuple[int, ...]
-    releases: tuple[bool, ...]
     owner: int
     held: int
-    push_order: int
+    contacts: tuple[int, ...]
+    releases: tuple[int, ...]
+    orders: tuple[int, ...]
     flow: Callable
     surfaces: Callable
     facts: Callable
@@ -41,12 +41,14 @@ class Mode:
 
 
 class Facts(NamedTuple):
-    """Surfaces at a point: values, -1 behind those of the mode; rates along the flow; gradients in (t, x), M rows of
-    1 + W numbers; magnitudes of terms; whether the `if` of each edge holds, true of walls.
+    """Surfaces at a point: values, -1 behind those of the mode; rates along the flow and ``spans``, the sizes of their
+    terms; gradients in (t, x), M rows of 1 + W numbers; magnitudes of terms; whether the `if` of each edge holds, true
+    of walls.
     """
 
     values: Any
     rates: Any
+    spans: Any
     gradients: Any
     magnitudes: Any
     conditions: Any
@@ -57,7 +59,12 @@ def mode_of(
     states,
     final,
     edges,
-    contact,
+    walls,
+    owner,
+    held,
+    contacts,
+    releases,
+    orders,
     sizes,
     flow,
     surfaces,
@@ -66,20 +73,8 @@ def mode_of(
     rates,
     conditions,
     outputs,
-    flags=(),
 ):
-    """A mode of plain routines, which return a tuple each, padded to ``sizes`` (W, M, outputs).
-
-    ``contact`` has the fields of `Mode` from ``contacts`` on, ``flags`` the numbers of contacts, which routines of
-    motions along guards take behind the others.
-    """
-
-    def with_flags(routine):
-        return (lambda p, t, x: routine(jnp.concatenate([p, jnp.asarray(flags)]), t, x)) if flags else routine
-
-    flow, surfaces, magnitudes, outputs = map(with_flags, (flow, surfaces, magnitudes, outputs))
-    gradients, rates = list(map(with_flags, gradients)), list(map(with_flags, rates))
-    conditions = [list(map(with_flags, parts)) for parts in conditions]
+    """A mode of plain routines, which return a tuple each, padded to ``sizes`` (W, M, outputs)."""
     width, count, results = sizes
     rest = count - len(rates)
 
@@ -96,16 +91,21 @@ def mode_of(
 
     def facts(p, t, x):
         along = padded([rate(p, t, x)[0] for rate in rates], count)
-        terms = padded(magnitudes(p, t, x), count)
-        return Facts(values(p, t, x), along, all_gradients(p, t, x), terms, all_conditions(p, t, x))
+        terms, slopes = padded(magnitudes(p, t, x), count), all_gradients(p, t, x)
+        spans = jnp.abs(slopes[:, 0]) + jnp.abs(slopes[:, 1:]) @ jnp.abs(padded(flow(p, t, x), width))
+        return Facts(values(p, t, x), along, spans, slopes, terms, all_conditions(p, t, x))
 
     return Mode(
         name,
         states,
         final,
         edges,
-        len(rates) - len(edges),
-        *contact,
+        walls,
+        owner,
+        held,
+        contacts,
+        releases,
+        orders,
         lambda p, t, x: padded(flow(p, t, x), width),
         values,
         facts,
@@ -113,7 +113,7 @@ def mode_of(
     )
 
 
-def edge_of(name, source, target, states, conditional, priority, counts, width, reset, spread, slow):
+def edge_of(name, source, target, states, conditional, priority, counts, changes, width, reset, spread, slow):
     """An edge of plain routines; ``slow`` is its reset, or the branch of that which slow impacts take."""
     return Edge(
         name,
@@ -123,6 +123,7 @@ def edge_of(name, source, target, states, conditional, priority, counts, width, 
         conditional,
         priority,
         counts,
+        changes,
         lambda p, t, x: padded(reset(p, t, x), width),
         lambda p, t, x, s: padded(spread(p, t, x, s), width),
         lambda p, t, x: padded(slow(p, t, x), width),
@@ -131,7 +132,7 @@ def edge_of(name, source, target, states, conditional, priority, counts, width, 
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge between modes, given by their numbers, as the states of its target and those that it counts with."""
+    """An edge between modes, given by their numbers; the states of its target, those it counts with, and changes."""
 
     name: str
     source: int
@@ -140,6 +141,7 @@ class Edge:
     conditional: bool
     priority: int
     counts: tuple[int, ...]
+    changes: tuple[int, ...]
     reset: Callable
     spread: Callable
     slow: Callable

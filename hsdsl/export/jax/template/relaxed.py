@@ -10,13 +10,13 @@ from jax import lax
 from .contact import is_possible
 from .control import accepted, error_ratio
 from .functions import frozen, when
-from .lane import CROSS, DEEP, FLAT, INWARD, scales_here
+from .lane import CROSS, DEEP, FLAT, INWARD, scaled
 from .model import Bound, noise_of, norm_of
 from .steps import at, error_of, hermite
 from .surfaces import SCAN, each_at, last_up_crossing, states_at
 from .transitions import Crossing, facts_here_and_at, passed_over, sizes_of
 from .trials import shortened
-from .verdicts import Verdict, attempted, motion, scaled
+from .verdicts import Verdict, attempted, motion
 
 
 def pieces_of(method, trial):
@@ -36,7 +36,7 @@ def crossings(model, config, bound, lane, trial):
     reach = jnp.maximum(jnp.abs(x), jnp.abs(trial.z))
     times, places = jnp.stack([t, trial.t1, trial.t1]), jnp.stack([x, trial.z, reach])
     ends = bound.facts(mode, times, places)
-    noises, norm = noise_of(ends, times, places, scaled(lane)), norm_of(ends)[1]
+    noises, norm = noise_of(ends, times, places, scaled(model, lane)), norm_of(ends)[1]
     values, noise, small = ends.values[1], noises[1], noises[2] / 16
     beyond = (values > noise) & model.of(model.is_edge, mode)
     may_pass = (lane.emerging | model.of(model.conditional, mode)) & (ends.values[0] > noises[0])
@@ -82,12 +82,12 @@ def holds_next(model, bound, lane, trial, pieces, share, values, found, facts):
     returning = found & returns & ~jnp.diagonal(facts.conditions)
     back = -jnp.diagonal(facts.rates) * trial.h
     hop = share + jnp.where(back > 0, (1 - share) * back / (jnp.where(back > 0, back, 0.0) + values), 0.0)
-    points, scales = states_at(trial.x, pieces, jnp.where(returning, hop, share)), scales_here(model, lane)
+    points = states_at(trial.x, pieces, jnp.where(returning, hop, share))
 
     def look():
         times = trial.t + hop * trial.h
         each = jnp.arange(model.M), times, points
-        return jax.vmap(lambda k, t, x: is_possible(model, bound, lane.mode, k, t, x, scales))(*each)
+        return jax.vmap(lambda k, t, x: is_possible(model, bound, lane, k, t, x))(*each)
 
     return returning & when(returning.any(), look, returning)
 
@@ -95,7 +95,7 @@ def holds_next(model, bound, lane, trial, pieces, share, values, found, facts):
 def relaxed_crossing(model, config, p, lane):
     """What a step that ended in strips leads to: a transition, a shorter step, or nothing where it may be there."""
     mask = lane.phase == CROSS
-    still, bound = frozen(lane), Bound(model, frozen(p), lane.segment)
+    still, bound = frozen(lane), Bound(model, frozen(p), lane.segment, lane.contacts)
     trial = attempted(model, bound, still, still.trial)
     points, depth, failed, kind, blocked = crossings(model, config, bound, still, trial)
     none = ~points[0].any() & ~failed

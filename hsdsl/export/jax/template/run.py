@@ -89,12 +89,13 @@ def look(model, config, p, lane, record):
         ends, until = crossing.mask | crossing.leaves, jnp.where(crossing.leaves, crossing.left, event.t)
         made = followed(model, p, before, crossing.trial, frozen(before.trial), ends)
         record = along_step(config, before, record, made, ends, until)
-    lane, touches = boundary(model, p, ended(lane, event), crossing.here)
-    if model.holds:
+    lane = ended(lane, event)
+    if model.holds and config.scheme == "located":
         lane, event = let_go(model, config, p, lane, event)
+    lane = boundary(model, config, p, lane, crossing.here, event.held)
     lane, record = transit(model, config, p, lane, record, event)
     lane, flows = enter(model, config, p, lane)
-    return held_on(model, config, p, lane, record, flows, touches) if config.scheme == "located" else (lane, record)
+    return held_on(model, config, p, lane, record, flows) if config.scheme == "located" else (lane, record)
 
 
 def one_round(model, config, p, state):
@@ -182,8 +183,7 @@ class Experiment:
             kept = np.array([name in self.fixed for name in self.names])
             p = jnp.where(kept, self.parameters(), p)
         config = self.settings(scheme, step, tolerance, relaxation, transitions, times)
-        model = self.model if config.scheme == "located" else self.model.free
-        return run(model, config, p, jnp.int32(self.start_mode), x0, rounds)
+        return run(self.model, config, p, jnp.int32(self.start_mode), x0, rounds)
 
     def settings(self, scheme, step, tolerance, relaxation, transitions, times):
         """The settings of a run."""

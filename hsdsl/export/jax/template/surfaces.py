@@ -8,12 +8,13 @@ import jax.numpy as jnp
 from jax import lax
 
 from .functions import INF
-from .lane import TIE
+from .lane import TIE, releasing, scaled, sizes_here
 from .model import noise_of
 from .steps import at
 
 SCAN = 8  # parts in which a step is searched
 UNIT = 2.0**-53
+SAME_UNITS = 4  # of round-off, relative to its scale: how far a reset may move a state that it keeps
 
 
 def each_at(bound, mode, t, h, x, pieces, shares):
@@ -34,9 +35,22 @@ def ties(t):
 
 def standing(model, lane, facts, t, x, since):
     """Edges on whose guards a state is, to round-off or within a time, the flow pointing out and the `if` true."""
-    noise = noise_of(facts, t, x, jnp.where(lane.active[:, None], lane.scale, 0.0))
+    noise = noise_of(facts, t, x, scaled(model, lane))
     near = jnp.abs(facts.values) <= jnp.maximum(noise, facts.rates * since)
-    return near & (facts.rates > 0) & facts.conditions & model.of(model.is_edge, lane.mode)
+    out = facts.rates > 32 * UNIT * facts.spans
+    return near & out & facts.conditions & model.of(model.is_edge, lane.mode) & ~releasing(model, lane)
+
+
+def after_reset(model, bound, lane, k, t, x):
+    """Where edge k leads at a slow impact, but for states that it counts with."""
+    edge = model.of(model.edge, lane.mode)[k]
+    return jnp.where(model.of(model.counts, edge), x, bound.routines.slow(edge, bound.p, t, x))
+
+
+def keeps(model, bound, lane, k, t, x):
+    """Whether the reset of edge k leaves the state where it is."""
+    off = jnp.abs(after_reset(model, bound, lane, k, t, x) - x)
+    return (off <= SAME_UNITS * UNIT * sizes_here(model, lane)).all()
 
 
 def choose(model, config, lane, found, facts, times, states):
@@ -52,7 +66,7 @@ def choose(model, config, lane, found, facts, times, states):
     tied = tied | standing(model, lane, here, times[first], states[first], since)
     priority = model.of(model.priority, lane.mode)
     edge = jnp.argmax(jnp.where(tied, priority, jnp.iinfo(jnp.int32).min))
-    return first, edge, tied.sum() > 1
+    return first, edge, (tied & ~releasing(model, lane)).sum() > 1
 
 
 def closed(value, low, high, small, needed):

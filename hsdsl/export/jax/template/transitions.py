@@ -23,13 +23,15 @@ from .lane import (
     UNTIL,
     VALUE,
     contraction,
+    flown,
+    of_contacts,
     recorded,
     sampled,
     scales_here,
     stopped,
 )
 from .model import Bound
-from .surfaces import choose, standing, ties
+from .surfaces import choose, keeps, standing, ties
 
 
 class Crossing(NamedTuple):
@@ -58,7 +60,10 @@ class Crossing(NamedTuple):
 
 
 class Event(NamedTuple):
-    """Where ``mask`` holds: edge k of the mode goes from (t, x); a step into a strip ended at ``landed``, this deep."""
+    """Where ``mask`` holds: edge k of the mode goes from (t, x); a step into a strip ended at ``landed``, this deep.
+
+    The guards of edges ``held`` held the state until then.
+    """
 
     mask: Any
     k: Any
@@ -68,6 +73,7 @@ class Event(NamedTuple):
     depth: Any
     sizes: Any
     tied: Any
+    held: Any
 
 
 def corrected(bound, lane, k, t, x, time, state):
@@ -112,7 +118,7 @@ def decided(model, config, p, lane, crossing):
     first, k, tied = choose(model, config, still, found, facts, times, states)
 
     def point(p, lane, t, x, first, length, share):
-        bound = Bound(model, p, lane.segment)
+        bound = Bound(model, p, lane.segment, lane.contacts)
         return corrected(bound, lane, first, t, x, *crossing.point(bound, lane, length, share))
 
     length, share = jnp.where(goes, crossing.length, 0.0), jnp.where(goes, crossing.shares[first], 0.0)
@@ -124,7 +130,8 @@ def decided(model, config, p, lane, crossing):
     landed = jnp.where(goes, crossing.landed, jnp.where(lane.phase == END, INF, still.t))
     depth = jnp.where(goes, jnp.where(found[k], crossing.depth[k], crossing.depth[first]), 0.0)
     depth = jnp.where(fires, config.relaxation, depth)
-    return Event(goes | on.any() | fires, jnp.where(fires, lane.blocked, k), t, x, landed, depth, sizes, tied & ~fires)
+    k = jnp.where(fires, lane.blocked, k)
+    return Event(goes | on.any() | fires, k, t, x, landed, depth, sizes, tied & ~fires, jnp.zeros_like(found))
 
 
 def ended(lane, event):
@@ -136,7 +143,7 @@ def ended(lane, event):
 
 def transit(model, config, p, lane, record, event):
     """Make a transition: wait in the strip, reset, and enter the target next."""
-    bound, entry, before = Bound(model, p, lane.segment), lane.phase == FIRE, lane
+    bound, entry, before = Bound(model, p, lane.segment, lane.contacts), lane.phase == FIRE, lane
     edge = model.of(model.edge, lane.mode)[event.k].astype(jnp.int32)
     mask = event.mask
     over = mask & (lane.count >= config.max_transitions)
@@ -145,13 +152,14 @@ def transit(model, config, p, lane, record, event):
     after = bound.routines.reset(edge, bound.p, event.t, x)
     spread = bound.routines.spread(edge, bound.p, frozen(event.t), frozen(x), event.sizes)
     scale = frozen(jnp.where(jnp.isfinite(spread).all(), spread, jnp.abs(after)))
-    changes = model.of(model.loops, lane.mode)[event.k] & (after != x)
+    changes = model.of(model.loops, lane.mode)[event.k] & model.of(model.changes, edge)
     most = (lane.count + 1) * jnp.maximum(jnp.abs(after), scales_here(model, lane))  # round-off adds up over resets
     scale = frozen(jnp.where(changes, jnp.minimum(scale, most), scale))
     if config.scheme == "relaxed":
         resumed = event.landed + (config.relaxation - event.depth)
     else:
-        resumed = event.t + jnp.where(crowded(config, lane, edge, event.t) & ~entry, config.relaxation, 0.0)
+        waits = crowded(model, config, bound, lane, edge, event) & ~entry
+        resumed = event.t + jnp.where(waits, config.relaxation, 0.0)
     waits = resumed > event.t
     late = waits & (resumed > config.until + ties(config.until))
     resumed = keeping(jnp.minimum(resumed, jnp.where(waits, config.until, resumed)), event.t)
@@ -183,29 +191,34 @@ def entered_next(model, config, bound, lane, event, edge, x, after, scale, resum
     relaxed, last = config.scheme == "relaxed", lane.visited.room
     slope = frozen(bound.flow(lane.mode, event.t, x)) if relaxed else lane.slope  # only the relaxed scheme reads it
     owner = model.of(model.owner, lane.mode).astype(jnp.int32)
+    on = event.held | (lane.active & ~event.held.any() & (event.t == lane.t))
+    off = jnp.abs(bound.surfaces(owner, event.t, x))
+    stays = on & ~entry & (jnp.asarray(model.target)[edge] == owner) & (off >= 0)
     return lane._replace(
         phase=jnp.int32(ENTER), t=resumed, resumed=frozen(resumed), x=after, scale=scale,
         mode=jnp.asarray(model.target, jnp.int32)[edge],
         since=kept(lane.since, since_of(config, lane, event)), inside=jnp.zeros_like(lane.inside),
-        reset_at=kept(NAN, frozen(event.t)), held=jnp.full_like(lane.held, -1), made=kept(lane.made, True),
+        reset_at=kept(NAN, frozen(event.t)), contacts=jnp.zeros_like(lane.contacts), made=kept(lane.made, True),
+        stood=frozen(jnp.where(stays, off, 0.0)),
         flowed=kept(lane.flowed, event.t > lane.resumed), edge=edge, slope=kept(lane.slope, slope),
         mode_before=kept(lane.mode_before, owner), times=jnp.append(lane.times[1:], frozen(event.t)),
         waits=jnp.append(lane.waits[1:], frozen(resumed - event.t)),
-        loops=jnp.append(lane.loops[1:], kept(-1, edge).astype(jnp.int32)), count=lane.count + 1, trial=lane.h,
-        clear=jnp.asarray(False), halvings=jnp.zeros_like(lane.halvings),
+        edges=jnp.append(lane.edges[1:], edge), entries=jnp.append(lane.entries[1:], entry), count=lane.count + 1,
+        trial=lane.h, clear=jnp.asarray(False), halvings=jnp.zeros_like(lane.halvings),
         visited=lane.visited._replace(room=kept(last, 0).astype(jnp.int32)),
     )  # fmt: skip
 
 
-def crowded(config, lane, edge, t):
+def crowded(model, config, bound, lane, edge, event):
     """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
 
-    Those of one instant count only where the edge is one of theirs.
+    Those of one instant count only where the edge is one of theirs. Those of contacts that move the state run to one.
     """
-    since = t - lane.times[0]
-    counts = (lane.loops == edge).any() | (since > ties(t))
-    flown = since - lane.waits.sum()
-    return (lane.count >= FREE) & ~contraction(lane)[0] & (flown <= config.relaxation) & counts
+    counts = (lane.edges == edge).any() | (event.t - lane.times[0] > ties(event.t))
+    close = ~contraction(model, lane)[0] & (flown(lane, event.t) <= config.relaxation)
+    contact = model.of(model.contact, model.of(model.owner, lane.mode))[event.k] >= 0
+    runs = contact & of_contacts(model, lane)[0] & ~keeps(model, bound, lane, event.k, event.t, event.x)
+    return frozen((lane.count >= FREE) & close & counts & ~runs)
 
 
 def since_of(config, lane, event):

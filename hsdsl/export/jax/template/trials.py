@@ -26,9 +26,9 @@ from .verdicts import attempted, followed, located_verdict, relaxed_verdict, ter
 
 def advance(model, config, p, lane, record):
     """Try one step of a run that flows."""
-    here = (lane.phase == STEP) & (lane.t < Bound(model, p, lane.segment).end)
+    here = (lane.phase == STEP) & (lane.t < Bound(model, p, lane.segment, lane.contacts).end)
     still, length = frozen(lane), frozen(lane.trial)
-    bound = Bound(model, frozen(p), still.segment)
+    bound = Bound(model, frozen(p), still.segment, still.contacts)
     trial = attempted(model, bound, still, length)
     verdict_of = relaxed_verdict if config.scheme == "relaxed" else located_verdict
     learnt, verdict, ends = verdict_of(model, config, bound, still, trial)
@@ -67,13 +67,13 @@ def located_or(config, mask):
 
 def counted(model, config, p, lane, record, tried, ends, ratio, mask):
     """Make the step that counts where ``mask`` holds: what was ``tried`` says how the run goes on from it."""
-    bound, values, after = Bound(model, frozen(p), lane.segment), ends.last.values, lane
+    bound, values, after = Bound(model, frozen(p), lane.segment, lane.contacts), ends.last.values, lane
     if config.tolerance is not None:
         after = accepted(config, after, tried.h, ratio, lane.halvings == 0)
     after = stalled(config, after, tried, ends)
     made = followed(model, p, lane, tried, frozen(lane.trial), mask)
     record = along_step(config, lane, record, made, mask, made.t1)
-    closes = tried.at_limit & (bound.last | bound.next_jumps | lane.active.any() | (lane.held >= 0))
+    closes = tried.at_limit & (bound.last | bound.next_jumps | lane.active.any() | lane.contacts.any())
     after = noticed(model, after, tried.z)._replace(
         t=made.t1,
         x=made.z,

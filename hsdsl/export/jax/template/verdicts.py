@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 from .control import cut, error_ratio
 from .functions import chosen, frozen, with_derivatives_of
-from .lane import DEEP, FLAT, VALUE, WALL
+from .lane import DEEP, FLAT, VALUE, WALL, scaled
 from .model import Bound, noise_of, norm_of
 from .steps import at, error_of, piece_of, secant, slope_at, step
 from .surfaces import SCAN
@@ -78,7 +78,7 @@ def followed(model, p, lane, trial, length, mask):
     """The step of a trial of this length, with derivatives; where ``mask`` fails one of no length, which has them."""
 
     def again(p, lane, length):
-        made = attempted(model, Bound(model, p, lane.segment), lane, length)
+        made = attempted(model, Bound(model, p, lane.segment, lane.contacts), lane, length)
         return Made(made.t, made.h, made.t1, made.x, made.z, made.piece)
 
     ours = Made(trial.t, trial.h, trial.t1, trial.x, trial.z, trial.piece)
@@ -90,11 +90,6 @@ def terms_of(method, x, h, stages):
     """The sizes of the terms that the end of a step of length h from x is computed from."""
     largest = jnp.abs(jnp.stack(stages)).max(axis=0)
     return frozen(jnp.abs(x) + h * sum(abs(weight) for _, weight in method.b) * largest)
-
-
-def scaled(lane):
-    """Sizes that round-off counts with, for each surface: on those that the state was on when it entered."""
-    return jnp.where(lane.active[:, None], lane.scale, 0.0)
 
 
 class Ends(NamedTuple):
@@ -109,7 +104,7 @@ class Ends(NamedTuple):
     states: Any
 
 
-def looked_at(bound, lane, trial, count):
+def looked_at(model, bound, lane, trial, count):
     """Surfaces at the ends of a trial and at ``count`` multiples of a part of it, in one evaluation."""
     shares = jnp.arange(count) / SCAN
     states = jax.vmap(lambda s: at(trial.x, trial.piece, s))(shares)
@@ -117,8 +112,9 @@ def looked_at(bound, lane, trial, count):
     places = jnp.concatenate([states.reshape(count, len(trial.x)), jnp.stack([trial.x, trial.z])])
     facts = bound.facts(lane.mode, times, places)
     first, last = (jax.tree.map(lambda rows, i=i: rows[i], facts) for i in (count, count + 1))
+    sizes = scaled(model, lane)
     return Ends(
-        first, last, noise_of(first, trial.t, trial.x, scaled(lane)), noise_of(last, trial.t1, trial.z, scaled(lane)),
+        first, last, noise_of(first, trial.t, trial.x, sizes), noise_of(last, trial.t1, trial.z, sizes),
         jax.tree.map(lambda rows: rows[:count], facts), times[:count], states,
     )  # fmt: skip
 
@@ -142,14 +138,14 @@ def judged(model, config, lane, trial, ends):
     return finite, bad.any(), kind, blocked, crosses.any()
 
 
-def excursion(lane, trial, ends):
+def excursion(model, lane, trial, ends):
     """Surfaces that an adaptive step went beyond and came back from."""
 
     def rate(facts, flow):
         return facts.gradients[:, 0] + facts.gradients[:, 1:] @ flow
 
     out, back = rate(ends.first, trial.stages[0]), rate(ends.last, trial.end)
-    noise = noise_of(ends.shares, ends.times, ends.states, scaled(lane))
+    noise = noise_of(ends.shares, ends.times, ends.states, scaled(model, lane))
     seen = (ends.shares.values > noise) & ends.shares.conditions
     first = ends.first.values > ends.first_noise
     return ((out > 0) | lane.active) & (back <= 0) & seen[1:].any(axis=0) & ~first
@@ -158,7 +154,7 @@ def excursion(lane, trial, ends):
 def relaxed_verdict(model, config, bound, lane, trial):
     """The verdict of the relaxed scheme, the run with what its step control learns, and what it looked at."""
     shares = SCAN if model.transparent or config.tolerance is not None else 0
-    ends = looked_at(bound, lane, trial, shares)
+    ends = looked_at(model, bound, lane, trial, shares)
     finite, bad, kind, blocked, crosses = judged(model, config, lane, trial, ends)
     failed = ~finite | bad
     wrong, ratio = jnp.asarray(False), jnp.asarray(0.0)
@@ -166,7 +162,7 @@ def relaxed_verdict(model, config, bound, lane, trial):
         error = error_of(model.method, trial.h, trial.stages, trial.end)
         lane, ratio = error_ratio(model, config, lane, motion(bound, lane), trial.h, error, trial.z)
         wrong = ~failed & trial.ends & ~(ratio <= 1)
-        away = excursion(lane, trial, ends)
+        away = excursion(model, lane, trial, ends)
         back = away.any() & ~failed & ~wrong & ~crosses
         kind, blocked = jnp.where(back, DEEP, kind), jnp.where(back, jnp.argmax(away), blocked)
         failed = failed | back
@@ -175,13 +171,14 @@ def relaxed_verdict(model, config, bound, lane, trial):
     return lane, verdict, ends
 
 
-def looked_along(bound, lane, trial):
-    """Surfaces and their slopes by the share at the ends of the parts of a step, and what counts as above."""
-    ends = looked_at(bound, lane, trial, SCAN + 1)
+def looked_along(model, bound, lane, trial):
+    """Surfaces and their slopes by the share at the ends of parts of a step, and what counts as above at each end."""
+    ends = looked_at(model, bound, lane, trial, SCAN + 1)
     gradients = ends.shares.gradients
     moved = jax.vmap(lambda s: slope_at(trial.piece, s))(jnp.arange(SCAN + 1) / SCAN)
     slopes = gradients[..., 0] * trial.h + (gradients[..., 1:] @ moved[..., None])[..., 0]
-    return ends, slopes, jnp.maximum(ends.first_noise, ends.last_noise)
+    level = jnp.tile(jnp.maximum(ends.first_noise, ends.last_noise), (SCAN, 1))
+    return ends, slopes, level.at[-1].set(ends.last_noise)
 
 
 def rising(lane, values, slopes, first, level):
@@ -202,7 +199,7 @@ def rising(lane, values, slopes, first, level):
 
 def located_verdict(model, config, bound, lane, trial):
     """The verdict of the located scheme, the run with what its step control learns, and what it looked at."""
-    ends, slopes, level = looked_along(bound, lane, trial)
+    ends, slopes, level = looked_along(model, bound, lane, trial)
     values = ends.shares.values
     finite = trial.ends & jnp.isfinite(trial.z.sum() + values.sum())
     wrong, ratio = jnp.asarray(False), jnp.asarray(0.0)
