@@ -6,6 +6,7 @@ import ast
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from hsdsl.export import routines
 from hsdsl.export.identifiers import identifiers
 from hsdsl.export.matlab.language import KEYWORDS, body, helpers, reserved
 from hsdsl.export.matlab.method import method_text
@@ -62,10 +63,9 @@ def parameter_fields(program: Program) -> dict[str, str]:
 
 
 def data_names(program: Program) -> dict[str, str]:
-    """The inputs and switches of a routine, as entries of a row of the table over time."""
-    lines = [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
-    switches = [f"k{i}" for i in range(len(program.switches))]
-    return {name: f"d({at})" for at, name in enumerate([*lines, *switches], start=1)}
+    """The inputs, switches and contacts of a routine, as entries of a row."""
+    names = routines.data_names(program)[len(program.parameters) :]
+    return {name: f"d({at})" for at, name in enumerate(names, start=1)}
 
 
 @dataclass
@@ -80,7 +80,7 @@ class ModelText:
         """All of it."""
         source, problem = self.source, self.source.problem
         program = problem.program
-        for number, mode in enumerate(program.modes, start=1):
+        for number, mode in enumerate(self.flows, start=1):
             self.mode(number, mode)
         parts = [
             f"function m = {source.name}_model()\n",
@@ -96,9 +96,15 @@ class ModelText:
         calls = helpers(functions)
         return "".join(parts) + functions + (f"\n{calls}" if calls else "")
 
+    @property
+    def flows(self) -> tuple[ModeProgram, ...]:
+        """The modes, then those with motion along guards, where a run has them."""
+        problem = self.source.problem
+        return problem.program.modes if problem.settings.completion == "none" else problem.program.flows
+
     def facts(self, program: Program) -> Iterable[tuple[str, str]]:
         """Names and sizes."""
-        modes, states = program.modes, program.all_states
+        modes, states, none = self.flows, program.all_states, self.source.problem.settings.completion == "none"
         yield "name", string(self.source.name)
         yield "mode_names", strings(program.mode_names)
         yield "state_names", cell(strings(mode.states) for mode in modes)
@@ -111,6 +117,14 @@ class ModelText:
         yield "edge_priority", cell(vector(edge.priority for edge in mode.edges) for mode in modes)
         yield "edge_changes", cell(cell(vector(1 + i for i in edge.changes) for edge in mode.edges) for mode in modes)
         yield "edge_counts", cell(cell(vector(1 + i for i in edge.counts) for edge in mode.edges) for mode in modes)
+        held = [0 if none or mode.held is None else 1 + mode.held for mode in modes]
+        yield "held", vector(held)
+        yield "contacts", str(program.contact_count)
+        places = [[(e.contact, e.releases, e.push_order) for e in mode.edges] for mode in modes]
+        numbers = [[tuple(0 if k is None or none else k + 1 for k in both) for *both, _ in edges] for edges in places]
+        yield "edge_contact", cell(vector(contact for contact, _ in edges) for edges in numbers)
+        yield "edge_releases", cell(vector(ends for _, ends in edges) for edges in numbers)
+        yield "edge_order", cell(vector(order for *_, order in edges) for edges in places)
         yield "edge_conditional", cell(f"{vector(int(e.conditional) for e in mode.edges)} == 1" for mode in modes)
 
     def mode(self, number: int, mode: ModeProgram) -> None:
@@ -128,8 +142,8 @@ class ModelText:
         self.add("slow", cell(self.slow(number, k, mode) for k in edges))
         self.add("condition", cell(self.condition(number, k, found, mode) for k in edges))
         method = self.source.problem.settings.method
-        if method is not None and method.implicit:
-            self.add("jacobian", self.jacobian(number, mode))
+        needed = (method is not None and method.implicit) or mode.held is not None
+        self.add("jacobian", self.jacobian(number, mode) if needed else "[]")
 
     def add(self, key: str, handle: str) -> None:
         """One more mode's entry of a table."""
