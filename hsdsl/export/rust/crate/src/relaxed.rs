@@ -217,6 +217,7 @@ impl<S: Sink> Run<'_, S> {
         if crossing.theta > 0.0 {
             self.append(t, &crossing.state);
         }
+        self.x = crossing.state;
         if self.limit_reached() {
             return Err(self.stop(StopReason::TransitionLimit, t));
         }
@@ -225,7 +226,6 @@ impl<S: Sink> Run<'_, S> {
         if resumed > until + self.tie(until) {
             self.strip(crossing, &[(t, 0.0), (t1, depth), (until, depth + (until - t1))]);
             self.record(crossing, event.tied, f64::NAN, &[0.0; W], false);
-            self.x = crossing.state;
             return Err(self.stop(StopReason::Until, until));
         }
         let (after, scale) = match reset {
