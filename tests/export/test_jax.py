@@ -29,15 +29,7 @@ pytestmark = pytest.mark.exports
 jnp = jax.numpy
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "models"
-CASES = ROOT / "tests" / "conformance" / "cases"
 NAMES = [path.stem for path in sorted(MODELS.glob("*.yaml")) if path.stem != "stiff-switch"]
-# of the meaning: walls, inputs that jump, conditions, entries, dimensions, ends
-MEANING = (
-    "curved-surface", "dimensions", "m1-wall-stops", "m3-cross-again", "m3-transparent", "m4-rising-floor",
-    "m4-start-tangent", "m5-entry-at-input-jump", "m5-entry-chain", "m6-tie-priority", "m8-end-on-guard",
-    "m8-jump-at-the-end", "m8-jump-and-guard-at-the-end",
-    "m9-linear-hold", "m9-pulses", "m10-final", "m10-flow-ends-at-guard", "m11-awake-at-rest", "outputs",
-)  # fmt: skip
 REST = """
 hsdsl: 1
 parameters: {e: 0.7, lift: 2}
@@ -154,20 +146,6 @@ def test_what_it_cannot_keep_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
 @pytest.mark.parametrize("name", NAMES)
 def test_every_model(name: str, setting: int, tmp_path: Path) -> None:
     model, settings = hsdsl.load(MODELS / f"{name}.yaml"), SETTINGS[setting]
-    module = imported(model, tmp_path, **settings)
-    assert_same(module, ran(module), model.simulate(**settings))
-
-
-@pytest.mark.parametrize(
-    ("name", "scheme"),
-    [
-        pytest.param(name, scheme, marks=slow_or_campaign(k % 2 == i))  # one scheme of each case in turn
-        for k, name in enumerate(MEANING)
-        for i, scheme in enumerate(("located", "relaxed"))
-    ],
-)
-def test_the_meaning(name: str, scheme: str, tmp_path: Path) -> None:
-    model, settings = hsdsl.load(CASES / f"{name}.yaml"), {"scheme": scheme, "method": "rk4", "step": 1e-2}
     module = imported(model, tmp_path, **settings)
     assert_same(module, ran(module), model.simulate(**settings))
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from octave import OCTAVE, Ran, evaluated, exported, ran
+from export.agreement import assert_agree, by_octave, octave_run, of_run
+from export.octave import OCTAVE, evaluated, exported
 from shipped import assert_golden
 
 import hsdsl
@@ -17,7 +18,6 @@ from hsdsl.export import files_of, source_of
 
 ROOT = Path(__file__).parents[2]
 MODELS = sorted((ROOT / "models").glob("*.yaml"))
-CASES = sorted(p for p in (ROOT / "tests/conformance/cases").glob("*.yaml") if ".expect" not in p.name)
 FIXED, ADAPTIVE = 1e-9, 1e-7  # of times of transitions, relative to the run
 LOCATED: dict[str, Any] = {"scheme": "located", "method": "rk4", "step": "1/100"}
 RELAXED: dict[str, Any] = {"scheme": "relaxed", "method": "midpoint", "step": "1/100", "relaxation": "1e-3"}
@@ -28,29 +28,10 @@ SHORT = {
     "thermostat": {"until": "7"},
     "bouncing-ball": {"until": "6"},
 }
-# reasons that MATLAB's own infinities hide, and returns that are noticed earlier than here
-NOT_ALIKE = {"m10-overflow-in-time", "m10-sliding", "m4-chattering"}
-# in the strips of a tail round-off decides how often a step is halved
-RELAXED_APART = {"m11-counts", "m11-rest-with-an-if", "zeno-ball"}
-FLAT = {"flat-surface": 1e-5}  # (x - 1)**3 is zero to round-off in an interval that long
-
-
-def agree(ours: Any, theirs: Ran, tolerance: float) -> None:
-    found = [(made.edge, made.source, made.target) for made in theirs.transitions]
-    assert found == [(t.edge, t.source, t.target) for t in ours.transitions]
-    end = max(1.0, float(ours.time_span[1]))
-    for ours_made, made in zip(ours.transitions, theirs.transitions, strict=True):
-        assert made.time == pytest.approx(float(ours_made.time), abs=tolerance * end)
-        if ours_made.after is not None:
-            size = max(map(abs, (*ours_made.after.values(), *ours_made.before.values(), 1.0)))
-            assert made.after == pytest.approx([*ours_made.after.values()], abs=1e3 * tolerance * float(size))
-    assert theirs.stop == ours.stop.reason
-    assert theirs.time == pytest.approx(float(ours.time_span[1]), abs=tolerance * end)
 
 
 def compare(model: Any, folder: Path, tolerance: float, **arguments: Any) -> None:
-    name = exported(model, folder, **arguments)
-    agree(model.simulate(**arguments), ran(folder, f"r = {name}_run();"), tolerance)
+    assert_agree(of_run(model.simulate(**arguments)), by_octave(model, folder, **arguments), tolerance)
 
 
 def kept(path: Path, arguments: dict[str, Any]) -> dict[str, Any]:
@@ -71,20 +52,6 @@ def test_fixed_steps_make_our_transitions(path: Path, arguments: dict[str, Any],
 def test_settings_of_the_file_make_our_transitions(path: Path, tmp_path: Path) -> None:
     shorter = SHORT | {"oscillator-with-stop-1": {"until": "3"}, "thermostat": {}, "bouncing-ball": {}}
     compare(hsdsl.load(path), tmp_path, ADAPTIVE, **shorter.get(path.stem, {}))
-
-
-@pytest.mark.tools
-@pytest.mark.slow
-@octave
-@pytest.mark.parametrize("scheme", ["located", "relaxed"])
-@pytest.mark.parametrize("path", [p for p in CASES if p.stem not in NOT_ALIKE], ids=lambda p: p.stem)
-def test_cases_of_the_meaning(path: Path, scheme: str, tmp_path: Path) -> None:
-    model, arguments = hsdsl.load(path), {"method": "rk4", "step": "1/64", "scheme": scheme}
-    if scheme == "relaxed" and path.stem in RELAXED_APART:
-        pytest.skip("steps of a Zeno tail")
-    if model.simulate(**arguments).made > 3000:
-        pytest.skip("too many transitions to wait for")
-    compare(model, tmp_path, FLAT.get(path.stem, FIXED), **arguments)
 
 
 @pytest.mark.tools
@@ -135,7 +102,7 @@ def test_parameters_change_and_others_follow(tmp_path: Path) -> None:
     text = evaluated(tmp_path, f"{chosen} fprintf('%.17g ', p.d, p.w0, {name}_initial(p));")
     assert [float(v) for v in text.split()] == [1.4, 0.35, 1, 7, 0, 0, 0]
     ours = model.simulate(**LOCATED, parameters={"if": "0.7"})
-    agree(ours, ran(tmp_path, f"{chosen} r = {name}_run(p);"), FIXED)
+    assert_agree(of_run(ours), octave_run(tmp_path, f"{chosen} r = {name}_run(p);"), FIXED)
     text = evaluated(tmp_path, f"try, {name}_parameters('q', 1); catch e, disp(e.message); end")
     assert text.strip() == "there is no parameter q"
 

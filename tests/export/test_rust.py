@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from pathlib import Path
 from shutil import which
 from typing import Any
 
 import pytest
+from export.agreement import assert_agree, by_rust, cargo, of_run
 from shipped import assert_golden
 
 import hsdsl
@@ -17,7 +16,6 @@ from hsdsl.export import files_of, source_of, write
 
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "models"
-CASES = ROOT / "tests" / "conformance" / "cases"
 needs_cargo = [pytest.mark.tools, pytest.mark.skipif(which("cargo") is None, reason="there is no cargo")]
 SETTINGS: list[tuple[str, dict[str, Any]]] = [
     *((path.stem, {}) for path in sorted(MODELS.glob("*.yaml")) if path.stem != "stiff-switch"),
@@ -26,7 +24,6 @@ SETTINGS: list[tuple[str, dict[str, Any]]] = [
     ("thermostat", {"method": "dop853", "tolerance": 1e-7}),
 ]
 GALLERY = [path.stem for path in sorted((MODELS / "gallery").glob("*.yaml"))]
-MEANING = [path.stem for path in sorted(CASES.glob("*.yaml")) if not path.stem.endswith(".expect")]
 HOSTILE = """
 hsdsl: 1
 title: "*/ \\" \\\\ } é"
@@ -44,24 +41,9 @@ def hostile(path: Path) -> Path:
     return path
 
 
-def cargo(crate: Path, *words: str) -> str:
-    environment = {**os.environ, "CARGO_NET_OFFLINE": "true", "RUSTFLAGS": "-D warnings"}
-    environment |= {"CARGO_INCREMENTAL": "0", "CARGO_PROFILE_DEV_DEBUG": "0"}  # built once, and not debugged
-    made = subprocess.run(["cargo", *words], cwd=crate, env=environment, capture_output=True, text=True)
-    assert made.returncode == 0, made.stderr
-    return made.stdout
-
-
 def assert_same(model: Any, crate: Path, **settings: Any) -> None:
-    write(files_of(source_of(model, settings), "rust"), crate)
-    lines = [line.split(" ") for line in cargo(crate, "run", "-q", "--example", "transitions").splitlines()]
     run = model.simulate(**{**settings, **chosen(model, settings), "scheme": "relaxed"})
-    assert len(lines) == len(run.transitions) + 1
-    for (_, time, resumed, *_), made in zip(lines, run.transitions, strict=False):
-        assert float(time) == made.time
-        assert resumed == "NaN" if made.resumed is None else float(resumed) == made.resumed
-    assert lines[-1][0] == "".join(word.title() for word in run.stop.reason.split("_"))
-    assert float(lines[-1][1]) == run.stop.time
+    assert_agree(of_run(run), by_rust(model, crate, **settings), 0.0)
 
 
 def chosen(model: Any, settings: Any) -> dict[str, str]:
@@ -84,13 +66,6 @@ def test_the_crates_own_test(name: str, settings: Any, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", [pytest.param(name, marks=needs_cargo) for name in GALLERY])
 def test_every_scene_of_the_gallery(name: str, tmp_path: Path) -> None:
     assert_same(hsdsl.load(MODELS / "gallery" / f"{name}.yaml"), tmp_path, method="dopri5")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("settings", ({"method": "rk4", "step": 0.017, "relaxation": 3e-4}, {"method": "dopri5"}))
-@pytest.mark.parametrize("name", [pytest.param(name, marks=needs_cargo) for name in MEANING])
-def test_the_meaning(name: str, settings: Any, tmp_path: Path) -> None:
-    assert_same(hsdsl.load(CASES / f"{name}.yaml"), tmp_path, **settings)
 
 
 @pytest.mark.tools

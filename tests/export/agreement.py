@@ -1,0 +1,141 @@
+"""Exports that have a loop of their own, run, and held against runs of the engine."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isnan
+from pathlib import Path
+from shutil import which
+from typing import Any
+
+import pytest
+from export.octave import OCTAVE, evaluated, exported
+
+from hsdsl.export import files_of, source_of, write
+
+NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class Made:
+    """A transition; ``after`` is empty where it is not printed, or not made."""
+
+    edge: str
+    time: float
+    resumed: float
+    after: Sequence[float] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run gives: its transitions, why it ended and when, and the last state."""
+
+    made: list[Made]
+    stop: str
+    time: float
+    final: Sequence[float] = ()
+
+
+def of_run(run: Any) -> Outcome:
+    """What a run of the engine gives."""
+    made = [
+        Made(t.edge, float(t.time), NAN if t.resumed is None else float(t.resumed),
+             () if t.after is None else [*map(float, t.after.values())])
+        for t in run.transitions
+    ]  # fmt: skip
+    return Outcome(made, run.stop.reason, float(run.stop.time), [*map(float, run.final.state.values())])
+
+
+def assert_agree(ours: Outcome, theirs: Outcome, within: float) -> None:
+    """The same transitions and end, within an error of times relative to the run's length, 1000 times it of states."""
+    allowed = within * max(1.0, ours.time)
+    assert [made.edge for made in theirs.made] == [made.edge for made in ours.made]
+    assert theirs.stop == ours.stop
+    for one, other in zip(ours.made, theirs.made, strict=True):
+        assert other.time == pytest.approx(one.time, rel=0, abs=allowed)
+        assert other.resumed == pytest.approx(one.resumed, rel=0, abs=allowed, nan_ok=True)
+        assert_near(one.after, other.after, 1e3 * within)
+    assert theirs.time == pytest.approx(ours.time, rel=0, abs=allowed)
+    assert_near(ours.final, theirs.final, 1e3 * within)
+
+
+def assert_near(ours: Sequence[float], theirs: Sequence[float], within: float) -> None:
+    """Each state, relative to the largest, of those that both have."""
+    if not ours or not len(theirs) or any(map(isnan, ours)):
+        return
+    size = max(1.0, *map(abs, ours))
+    assert list(theirs)[: len(ours)] == pytest.approx(list(ours), rel=0, abs=within * size)
+
+
+def by_jax(model: Any, folder: Path, **arguments: Any) -> Outcome:
+    """A module for JAX."""
+    from export.jax_modules import imported, jitted
+
+    module = imported(model, folder, **arguments)
+    found = jitted(lambda: module.simulate(transitions=512))()
+    names = [module.MODEL.edges[int(k)].name for k in found.edges if k >= 0]
+    rows = zip(names, found.times, found.resumed, found.after, strict=False)
+    made = [Made(name, float(t), float(resumed), after.tolist()) for name, t, resumed, after in rows]
+    made += [Made("", NAN, NAN)] * (int(found.count) - len(made))
+    return Outcome(made, module.STOPS[int(found.stop)], float(found.t), found.x.tolist())
+
+
+def by_octave(model: Any, folder: Path, **arguments: Any) -> Outcome:
+    """Functions for MATLAB, run by GNU Octave."""
+    return octave_run(folder, f"r = {exported(model, folder, **arguments)}_run();")
+
+
+def octave_run(folder: Path, statement: str) -> Outcome:
+    """What a statement gives that makes a run ``r`` of functions in a folder."""
+    *lines, last = (line.split("\t") for line in evaluated(folder, statement + PRINT).splitlines())
+    made = [Made(edge, float(t), float(resumed), [*map(float, after.split())]) for _, edge, t, resumed, after in lines]
+    return Outcome(made, last[1], float(last[2]), [*map(float, last[3].split())])
+
+
+# the final state is that of the last row, behind the mode's number
+PRINT = """
+for k = 1:numel(r.transitions)
+  e = r.transitions(k);
+  fprintf('T\\t%s\\t%.17g\\t%.17g\\t', e.edge, e.time, e.resumed);
+  fprintf('%.17g ', e.after);
+  fprintf('\\n');
+end
+fprintf('E\\t%s\\t%.17g\\t', r.stop, r.t(end));
+fprintf('%.17g ', r.x(end, 2:end));
+fprintf('\\n');
+"""
+
+
+def by_rust(model: Any, folder: Path, **arguments: Any) -> Outcome:
+    """A crate for Rust."""
+    write(files_of(source_of(model, arguments), "rust"), folder, force=True)
+    *lines, last = cargo(folder, "run", "-q", "--example", "transitions").splitlines()
+    made = list[Made]()
+    for line in lines:
+        _, time, resumed, rest = line.split(" ", 3)
+        edge, _, after = rest.rpartition(" [")
+        made.append(Made(edge, float(time), float(resumed), numbers(after)))
+    reason, time, rest = last.split(" ", 2)
+    stop = "".join(f"_{c.lower()}" if c.isupper() else c for c in reason)[1:]
+    return Outcome(made, stop, float(time), numbers(rest.rpartition(" [")[2]))
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers of a vector that Rust prints, without its first bracket."""
+    return [float(word) for word in text.rstrip("]").split(", ") if word]
+
+
+def cargo(crate: Path, *words: str) -> str:
+    """What cargo prints; crates are built once, and not debugged."""
+    environment = {**os.environ, "CARGO_NET_OFFLINE": "true", "RUSTFLAGS": "-D warnings"}
+    environment |= {"CARGO_INCREMENTAL": "0", "CARGO_PROFILE_DEV_DEBUG": "0"}
+    made = subprocess.run(["cargo", *words], cwd=crate, env=environment, capture_output=True, text=True)
+    assert made.returncode == 0, made.stderr
+    return made.stdout
+
+
+OF_TOOLS = {"matlab": OCTAVE, "rust": which("cargo")}
+BY: dict[str, Callable[..., Outcome]] = {"jax": by_jax, "matlab": by_octave, "rust": by_rust}
