@@ -83,7 +83,8 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
             found, z, stages, end = attempt(t, h, t1, x, slope)
             if estimate and end is not None and not isinstance(found, StepFailure):
                 ratio = error_ratio(run, here, method, estimate(h, stages, end), t, h, x, z)
-                found = assess(here, found, ratio, Trial(t, h, t1, x, slope, z, stages, here.kernel.flow, method))
+                trial = Trial(t, h, t1, x, slope, z, stages, here.kernel.flow, method)
+                found = assess(here, found, ratio, trial, run.settings.relaxation)
             if not isinstance(found, StepFailure):
                 break
             failure = found
@@ -145,11 +146,9 @@ def attempts(run: Run, here: ModeState, method: Stepper) -> Attempt:
     return attempt
 
 
-def assess(here: ModeState, found: Found, ratio: Number, trial: Trial) -> Found:
+def assess(here: ModeState, found: Found, ratio: Number, trial: Trial, epsilon: Number) -> Found:
     """Look again at an adaptive step that ended where it may: its error, and whether it left the domain on the way."""
-    if ratio > 1:
-        return TOO_WRONG
-    return found or here.surfaces.excursion(trial) or ()
+    return TOO_WRONG if ratio > 1 else here.surfaces.excursion(trial, epsilon) or found
 
 
 def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:

@@ -249,10 +249,10 @@ class Surfaces:
             size = size + abs(g) * abs(f)
         return rate > ROUNDOFF_UNITS * self.arithmetic.unit * size
 
-    def excursion(self, trial: Trial) -> StepFailure | None:
-        """Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant.
+    def excursion(self, trial: Trial, epsilon: Number) -> StepFailure | None:
+        """Look for a surface that a step went beyond and came back from, on its interpolant.
 
-        Only where the step starts on it, or the flow points out of it there, and back in at its end; for adaptive
+        Only where the step starts on it, or the flow points out of it there and back in at its end; for adaptive
         steps, whose length nobody chose.
         """
         if trial.end_slope is None:
@@ -261,7 +261,7 @@ class Surfaces:
             try:
                 out = self._rate(gradient(trial.t, *trial.x), trial.slope)
                 back = self._rate(gradient(trial.t1, *trial.z), trial.end_slope)
-                if (out > 0 or k in self.active) and back <= 0 and self._beyond_within(trial, k):
+                if (k in self.active or out > 0 >= back) and self._beyond_within(trial, k, epsilon):
                     return StepFailure("deep", k)
             except DOMAIN_ERRORS:
                 continue
@@ -273,14 +273,30 @@ class Surfaces:
             total = total + g * f
         return total
 
-    def _beyond_within(self, trial: Trial, k: int) -> bool:
-        if self.kernel.surfaces(trial.t, *trial.x)[k] > self.roundoff_bound(k, trial.t, trial.x):
-            return False  # transparent, and beyond already
-        for i in range(1, SCAN):
-            s = (self.arithmetic.zero + i) / SCAN
-            t, x = trial.t + s * trial.h, at(trial.x, trial.piece, s)
-            if self.kernel.surfaces(t, *x)[k] > self.roundoff_bound(k, t, x):
-                return k >= len(self.edges) or bool(self.kernel.conditions[k](t, *x)[0])
+    def _beyond_within(self, trial: Trial, k: int, epsilon: Number) -> bool:
+        """Whether a step is beyond surface k on the way: at its eighths, and then ever nearer around the highest point.
+
+        That ends where a concave surface could not reach zero, or a visit would not last as long as epsilon. Whether an
+        `if` holds where it begins is seen by a step that ends in it.
+        """
+        zero, top = self.arithmetic.zero, self.kernel.surfaces(trial.t, *trial.x)[k]
+        end = self.kernel.surfaces(trial.t1, *trial.z)[k]
+        if top > self.roundoff_bound(k, trial.t, trial.x) or end > self.roundoff_bound(k, trial.t1, trial.z):
+            return False  # transparent, and beyond already, or crossed
+        place, width, middles = zero, (zero + 1) / SCAN, [(zero + i) / SCAN for i in range(1, SCAN)]
+        while middles:
+            crest, least = top, top
+            for s in middles:
+                t, x = trial.t + s * trial.h, at(trial.x, trial.piece, s)
+                r = self.kernel.surfaces(t, *x)[k]
+                if r > 0 and r > self.roundoff_bound(k, t, x):
+                    return True
+                place, top, least = (s, r, least) if r > top else (place, top, min(least, r))
+            within = len(middles) == 2 and top == crest
+            if not width * trial.h > epsilon or (within and top + (top - least) <= 0):
+                break
+            width = width / 2
+            middles = [s for s in (place - width, place + width) if 0 < s < 1]
         return False
 
     def judge(self, trial: Trial, values: Vector, epsilon: Number, next_: Condition) -> list[Crossing] | StepFailure:

@@ -137,7 +137,7 @@ static int condition(hs_run *run, int k, hs_time t, const hs_real *x);
 static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found);
 static int ends(hs_run *run, hs_trial *trial);
 static int piece_of(hs_run *run, hs_trial *trial);
-static hs_found excursion(hs_run *run, hs_trial *trial);
+static hs_found excursion(hs_run *run, hs_trial *trial, hs_found found);
 HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *piece, int k, hs_real a, hs_real fa,
                             hs_real b, hs_real fb, hs_real small, hs_real unit, hs_real *theta);
 static int judge(hs_run *run, const hs_real *values, hs_found *found);

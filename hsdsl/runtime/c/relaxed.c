@@ -127,10 +127,7 @@ static int flow(hs_run *run) {
       if (adaptive && run->trial.ends && found.failure == HS_CLEAR) {
         local_error(run, h);
         ratio = error_ratio(run, h);
-        if (ratio > 1)
-          found = TOO_WRONG;
-        else if (!found.crossings)
-          found = excursion(run, &run->trial);
+        found = ratio > 1 ? TOO_WRONG : excursion(run, &run->trial, found);
       }
       if (found.failure == HS_CLEAR) break;
       last = found;

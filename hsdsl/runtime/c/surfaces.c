@@ -226,18 +226,38 @@ static int piece_of(hs_run *run, hs_trial *trial) {
   return 0;
 }
 
+/* Whether a step is beyond surface k on the way: at its eighths, and then ever nearer around the highest point. */
 static int beyond_within(hs_run *run, hs_trial *trial, int k) {
-  const hs_mode *mode = run->here.table;
-  hs_real r, noise;
-  if (surface(run, k, trial->t, run->x, &r) || roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
-  if (r > noise) return 0; /* transparent, and beyond already */
-  for (int i = 1; i < SCAN; i++) {
-    const hs_real s = (0.0 + i) / SCAN;
-    const hs_time t = trial->t + s * trial->h;
-    if (piece_of(run, trial)) return RAISED;
-    at(run, &trial->piece, s, run->at);
-    if (surface(run, k, t, run->at, &r) || roundoff_bound(run, k, t, run->at, 0, &noise)) return RAISED;
-    if (r > noise) return k >= mode->edges ? 1 : condition(run, k, t, run->at);
+  hs_real top, r, noise, place = 0.0, width = 1.0 / SCAN, shares[SCAN];
+  if (surface(run, k, trial->t, run->x, &top) || surface(run, k, trial->t1, run->z, &r)) return RAISED;
+  if (roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
+  if (top > noise) return 0; /* transparent, and beyond already */
+  if (roundoff_bound(run, k, trial->t1, run->z, 0, &noise)) return RAISED;
+  if (r > noise) return 0; /* crossed */
+  int count = SCAN - 1;
+  for (int i = 1; i < SCAN; i++) shares[i - 1] = (0.0 + i) / SCAN;
+  while (count) {
+    const hs_real crest = top;
+    hs_real least = top;
+    for (int i = 0; i < count; i++) {
+      const hs_real s = shares[i];
+      const hs_time t = trial->t + s * trial->h;
+      if (piece_of(run, trial)) return RAISED;
+      at(run, &trial->piece, s, run->at);
+      if (surface(run, k, t, run->at, &r)) return RAISED;
+      if (r > 0 && roundoff_bound(run, k, t, run->at, 0, &noise)) return RAISED;
+      if (r > 0 && r > noise) return 1;
+      if (r > top)
+        place = s, top = r;
+      else
+        least = r < least ? r : least;
+    }
+    const int within = count == 2 && top == crest;
+    if (!(width * trial->h > run->epsilon) || (within && top + (top - least) <= 0)) break;
+    width = width / 2;
+    count = 0;
+    if (place - width > 0 && place - width < 1) shares[count++] = place - width;
+    if (place + width > 0 && place + width < 1) shares[count++] = place + width;
   }
   return 0;
 }
@@ -251,17 +271,17 @@ static int rate_along(hs_run *run, int k, hs_time t, const hs_real *x, const hs_
   return 0;
 }
 
-/* Look for a surface that a step from inside to inside went beyond and came back from, on its interpolant. */
-static hs_found excursion(hs_run *run, hs_trial *trial) {
-  if (!ends(run, trial)) return CLEAR;
+/* Look for a surface that a step went beyond and came back from, on its interpolant: its failure, or what was found. */
+static hs_found excursion(hs_run *run, hs_trial *trial, hs_found found) {
+  if (!ends(run, trial)) return found;
   for (int k = 0; k < run->here.table->surfaces; k++) {
     hs_real out, back;
     if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
     if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
-    const int leaves = out > 0 || run->active_surfaces[k];
-    if (leaves && back <= 0 && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
+    const int looked = run->active_surfaces[k] || (out > 0 && 0 >= back);
+    if (looked && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
   }
-  return CLEAR;
+  return found;
 }
 
 static int on_piece(hs_run *run, const hs_polynomial *piece, int k, hs_real s, hs_real *r) {

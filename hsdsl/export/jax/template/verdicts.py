@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
+from jax import lax
 
 from .control import cut, error_ratio
 from .functions import chosen, frozen, with_derivatives_of
 from .lane import DEEP, FLAT, VALUE, WALL, scaled
 from .model import Bound, noise_of, norm_of
 from .steps import at, error_of, piece_of, secant, slope_at, step
-from .surfaces import SCAN
+from .surfaces import SCAN, each_at
 
 
 class Trial(NamedTuple):
@@ -138,17 +139,34 @@ def judged(model, config, lane, trial, ends):
     return finite, bad.any(), kind, blocked, crosses.any()
 
 
-def excursion(model, lane, trial, ends):
-    """Surfaces that an adaptive step went beyond and came back from."""
+def excursion(model, config, bound, lane, trial, ends):
+    """Surfaces that an adaptive step went beyond and came back from: at its eighths, then nearer around the highest."""
 
     def rate(facts, flow):
         return facts.gradients[:, 0] + facts.gradients[:, 1:] @ flow
 
     out, back = rate(ends.first, trial.stages[0]), rate(ends.last, trial.end)
-    noise = noise_of(ends.shares, ends.times, ends.states, scaled(model, lane))
-    seen = (ends.shares.values > noise) & ends.shares.conditions
-    first = ends.first.values > ends.first_noise
-    return ((out > 0) | lane.active) & (back <= 0) & seen[1:].any(axis=0) & ~first
+    outside = (ends.first.values > ends.first_noise) | (ends.last.values > ends.last_noise)
+    looked = (lane.active | ((out > 0) & (back <= 0))) & ~outside
+    values, noise = ends.shares.values, noise_of(ends.shares, ends.times, ends.states, scaled(model, lane))
+    seen = (values > noise)[1:].any(axis=0)
+    noise = jnp.maximum(ends.first_noise, ends.last_noise)
+
+    def nearer(state):
+        place, crest, width, going, seen = state
+        width, top, least, sides = width / 2, crest, crest, jnp.full(going.shape, True)
+        for s in (place - width, place + width):
+            within = (s > 0) & (s < 1)
+            r = jnp.where(within, each_at(bound, lane.mode, trial.t, trial.h, trial.x, trial.piece, s), top)
+            seen, sides = seen | (going & (r > noise)), sides & within
+            place, top, least = jnp.where(r > top, s, place), jnp.maximum(r, top), jnp.minimum(r, least)
+        clear = sides & (top == crest) & (top + (top - least) <= 0)
+        return place, top, width, going & ~clear & ~seen & (width * trial.h > config.relaxation), seen
+
+    going = looked & ~seen & (trial.h / SCAN > config.relaxation)
+    state = jnp.argmax(values, axis=0) / SCAN, values.max(axis=0), jnp.asarray(1 / SCAN), going, seen
+    *_, seen = lax.while_loop(lambda state: state[3].any(), nearer, state)
+    return looked & seen
 
 
 def relaxed_verdict(model, config, bound, lane, trial):
@@ -162,8 +180,8 @@ def relaxed_verdict(model, config, bound, lane, trial):
         error = error_of(model.method, trial.h, trial.stages, trial.end)
         lane, ratio = error_ratio(model, config, lane, motion(bound, lane), trial.h, error, trial.z)
         wrong = ~failed & trial.ends & ~(ratio <= 1)
-        away = excursion(model, lane, trial, ends)
-        back = away.any() & ~failed & ~wrong & ~crosses
+        away = excursion(model, config, bound, lane, trial, ends)
+        back = away.any() & ~failed & ~wrong
         kind, blocked = jnp.where(back, DEEP, kind), jnp.where(back, jnp.argmax(away), blocked)
         failed = failed | back
     kind = jnp.where(finite, kind, VALUE)

@@ -61,10 +61,8 @@ impl<S: Sink> Run<'_, S> {
                     ratio = self.error_ratio(length);
                     if ratio > 1.0 {
                         found = Err(Failure::TooWrong);
-                    } else if found.as_ref().map_or(false, |f| f.count == 0) {
-                        if let Some(failure) = self.excursion() {
-                            found = Err(failure);
-                        }
+                    } else if let Some(failure) = self.excursion() {
+                        found = Err(failure);
                     }
                 }
                 match found {

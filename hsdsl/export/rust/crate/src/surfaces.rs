@@ -186,7 +186,7 @@ impl<S> Run<'_, S> {
         self.surface(k, self.trial.t + s * self.trial.h, &piece.at(&self.x, self.dimension, s))
     }
 
-    /// A surface that a step from inside to inside went beyond and came back from, on its interpolant.
+    /// A surface that a step went beyond and came back from, on its interpolant.
     pub(crate) fn excursion(&mut self) -> Option<Failure> {
         if !self.ends() {
             return None;
@@ -195,8 +195,8 @@ impl<S> Run<'_, S> {
             let out = self.rate_along(k, self.trial.t, &self.x, &self.slope);
             let back = self.rate_along(k, self.trial.t1, &self.z, &self.end);
             if let (Some(out), Some(back)) = (out, back) {
-                let leaves = out > 0.0 || self.active[k];
-                if leaves && 0.0 >= back && self.beyond_within(k) == Some(true) {
+                let looked = self.active[k] || (out > 0.0 && 0.0 >= back);
+                if looked && self.beyond_within(k) == Some(true) {
                     return Some(Failure::Deep(k));
                 }
             }
@@ -209,17 +209,42 @@ impl<S> Run<'_, S> {
         Some((0..self.dimension).fold(g[0], |rate, s| rate + g[s + 1] * flow[s]))
     }
 
+    /// Whether a step is beyond surface k on the way: at its eighths, and then ever nearer around the highest point.
     fn beyond_within(&mut self, k: usize) -> Option<bool> {
-        let (t, h, x) = (self.trial.t, self.trial.h, self.x);
-        if self.surface(k, t, &x)? > self.roundoff(k, t, &x, false)? {
-            return Some(false); // transparent, and beyond already
+        let (t, h, x, t1, z) = (self.trial.t, self.trial.h, self.x, self.trial.t1, self.z);
+        let (mut place, mut top, mut width) = (0.0, self.surface(k, t, &x)?, 1.0 / SCAN as f64);
+        if top > self.roundoff(k, t, &x, false)? || self.surface(k, t1, &z)? > self.roundoff(k, t1, &z, false)? {
+            return Some(false); // transparent, and beyond already, or crossed
         }
+        let (mut shares, mut count) = ([0.0; SCAN], SCAN - 1);
         for i in 1..SCAN {
-            let s = i as f64 / SCAN as f64;
-            let point = self.piece()?.at(&x, self.dimension, s);
-            let time = t + s * h;
-            if self.surface(k, time, &point)? > self.roundoff(k, time, &point, false)? {
-                return if k >= self.here().edges.len() { Some(true) } else { self.condition(k, time, &point) };
+            shares[i - 1] = i as f64 / SCAN as f64;
+        }
+        while count > 0 {
+            let (crest, mut least) = (top, top);
+            for s in &shares[..count] {
+                let (time, point) = (t + s * h, self.piece()?.at(&x, self.dimension, *s));
+                let r = self.surface(k, time, &point)?;
+                if r > 0.0 && r > self.roundoff(k, time, &point, false)? {
+                    return Some(true);
+                }
+                if r > top {
+                    (place, top) = (*s, r);
+                } else if r < least {
+                    least = r;
+                }
+            }
+            let within = count == 2 && top == crest;
+            if !(width * h > self.settings.relaxation) || (within && top + (top - least) <= 0.0) {
+                break;
+            }
+            width /= 2.0;
+            count = 0;
+            for s in [place - width, place + width] {
+                if s > 0.0 && s < 1.0 {
+                    shares[count] = s;
+                    count += 1;
+                }
             }
         }
         Some(false)
