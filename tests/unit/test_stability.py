@@ -93,6 +93,17 @@ def test_explicit_runs_blow_up_beyond_the_limit_and_only_there() -> None:
                     assert word == "converged" and panel.cells[j][i].error < 0.05
 
 
+def test_errors_of_converged_runs_fall_with_the_order_of_the_method() -> None:
+    falling = "modes: {m: {flow: {x: v, v: -x}, transitions: [{when: x <= -1/2, to: m, reset: {v: -v}}]}}"
+    text = f"hsdsl: 1\n{falling}\ninitial: {{mode: m, x: 1, v: 0}}\nexperiment: {{until: 3, scheme: located}}"
+    found = stability_map(
+        hsdsl.loads(text), "h=1e-2:1e-1:2,initial.v=0:1e-2:2:lin", methods=["midpoint", "rk4"], with_rho=False
+    )
+    for panel, order in zip(found.panels, (2, 4), strict=True):
+        errors = np.array([[cell.error for cell in row] for row in panel.cells])
+        assert np.log10(errors[:, 1:] / errors[:, :-1]) == pytest.approx(order, abs=0.4), panel.tool.method
+
+
 def bench(text: str, rho: bool = False) -> Bench:
     return Bench(hsdsl.loads(text), {"parameters": {}, "initial": {}, "settings": {}}, rho)
 

@@ -8,12 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import isfinite, nan
+from math import inf, isfinite, nan
 from typing import Any
 
-from hsdsl.chart.outcome import Outcome, Tolerance, outcome
+import numpy as np
+
+from hsdsl.chart.outcome import Tolerance, outcome, spans
 from hsdsl.chart.peers import prepare
-from hsdsl.chart.result import Refused, Tool
+from hsdsl.chart.result import Refused, Result, Tool
 from hsdsl.chart.scene import Scene
 from hsdsl.errors import UsageError
 from hsdsl.exact import reference
@@ -37,7 +39,10 @@ RAN_AWAY = ("not_finite", "left_domain")
 
 @dataclass(frozen=True)
 class Cell:
-    """What came of a run: a word of :data:`WORDS`, ``rho`` (at most) or NaN, the samples' error, and why."""
+    """What came of a run: a word of :data:`WORDS`, ``rho`` (at most) or NaN, the error of samples, and why.
+
+    Of converged runs samples near jumps of the reference do not count; of others times that are near are compared.
+    """
 
     word: str
     rho: float = nan
@@ -112,8 +117,7 @@ class Bench:
         given |= {key: value for key, value in arguments.items() if key not in given}
         chosen = {"scheme": tool.scheme or None, "method": tool.method or None, "settings": self.base.get("settings")}
         run = self.model.simulate(**chosen, **given)
-        found = outcome(scene, scene.result(run), WITHIN)
-        cell = _cell(scene, found, run.stop.reason)
+        cell = _cell(scene, scene.result(run), run.stop.reason)
         if cell.word in (CONVERGED, INACCURATE) and not _same_transitions(scene, run):
             cell = replace(cell, word=OTHER, why="other transitions")
         if self.with_rho and cell.word in (CONVERGED, INACCURATE) and len(run.times) <= MOST_ROWS:
@@ -129,22 +133,30 @@ class Bench:
         return rho.upper if isfinite(rho.upper) and rho.upper - rho.lower <= LOOSE * rho.upper else nan
 
     def _peer(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
-        found = outcome(scene, prepare(tool.name, scene)(arguments.get("tolerance", PEER_TOLERANCE)), WITHIN)
-        return _cell(scene, found, "stopped")
+        return _cell(scene, prepare(tool.name, scene)(arguments.get("tolerance", PEER_TOLERANCE)), "stopped")
 
 
-def _cell(scene: Scene, found: Outcome, reason: str) -> Cell:
-    """The word of an outcome."""
+def _cell(scene: Scene, result: Result, reason: str) -> Cell:
+    """The outcome of a run in a word."""
+    found = outcome(scene, result, WITHIN)
     if found.word == "stops":
         word = BLOWN_UP if reason in RAN_AWAY or found.error > LARGE else STUCK
     elif found.word == "right":
-        word = CONVERGED
+        return Cell(CONVERGED, nan, _error_between_jumps(scene, result), found.transitions, found.why)
     elif found.error > LARGE:
         word = BLOWN_UP
     else:
         counted = found.transitions is not None
         word = OTHER if "transition" in found.why or ("mode" in found.why and not counted) else INACCURATE
     return Cell(word, nan, found.error, found.transitions, found.why)
+
+
+def _error_between_jumps(scene: Scene, result: Result) -> float:
+    """The largest difference of a sample, as a share of the state's span; NaN where jumps are near all of them."""
+    jumps = np.array([float(t.time) for t in scene.exact.transitions])
+    near = np.abs(scene.grid[:, None] - jumps).min(axis=1, initial=inf) <= WITHIN.time * scene.grid[-1]
+    apart = (np.abs(scene.exact_values - result.values) / spans(scene))[~near]
+    return float(np.fmax.reduce(apart, axis=None, initial=nan))
 
 
 def _same_transitions(scene: Scene, run: Execution) -> bool:
