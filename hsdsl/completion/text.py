@@ -166,8 +166,8 @@ def _flow(mode: Mode) -> dict[str, str]:
 
 
 def _reduced(value: sp.Expr) -> sp.Expr:
-    """The same expression, with common factors cancelled where that is cheap."""
-    return value if value.count_ops() > LONG else sp.cancel(value)
+    """The same expression, with common factors cancelled where that is cheap and makes it shorter."""
+    return value if value.count_ops() > LONG else min((value, sp.cancel(value)), key=sp.count_ops)
 
 
 def _rest(mode: Mode, system: HybridSystem) -> Iterator[str]:

@@ -13,6 +13,7 @@ from hsdsl.calls import checks_methods
 from hsdsl.execution import Array, Execution
 from hsdsl.fitting.data import Measurements
 from hsdsl.names import called, visible
+from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
 
@@ -30,7 +31,7 @@ class Fit:
         Of the values in their order: from the standard deviations of the measurements where these were given, else from
         what is left over. Infinite where the measurements do not determine a value.
     residuals : dict of array
-        What the run is above each measurement, by column; NaN where nothing was measured.
+        What the run is above each measurement, by column; NaN where nothing was measured, or the run has ended.
     deviation : float
         The root of the weighted mean square of residuals, over the degrees of freedom.
     success : bool
@@ -97,7 +98,7 @@ class Fit:
             yield f"  {name:{width}}  {number(value, 12 if determined else 3)} {known}{bound}"
         yield f"left over: {number(self.deviation, 4)} (weighted root mean square)"
         yield f"{'ended' if self.success else 'did not end'} well: {self.message}"
-        yield from (f"not smooth: {reason}" for reason in self.nonsmooth)
+        yield from (f"not smooth: {reason}" for reason in condensed(self.nonsmooth))
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the measurements and the run to a .png or .svg file."""

@@ -20,7 +20,7 @@ Evaluate = Callable[[Mapping[str, float], float], Sensitivity]
 Progress = Callable[[int, Mapping[str, float], float], None]
 SHARES = (0.25, 0.5)  # of the time: fits of the beginning of the measurements, from which the whole is tried as well
 PRECISE = 1e-15  # changes of values and of the sum that end a fit
-TOO_FAR = 1e3  # the weighted residual of a run that ends before a measurement
+TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends before a measurement
 UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
 MOST_NAMED = 3
 TIE = 1e-12  # of a run: times that are no further apart are one
@@ -78,10 +78,11 @@ class Objective:
         slopes: list[Array] = []
         for name, column in self.measured.columns.items():
             weight, known = self.weights[name], np.isfinite(column)
-            off, moves = np.full(len(times), TOO_FAR), np.zeros((len(times), len(self.start)))
+            far = TOO_FAR * max(1.0, weight * float(np.max(np.abs(column[known]), initial=0.0)))
+            off, moves = np.full(len(times), far), np.zeros((len(times), len(self.start)))
             if table is not None and name in table.values:
                 there = np.asarray(table.values[name], float)
-                off[reached] = np.where(np.isfinite(there), weight * (there - column[reached]), TOO_FAR)
+                off[reached] = np.where(np.isfinite(there), weight * (there - column[reached]), far)
                 moves[reached] = np.nan_to_num(weight * np.asarray(table.slopes[name], float), posinf=0, neginf=0)
             residuals.append(off[known])
             slopes.append(moves[known])
@@ -154,15 +155,21 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
     covariance = _covariance(slopes) * (1.0 if sigma else variance)
     values = objective.named(x)
     at = tuple(name for name, value in values.items() if value in bounds[name])
-    table = found.as_made().sample(objective.measured.times)
-    measured = objective.measured.columns.items()
+    times, run = objective.measured.times, found.execution
+    reached = times <= float(run.times[-1])
+    table = found.as_made().sample(times[reached])
+    measured = objective.measured.columns
+    left_over = {name: np.full(len(times), np.nan) for name in measured}
+    for name, column in measured.items():
+        left_over[name][reached] = np.asarray(table.values[name], float) - column[reached]
+    ends = f"the run ends at t = {show(run.times[-1])} ({run.stop.reason}), before the last measurement"
     return Fit(
         values,
         covariance,
-        {name: np.asarray(table.values[name], float) - column for name, column in measured},
+        left_over,
         variance**0.5,
-        bool(result.success),
-        str(result.message),
+        bool(result.success) and bool(reached.all()),
+        str(result.message) if reached.all() else ends,
         objective.evaluations,
         at,
         (*_close_transitions(found, objective.measured, covariance), *objective.bumps),

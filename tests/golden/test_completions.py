@@ -438,3 +438,27 @@ def test_derivatives_go_through_sliding() -> None:
             arguments: Any = {group: {key: value + sign * small}, "tolerance": 1e-13}
             ends.append(model.simulate(**arguments).final.state["x"])
         assert slopes[name] == pytest.approx((ends[0] - ends[1]) / (2 * small), abs=1e-8)
+
+
+def test_written_sliding_is_no_longer_than_it_has_to_be() -> None:
+    """Multiplied out, its flow would have 4,100 characters; that of others more than an expression may have."""
+    outside = "y: -0.6*y - sin(y + 1.8*t)/2 - 0.4*x*y"
+    text = f"""
+hsdsl: 1
+modes:
+  a:
+    flow: {{x: 2 - 1.4*x, "{outside} + y**2/4 - x**2/8 - 1.4*cos(2*y)"}}
+    transitions: [{{when: x >= 0.4*sin(2*y) + 0.5, to: b}}]
+  b:
+    flow: {{x: -2 - 1.4*x, "{outside} + 1.4*cos(2*y)"}}
+    transitions: [{{when: x <= 0.4*sin(2*y) + 0.5, to: a}}]
+initial: {{mode: a, x: -0.5, y: -0.5}}
+experiment: {{until: 3, completion: auto}}
+""".replace('"y: ', 'y: "')
+    model = hsdsl.loads(text)
+    written = model.completed()
+    assert written is not None
+    assert max(map(len, written.splitlines())) < 1000
+    run, again = model.simulate(tolerance=1e-11), hsdsl.loads(written).simulate(tolerance=1e-11)
+    assert [made.edge for made in run.transitions] == [made.edge for made in again.transitions]
+    assert again.final.state == pytest.approx(run.final.state, rel=1e-9)

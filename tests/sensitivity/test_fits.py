@@ -154,6 +154,29 @@ def test_a_measurement_at_a_time_that_no_value_moves_is_not_named() -> None:
     assert replace(fit, units={"A": "mg"})._repr_html_() != shown  # the picture has the unit
 
 
+ENDING = """
+hsdsl: 1
+parameters: {p: 0.9}
+modes:
+  grow: {flow: {x: p}, transitions: [{when: x >= 1, to: done}]}
+  done: {final: true}
+initial: {mode: grow, x: 0}
+experiment: {until: 2}
+"""
+
+
+def test_a_run_that_ends_early_is_worse_than_any_measurement(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At p = 1.8 the first measurement is met, and the run has ended before the second."""
+    data = {"t": [0.5, 1.0], "x": [0.9, 0.95]}
+    found = hsdsl.loads(ENDING).fit(data, "p", sigma={"x": 1e-5})
+    assert found.values["p"] == pytest.approx(1, abs=1e-6)  # the nearest to 0.9*2 at which the run does not end
+    monkeypatch.setattr("hsdsl.fitting.least_squares.TOO_FAR", 1e-9)
+    ended = hsdsl.loads(ENDING).fit(data, "p", sigma={"x": 1e-5})
+    assert not ended.success
+    assert "before the last measurement" in ended.message
+    assert np.isnan(ended.residuals["x"]).tolist() == [False, True]
+
+
 def test_progress(model: Any, samples: dict[str, Any]) -> None:
     answer: list[float] = []
     model.fit({"t": samples["t"], "x": samples["x"]}, "c", progress=lambda runs, values, total: answer.append(total))
