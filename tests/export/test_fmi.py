@@ -209,8 +209,12 @@ experiment: {until: 3}
 """
 
 
+CASES = Path(__file__).parents[1] / "conformance/cases"
+LIFTED = (CASES / "m11-lifted-by-a-jump.yaml").read_text()
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("text", [ROLLING, RIDGE], ids=["rolling", "released"])
+@pytest.mark.parametrize("text", [ROLLING, RIDGE, LIFTED], ids=["rolling", "released", "lifted"])
 @pytest.mark.parametrize("kind", ["ModelExchange", "CoSimulation"])
 def test_what_a_guard_holds_moves_along_it_until_it_is_released(text: str, kind: str, made: Any) -> None:
     run = loaded(text).simulate()

@@ -93,14 +93,27 @@ static int push_of(const hs_mode *mode, int k, const double *p, double t, const 
   return 0;
 }
 
+/* Whether surface k ends the motion along the guard that holds the state. */
+static int lets_go(const fmu *unit, int k) {
+  const fmu_data *now = &unit->now;
+  const hs_mode *mode = fmu_table(unit);
+  if (now->resting < 0 || k >= mode->edges) return 0;
+  return mode->edge[k].releases == hs_the_model.mode[now->mode].edge[now->resting].contact;
+}
+
+/* Whether a state may be beyond surface k without having crossed it. */
+static int may_be_beyond(const fmu *unit, int k) {
+  const hs_mode *mode = fmu_table(unit);
+  return k < mode->edges && mode->edge[k].conditional && !lets_go(unit, k);
+}
+
 /* The indicator of surface k. */
 static int indicator(const fmu *unit, int k, const double *p, const double *x, const double *r, double *z) {
   const fmu_data *now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
-  const int plain = k < mode->edges && mode->edge[k].conditional;
   double rate;
   *z = (now->outside[k] ? now->margin[k] / 4 : now->margin[k]) - r[k];
-  if (!plain && !rate_of(mode, k, p, now->time, x, &rate)) /* the flow may end at the surface */
+  if (!may_be_beyond(unit, k) && !rate_of(mode, k, p, now->time, x, &rate)) /* the flow may end at the surface */
     *z = hs_max(*z, -length_of() * rate);
   return !hs_finite(*z);
 }
@@ -170,7 +183,7 @@ static int entered_beyond(const fmu *unit, int k, double r) {
   const fmu_data *now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   const double noise = ROUNDOFF * now->margin[k];
-  if (k < mode->edges && mode->edge[k].conditional) return 0;
+  if (may_be_beyond(unit, k)) return 0;
   return r > now->margin[k] || (k < mode->edges && now->left_known && now->left[k] < -noise && r >= -noise);
 }
 
@@ -253,7 +266,7 @@ static int enter_surfaces(fmu *unit, double t, const hs_mode *before, const int 
   fmu_local(unit, x);
   if (mode->values(fmu_bind(unit), t, x, r)) return 0;
   for (int k = 0; k < mode->edges; k++)
-    now->outside[k] = mode->edge[k].conditional && r[k] > now->margin[k] && !(mode == before && crossed[k]);
+    now->outside[k] = may_be_beyond(unit, k) && r[k] > now->margin[k] && !(mode == before && crossed[k]);
   return 0;
 }
 
@@ -292,7 +305,7 @@ static int set_outside(fmu *unit, int jumped) {
   double r[PROBLEM_SURFACES + 1];
   if (values_now(unit, r)) return 1;
   for (int k = 0; k < mode->edges; k++)
-    if (mode->edge[k].conditional && (!jumped || !(now->left[k] > now->margin[k] / 2)))
+    if (may_be_beyond(unit, k) && (!jumped || !(now->left[k] > now->margin[k] / 2)))
       now->outside[k] = r[k] > now->margin[k] / 2;
   return 0;
 }
@@ -314,7 +327,7 @@ static const char *transitions(fmu *unit, int entry) {
     const int k = first_of(unit, p, x, r, entry);
     if (k < 0) return 0;
     if (k >= mode->edges) return "left_domain";
-    if (now->resting >= 0 && mode->edge[k].releases == hs_the_model.mode[now->mode].edge[now->resting].contact) {
+    if (lets_go(unit, k)) {
       now->resting = -1;
       if (enter_surfaces(unit, now->time, 0, 0)) return "not_finite";
       continue;
