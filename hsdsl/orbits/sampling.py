@@ -41,7 +41,8 @@ class OrbitalStability:
     Attributes
     ----------
     verdict : {"stable", "not stable", "undecided"}
-        Whether distances fall with the radius, as far as was sampled.
+        Whether distances fall with the radius, as far as was sampled: ``stable`` where their upper ends do, ``not
+        stable`` where their lower ends do not.
     sentence : str
         The verdict in words.
     exponent : float
@@ -99,12 +100,12 @@ def sampled(
         for way in ways:
             shift = dict(zip(wrt, (radius * scales * way).tolist(), strict=True))
             runs.append(Nearby(radius, shift, *look(shift)))
-    largest = [max(run.upper for run in runs if run.radius == radius) for radius in radii]
+    at = [[run for run in runs if run.radius == radius] for radius in radii]
+    least, largest = ([max(getattr(run, end) for run in each) for each in at] for end in ("lower", "upper"))
     exponent = _exponent(radii, largest)
-    verdict = "stable" if exponent >= FALLS else "not stable" if exponent <= STAYS else "undecided"
-    return OrbitalStability(
-        tuple(wrt), verdict, _sentence(verdict, radii, largest, exponent), exponent, tuple(runs), title
-    )
+    verdict = "stable" if exponent >= FALLS else "not stable" if _exponent(radii, least) <= STAYS else "undecided"
+    sentence = _sentence(verdict, radii, least, largest, exponent)
+    return OrbitalStability(tuple(wrt), verdict, sentence, exponent, tuple(runs), title)
 
 
 def _exponent(radii: Sequence[float], largest: Sequence[float]) -> float:
@@ -118,11 +119,15 @@ def _exponent(radii: Sequence[float], largest: Sequence[float]) -> float:
     return float(np.log(largest[-2] / largest[-1]) / np.log(radii[-2] / radii[-1]))
 
 
-def _sentence(verdict: str, radii: Sequence[float], largest: Sequence[float], exponent: float) -> str:
-    pairs = ", ".join(f"{number(d, 3)} at {number(r, 1)}" for r, d in zip(radii, largest, strict=True))
-    seen = f"the largest distances are {pairs} of the scales"
+def _sentence(
+    verdict: str, radii: Sequence[float], least: Sequence[float], largest: Sequence[float], exponent: float
+) -> str:
+    def seen(distances: Sequence[float]) -> str:
+        return ", ".join(f"{number(d, 3)} at {number(r, 1)}" for r, d in zip(radii, distances, strict=True))
+
+    found = f"the largest distances are {seen(largest)} of the scales"
     if verdict == "stable":
-        return f"orbitally stable, as far as was sampled: {seen}, falling with the power {exponent:.2g} of the radius"
+        return f"orbitally stable, as far as was sampled: {found}, falling with the power {exponent:.2g} of the radius"
     if verdict == "not stable":
-        return f"not orbitally stable: {seen}, and do not fall"
-    return f"undecided: {seen}"
+        return f"not orbitally stable: {found}, and do not fall"
+    return f"undecided: {found}, and at least {seen(least)}"

@@ -6,11 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hsdsl
 from hsdsl import UsageError
 from hsdsl.cli.verbs import obey
+from hsdsl.orbits.sampling import sampled
 
 CORNER = """
 hsdsl: 1
@@ -48,6 +50,22 @@ def test_verdicts(model: str, verdict: str) -> None:
         assert found.exponent == pytest.approx(1, abs=0.05)
     if model is GRAZING:  # the speed at the stop is the root of the excess energy
         assert found.exponent == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("lower", "upper", "verdict"),
+    [(1, 0, "not stable"), (1e-9, 0, "undecided"), (0, 0, "undecided"), (0, 1, "stable"), (1e-9, 0.5, "stable")],
+)
+def test_upper_ends_that_stay_prove_nothing(lower: float, upper: float, verdict: str) -> None:
+    """Distances through guards and resets that are not affine are intervals, of which only the lower end is proved."""
+
+    def look(shift: Any) -> tuple[float, float, tuple[str, ...]]:
+        radius = abs(shift["x"])
+        return (lower if lower == 1 else lower * radius, radius**upper, ())
+
+    found = sampled(["x"], np.ones(1), (1e-3, 1e-5, 1e-7), np.ones((1, 1)), look, "")
+    assert found.verdict == verdict
+    assert verdict in found.sentence or verdict == "not stable"
 
 
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
