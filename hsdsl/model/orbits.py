@@ -37,6 +37,11 @@ MOST_GUESSES = 6
 ENOUGH = 16  # times as many transitions as the guess makes, in a lap that another one is looked for
 SHORTER = "passages become ever shorter, so the execution ends in a point"
 NO_TIME = "Newton's method goes to where a passage takes no time"
+CLOSER = "begin closer to it with --set initial.NAME=VALUE, or try more laps"
+COMPLETE = (
+    f"{CLOSER}; where the run moves along a guard, give it the model that `hsdsl complete` writes, with "
+    "--set contact_time=1e-4"
+)
 SHRUNK = 1e-6  # a period below this share of the guess is none
 
 
@@ -200,10 +205,8 @@ class Orbits:
             except NotClosed as error:
                 problem = problem or str(error)
         problem = SHORTER if problem == NO_TIME and self._shortens(run) else problem
-        raise UsageError(
-            f"no periodic orbit was found near the run: {problem}{ending}",
-            "begin closer to it with --set initial.NAME=VALUE, or try more laps",
-        )
+        rests = any(mode.held is not None for mode in self.model.program.modes)
+        raise UsageError(f"no periodic orbit was found near the run: {problem}{ending}", COMPLETE if rests else CLOSER)
 
     def _shortens(self, run: Execution) -> bool:
         """Whether each passage of a run is shorter than the one before it."""

@@ -259,6 +259,40 @@ def test_multipliers_that_are_zero() -> None:
     assert "multipliers 0\nverdict     stable: the largest multiplier has the size 0," in orbit.summary
 
 
+TABLE = """
+hsdsl: 1
+parameters: {A: 0.14, w: 9, e: 0.3, g: 9.81}
+modes:
+  fly:
+    flow: {z: v, v: -g}
+    transitions:
+      - name: hit
+        when: z <= A*sin(w*t)
+        if: v < A*w*cos(w*t)
+        to: fly
+        reset: {v: -e*v + (1 + e)*A*w*cos(w*t)}
+initial: {mode: fly, z: 1, v: 0}
+experiment: {until: 8}
+"""
+
+
+def test_a_ball_that_rests_on_a_shaken_table() -> None:
+    """It is thrown where the table's acceleration is -g, after a rest that forgets the flights before."""
+    model = hsdsl.loads(TABLE)
+    with pytest.raises(UsageError) as refused:
+        model.orbit("hit")
+    assert "hsdsl complete" in str(refused.value.hint)
+    text = model.completed()
+    assert text is not None
+    orbit = hsdsl.loads(text).orbit("contact_fly_hit->fly", parameters={"contact_time": 1e-4})
+    thrown = np.arcsin(9.81 / (0.14 * 81)) / 9
+    assert orbit.verdict == "stable"
+    assert np.isclose(orbit.period, 2 * np.pi / 9, rtol=1e-12)
+    assert np.isclose(orbit.phase, thrown, rtol=1e-11)
+    assert np.allclose([orbit.state["z"], orbit.state["v"]], [9.81 / 81, 0.14 * 9 * np.cos(9 * thrown)], rtol=1e-11)
+    assert np.allclose(orbit.multipliers, 0, atol=1e-8)
+
+
 WORLD = """
 hsdsl: 1
 title: A monopod whose foot has a place in the world
