@@ -46,9 +46,11 @@ def measurements(given: Any, known: Sequence[str]) -> Measurements:
     if isinstance(given, Measurements):
         return given
     name, columns = _columns(given)
-    time = next((c for name in TIMES for c in columns if c.lower() == name and c not in known), None)
-    if time is None:
-        raise UsageError(f"{name}: expected a column t with the times, got {', '.join(columns) or 'none'}")
+    timed = [c for c in columns if c.lower() in TIMES and c not in known]
+    if len(timed) != 1:
+        got = "both " + " and ".join(timed) if timed else ", ".join(columns) or "none"
+        raise UsageError(f"{name}: expected a column t with the times, got {got}")
+    (time,) = timed
     measured = [c for c in columns if c != time and c not in HYBRID_TIME]
     for column in measured:
         if column not in known:

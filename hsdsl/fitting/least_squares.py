@@ -21,6 +21,7 @@ Progress = Callable[[int, Mapping[str, float], float], None]
 SHARES = (0.25, 0.5)  # of the time: fits of the beginning of the measurements, from which the whole is tried as well
 PRECISE = 1e-15  # changes of values and of the sum that end a fit
 TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends before a measurement
+LARGEST = 1e100  # the weighted size of a column: its residuals have squares
 UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
 MOST_NAMED = 3
 TIE = 1e-12  # of a run: times that are no further apart are one
@@ -63,6 +64,12 @@ class Objective:
                 self.progress(self.evaluations, self.named(x), float(np.sum(self._last[1] ** 2)))
         return self._last
 
+    def size(self, name: str) -> float:
+        """The largest size of a column, weighted."""
+        column = self.measured.columns[name]
+        with np.errstate(over="ignore"):
+            return float(self.weights[name] * np.max(np.abs(column[np.isfinite(column)]), initial=0.0))
+
     def named(self, x: Array) -> dict[str, float]:
         """Values by name."""
         return dict(zip(self.start, np.asarray(x, float).tolist(), strict=True))
@@ -78,7 +85,7 @@ class Objective:
         slopes: list[Array] = []
         for name, column in self.measured.columns.items():
             weight, known = self.weights[name], np.isfinite(column)
-            far = TOO_FAR * max(1.0, weight * float(np.max(np.abs(column[known]), initial=0.0)))
+            far = TOO_FAR * max(1.0, self.size(name))
             off, moves = np.full(len(times), far), np.zeros((len(times), len(self.start)))
             if table is not None and name in table.values:
                 there = np.asarray(table.values[name], float)
@@ -94,9 +101,12 @@ def fitted(
 ) -> Fit:
     """Fit; ``sigma`` says that weights are inverse standard deviations.
 
-    Raises UsageError: the run with the first values does not reach the measurements.
+    Raises UsageError: the run with the first values does not reach the measurements, or these are too large.
     """
     first = np.array([*objective.start.values()])
+    for name in objective.measured.columns:
+        if objective.size(name) > LARGEST:
+            raise UsageError(f"the numbers of column {name} are too large for its standard deviation or weight")
     _check_start(objective, first)
     results = [_solved(objective, first, bounds, scales)]
     begun = first
@@ -180,13 +190,14 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
 
 def _covariance(slopes: Array) -> Array:
     """The inverse of J^T J; infinite in directions that nothing determines."""
-    norms = np.linalg.norm(slopes, axis=0)
+    largest = np.max(np.abs(slopes), axis=0, initial=0.0)  # whose square may be too small for a number
+    norms = largest * np.linalg.norm(slopes / np.where(largest > 0, largest, 1.0), axis=0)
     scaled = slopes / np.where(norms > 0, norms, 1.0)
     _, sizes, rows = np.linalg.svd(scaled, full_matrices=False)
     known = sizes > UNKNOWN * sizes.max(initial=0.0)
     inverse = (rows[known].T / sizes[known] ** 2) @ rows[known]
     unknown = np.sum(rows[~known] ** 2, axis=0) > UNKNOWN
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         covariance = inverse / np.outer(norms, norms)
     for k in np.flatnonzero(unknown | (norms == 0)):
         covariance[k, :] = covariance[:, k] = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -188,6 +189,7 @@ def test_progress(model: Any, samples: dict[str, Any]) -> None:
     [
         ("t,y\n1,2\n", "no state or output 'y'"),
         ("x,v\n1,2\n", "expected a column t"),
+        ("t,time,x\n1,2,3\n", "expected a column t with the times, got both t and time"),
         ("t,x\n1,a\n", "column x, row 2, got 'a'"),
         ("t,x\n1\n", "row 2 has 1 cells"),
         ("t,x\n-1,2\n", "not negative"),
@@ -205,6 +207,15 @@ def test_bad_data(text: str, sentence: str, tmp_path: Path, capsys: pytest.Captu
     path.write_text(text)
     assert obey(["fit", OSCILLATOR, str(path), "--wrt", "c,a"]) == 2
     assert sentence in capsys.readouterr().err
+
+
+def test_numbers_without_squares() -> None:
+    data = {"t": [0.1, 0.7], "h": [1e308, -1e308]}
+    with pytest.raises(UsageError, match="column h are too large for its standard deviation"):
+        hsdsl.loads(BALL).fit(data, "e", sigma=1e-3)
+    with warnings.catch_warnings(action="error"):
+        found = hsdsl.loads(BALL).fit(data, "e,g")
+    assert np.isinf([*found.deviations.values()]).all()
 
 
 def test_bad_calls(model: Any, samples: dict[str, Any]) -> None:
