@@ -160,7 +160,8 @@ def _direction(near: Nearby, last: sp.Expr, projection: dict[int, dict[sp.Symbol
     if (x := next((x for x in near.own if x in slopes and slopes[x].is_Number and slopes[x] != 0), None)) is None:
         return None
     found = {y: derivative(change, x) for y, change in zip(near.own, near.moved, strict=True)}
-    found = {y: sp.Mul.make_args(u) for y, u in found.items() if not is_zero(u, at)}
+    if not (found := {y: sp.Mul.make_args(u) for y, u in found.items() if not is_zero(u, at)}):
+        return None
     common = set.intersection(*map(set, found.values()))
     along = {y: sp.Mul(*(factor for factor in u if factor not in common)) for y, u in found.items()}
     whole = sp.Add(*(u * slopes[y] for y, u in along.items() if y in slopes))

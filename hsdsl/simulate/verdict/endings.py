@@ -69,16 +69,18 @@ def _at_a_kink(run: RunView, arc: Arc, after: Place) -> Iterator[Finding]:
 
 
 def at_the_end(run: RunView) -> Iterator[Finding]:
-    """Surfaces that would be reached just behind the end, and a transition just before it."""
+    """Surfaces reached just behind the end, or there but for the time in strips, and a transition just before it."""
     if run.errors is None or run.reliable_until < inf or run.stop.reason != "until" or not run.flows:
         return
     arc, until = run.flows[-1], run.times[-1]
     place = run.at_row(arc, arc.last)
+    waited = sum(made.resumed - made.time for made in run.transitions if made.resumed is not None)
     if run.times[arc.last] == until:
         for k in range(len(place.mode.edges)):
             try:
-                near = abs(place.value(k)) <= SAFE * run.surface_error(place, k, arc.last)
-                if near and place.rate(k) > 0 and near_surface(run, place, k, arc.last, "ends at"):
+                rate, error = place.rate(k), SAFE * run.surface_error(place, k, arc.last)
+                near = rate > 0 and abs(place.value(k)) <= error + rate * waited
+                if near and (not has_condition(place, k) or may_hold(run, place, k, arc.last)):
                     yield Finding("end", "unknown", _undecided(place.name(k)))
             except DOMAIN_ERRORS:
                 continue

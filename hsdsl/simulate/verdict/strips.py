@@ -36,12 +36,11 @@ def lost(run: RunView, made: Transition) -> list[str]:
     x = tuple(made.after.values())
     before, place = run.place(made.target, made.time, x), run.place(made.target, made.resumed, x)
     edges, kernel = place.mode.edges, place.kernel
-    itself = made.edge if made.source == made.target else None
     found: list[str] = []
     try:
         then, now = before.kernel.surfaces(before.t, *x), kernel.surfaces(place.t, *x)
         for k, edge in enumerate(edges):
-            passed = edge.conditional and edge.name != itself and now[k] > place.roundoff_bound(k) >= then[k]
+            passed = edge.conditional and now[k] > place.roundoff_bound(k) >= then[k]
             if passed and kernel.conditions[k](place.t, *x)[0]:
                 found.append(edge.name)
     except DOMAIN_ERRORS:
