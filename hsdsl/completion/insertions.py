@@ -28,7 +28,7 @@ class Insertions:
             self.insert(end - 1, before + inline)
             return
         column = node.place.start[2]
-        last = len(content[:end].rstrip())
+        last = _end_of_block(content[:end], column)
         line_end = content.find("\n", last)
         at = len(content) if line_end < 0 else line_end
         self.insert(at, "".join(f"\n{' ' * column}{line}" for line in block.splitlines()))
@@ -36,6 +36,14 @@ class Insertions:
     def insert(self, index: int, text: str) -> None:
         """Insert at an index of the text."""
         self._insertions.setdefault(index, []).append(text)
+
+
+def _end_of_block(content: str, column: int) -> int:
+    """The end of the last line of a block: comments behind it that begin further left belong to what follows."""
+    lines = content.rstrip().split("\n")
+    while (last := lines[-1].lstrip()) == "" or (last[0] == "#" and len(lines[-1]) - len(last) < column):
+        lines.pop()
+    return len("\n".join(lines).rstrip())
 
 
 def flow_style(fields: dict[str, str]) -> str:

@@ -19,6 +19,7 @@ from hsdsl.source import Mapping, Node, Text, child
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
 TIME_OF_CONTACT = "1e-6"
+WIDTH, INDENT = 120, 6  # of a line, and of the transitions in a mode that is written
 
 
 def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
@@ -119,8 +120,7 @@ class _Writer:
         """Add a transition behind those of a mode."""
         node = child(child(child(self._root, "modes"), mode), "transitions")
         assert node is not None
-        text = flow_style(fields)
-        self.insertions.append(node, text, f"- {text}")
+        self.insertions.append(node, flow_style(fields), "\n".join(_transition_lines(fields, node.place.start[2])))
 
     def add_mode(self, mode: Mode, name: str) -> None:
         """Add a mode behind the others."""
@@ -185,4 +185,11 @@ def _mode_lines(mode: Mode, system: HybridSystem) -> Iterator[str]:
     yield from _rest(mode, system)
     if mode.edges:
         yield "transitions:"
-    yield from (f"  - {flow_style(fields)}" for fields in map(_transition, mode.edges))
+    yield from (f"  {line}" for edge in mode.edges for line in _transition_lines(_transition(edge), INDENT))
+
+
+def _transition_lines(fields: dict[str, str], column: int) -> list[str]:
+    """A transition as an entry of a list at a column: on one line where it fits there."""
+    if column + len(line := f"- {flow_style(fields)}") <= WIDTH:
+        return [line]
+    return [f"{' ' if i else '-'} {key}: {value}" for i, (key, value) in enumerate(fields.items())]

@@ -314,13 +314,23 @@ modes:
       - when: h <= 0  # floor
         to: fly
         reset: {v: -v/2}
+        # bounces
+
+# begins in the air
 initial: {mode: fly, h: 1, v: 0}
 experiment: {until: 5}
 """
     written = hsdsl.loads(text).completed()
     assert written is not None and "# gravity" in written and "# floor" in written and written.startswith("# mine\n")
+    assert "# bounces\n      - {when:" in written and "\n\n# begins in the air\ninitial:" in written
     assert "contact_time: 1e-6" in written and "  contact_fly:\n" in written
     assert hsdsl.loads(written).system.modes[1].name == "contact_fly"
+
+
+def test_long_transitions_are_written_a_line_for_each_key() -> None:
+    written = hsdsl.load(MODELS / "gallery" / "stick-slip.yaml").completed()
+    assert written is not None and max(map(len, written.splitlines())) <= 120
+    assert "\n        to: sliding_slower_faster\n        priority: 1\n" in written
 
 
 def test_nothing_to_complete_is_said(tmp_path: Any, capsys: Any) -> None:
