@@ -27,9 +27,10 @@ A run with a precision is not examined, and counts as not stiff.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from math import inf, isfinite
 
 import numpy as np
@@ -82,9 +83,9 @@ def chosen(
 def _adaptive(
     until: float, program: Program, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]
 ) -> tuple[Method, str]:
-    near = list(_near(program, mode, len(x))) if kernel.arithmetic.digits is None else []
-    for k in near:
-        stiff = stiffness(kernel, timeline, program.modes[k].name, k, x, until)
+    near = dict(_near(program, mode, x)) if kernel.arithmetic.digits is None else {}
+    for k, values in near.items():
+        stiff = stiffness(kernel, timeline, program.modes[k].name, k, values, until)
         if stiff is not None:
             return METHODS["radau"], str(stiff)
     if mode in near and not _has_derivatives(kernel, timeline, mode, x):
@@ -122,10 +123,9 @@ def _judge(
     if name not in plain.program.mode_names:
         return None
     index = plain.program.mode_names.index(name)
-    states = plain.program.modes[index].states
-    if not 0 < len(states) <= MOST_STATES or not values.keys() >= set(states):
+    here, until = _in_mode(plain.program, index, values), float(plain.settings.until)
+    if here is None:
         return None
-    here, until = [float(values[each]) for each in states], float(plain.settings.until)
     try:
         look = _Look(plain.kernel, plain.timeline, index, float(t), np.array(here))
         decay = look.decay()
@@ -176,12 +176,20 @@ def _begins(method: Method, kernel: Kernel, timeline: Timeline, mode: int, x: Se
     return True
 
 
-def _near(program: Program, mode: int, states: int) -> Iterator[int]:
-    """The mode of the start and those its edges lead to, where they have as many states, so that x is in them."""
-    if states == 0 or states > MOST_STATES:
-        return
+def _near(program: Program, mode: int, x: Sequence[Number]) -> Iterator[tuple[int, list[float]]]:
+    """The mode of the start and those its edges lead to that have no other states, with x in their order."""
+    values = dict(zip(program.modes[mode].states, x, strict=True))
     targets = dict.fromkeys((mode, *(edge.target for edge in program.modes[mode].edges)))
-    yield from [k for k in targets if len(program.modes[k].states) == states][:MOST_MODES]
+    found = ((k, _in_mode(program, k, values)) for k in targets)
+    yield from islice(((k, there) for k, there in found if there is not None), MOST_MODES)
+
+
+def _in_mode(program: Program, mode: int, values: Mapping[str, Number]) -> list[float] | None:
+    """The values of a mode's states; None where one is missing, or where there are none or too many to look at."""
+    states = program.modes[mode].states
+    if not 0 < len(states) <= MOST_STATES or not values.keys() >= set(states):
+        return None
+    return [float(values[each]) for each in states]
 
 
 def stiffness(

@@ -107,6 +107,23 @@ def test_what_was_picked_is_said_and_estimates_keep_it(tmp_path: Path) -> None:
     assert load(tmp_path / "run.npz").settings == run.settings
 
 
+@pytest.mark.parametrize("order", [("u", "w"), ("w", "u")])
+def test_modes_that_edges_lead_to_are_judged_at_values_by_name(order: tuple[str, str]) -> None:
+    """Decays at 1 + 3e5 u: u stays zero, whatever place it has among the states."""
+    flows = {"u": "0", "w": "-w*(1 + 3e5*u)"}
+    later = ", ".join(f"{name}: {flows[name]}" for name in order)
+    text = f"""
+hsdsl: 1
+modes:
+  a: {{flow: {{u: 0, w: -w}}, transitions: [{{when: w <= 0.7, to: b}}]}}
+  b: {{flow: {{{later}}}}}
+initial: {{mode: a, u: 0, w: 1}}
+experiment: {{until: 7}}
+"""
+    assert hsdsl.loads(text).simulate().method == "taylor"
+    assert hsdsl.loads(text.replace("u: 0, w: 1", "u: 1, w: 1")).simulate().method == "radau"
+
+
 def test_a_stiff_run_takes_few_steps() -> None:
     flow, initial, until, _ = CASES["a fast decay to a slow curve"]
     run = made(flow, initial, until).simulate(engine="python")
