@@ -8,7 +8,7 @@ from typing import Any
 
 from gallery.scenes import UNDECIDED, Entry
 from hsdsl.chart import PEERS, Refused
-from hsdsl.chart.outcome import Outcome, Tolerance, outcome
+from hsdsl.chart.outcome import WITHIN, Outcome, outcome
 from hsdsl.chart.peers import prepare
 from hsdsl.chart.plan import relaxation
 from hsdsl.chart.result import Tool
@@ -17,7 +17,6 @@ from hsdsl.integrators import METHODS
 from hsdsl.model.options import OWN_FORMULA
 from hsdsl.simulate import SCHEMES
 
-WITHIN = Tolerance(state=0.05, time=0.005)  # of a right result
 TOLERANCES = (1e-6, 1e-9)
 STEPS = (1e-3, 1e-4)  # of the run
 MOST = 100_000  # transitions

@@ -26,6 +26,9 @@ class Tolerance:
     time: float
 
 
+WITHIN = Tolerance(state=0.05, time=0.005)  # of a right result
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What came of a run.
@@ -40,6 +43,9 @@ class Outcome:
         The difference from the exact execution, or the tool's own words.
     error : float
         The largest difference of a state from the exact one, as a share of that state's span; NaN where none compares.
+    other : str
+        What differs from the exact execution: ``transitions`` (their number), ``modes``, ``values`` or ``end``; empty
+        where nothing does.
     verdict : str
         Of the theorem: ``holds``, ``left`` or ``unknown``; empty where the tool has none.
     """
@@ -49,6 +55,7 @@ class Outcome:
     error: float = nan
     transitions: int | None = None
     verdict: str = ""
+    other: str = ""
 
 
 def outcome(scene: Scene, result: Result, within: Tolerance, verdict: Verdict | None = None) -> Outcome:
@@ -57,14 +64,14 @@ def outcome(scene: Scene, result: Result, within: Tolerance, verdict: Verdict | 
     known = "" if verdict is None else verdict.theorem
     until, last = float(scene.grid[-1]), float(scene.exact.final.time)
     ends = until - last > SAME_END * until  # the exact execution ends before the run is to end
-    different = _difference(scene, result, others, error, within)
+    other, why = _difference(scene, result, others, error, within)
     if result.problem:
-        word = "right" if ends and not different else "stops"
-        return Outcome(word, result.problem, error, result.transitions, known)
+        word = "right" if ends and not other else "stops"
+        return Outcome(word, result.problem, error, result.transitions, known, other)
     if ends:
-        different = f"goes on past t = {last:.6g}, where the exact execution ends"
-    word = ("warns" if known in ("left", "unknown") else "wrong") if different else "right"
-    return Outcome(word, different, error, result.transitions, known)
+        other, why = "end", f"goes on past t = {last:.6g}, where the exact execution ends"
+    word = ("warns" if known in ("left", "unknown") else "wrong") if other else "right"
+    return Outcome(word, why, error, result.transitions, known, other)
 
 
 def compared(scene: Scene, result: Result, slack: float) -> tuple[float, int]:
@@ -119,14 +126,14 @@ def spans(scene: Scene) -> Array:
     return np.where(span > 0, span, np.where(size > 0, size, 1.0))
 
 
-def _difference(scene: Scene, result: Result, others: int, error: float, within: Tolerance) -> str:
-    """How a result differs from the exact execution; empty where it does not."""
+def _difference(scene: Scene, result: Result, others: int, error: float, within: Tolerance) -> tuple[str, str]:
+    """What of a result differs from the exact execution, in a word and a sentence; empty where nothing does."""
     fewest, most = scene.countable
     if not result.problem and result.transitions is not None and not fewest <= result.transitions <= most:
-        return f"{result.transitions} transition{'s' * (result.transitions != 1)} instead of {most:g}"
+        return "transitions", f"{result.transitions} transition{'s' * (result.transitions != 1)} instead of {most:g}"
     if others:
-        return f"another mode at {others} of {len(scene.grid)} samples"
+        return "modes", f"another mode at {others} of {len(scene.grid)} samples"
     missing = ~np.isfinite(result.values[scene.clear]) & np.isfinite(scene.exact_values[scene.clear])
     if not result.problem and bool(missing.any()):
-        return "no finite value where the exact execution has one"
-    return "" if not error > within.state else f"an error of {error:.2g} of the span"
+        return "values", "no finite value where the exact execution has one"
+    return ("values", f"an error of {error:.2g} of the span") if error > within.state else ("", "")

@@ -13,6 +13,10 @@ class Refused(Exception):
     """A tool cannot run a model; the text gives the reason."""
 
 
+class NotFinite(Refused):
+    """A tool ends where numbers are not finite."""
+
+
 @dataclass(frozen=True)
 class Result:
     """A run at the scene's sample times; modes and transitions are computed outside the clock.

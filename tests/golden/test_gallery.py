@@ -10,12 +10,12 @@ import pytest
 import yaml
 from exact.arithmetic import evaluate
 from gallery.scenes import GALLERY, OLDER, Entry, entries
-from gallery.settings import WITHIN, Setting, own_settings, run
+from gallery.settings import Setting, own_settings, run
 from references.gallery import GALLERY as SOLVED
 from references.gallery import two_ways
 
 import hsdsl
-from hsdsl.chart.outcome import Tolerance, outcome
+from hsdsl.chart.outcome import WITHIN, Tolerance, outcome
 from hsdsl.chart.result import Result
 from hsdsl.execution import Verdict
 

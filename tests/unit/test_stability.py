@@ -105,11 +105,11 @@ def test_errors_of_converged_runs_fall_with_the_order_of_the_method() -> None:
 
 
 def bench(text: str, rho: bool = False) -> Bench:
-    return Bench(hsdsl.loads(text), {"parameters": {}, "initial": {}, "settings": {}}, rho)
+    return Bench(hsdsl.loads(text), rho)
 
 
 def test_words_of_runs() -> None:
-    swing = Bench(hsdsl.load(GALLERY / "two-crossings.yaml"), {}, True)
+    swing = Bench(hsdsl.load(GALLERY / "two-crossings.yaml"), True)
     fine = swing.run(Tool("", "located", "dopri5"), {"tolerance": 1e-9})
     assert (fine.word, fine.transitions) == ("converged", 20)
     assert swing.run(Tool("", "located", "euler"), {"step": 1}).word == "blown up"
@@ -117,11 +117,11 @@ def test_words_of_runs() -> None:
     assert swing.run(Tool("", "located", "rk4"), {"step": 1}).word == "wrong transitions"
     assert swing.run(Tool("", "paoli-schatzman"), {"step": 1e-2}).word == "refused"
     assert swing.run(Tool("scipy"), {"tolerance": 1e-6}).word == "wrong transitions"
-    rolls = Bench(hsdsl.load(GALLERY / "rolling-ball.yaml"), {}, False)
+    rolls = Bench(hsdsl.load(GALLERY / "rolling-ball.yaml"), False)
     assert rolls.run(Tool("", "located", "dopri5"), {"parameters": {"e": 0.4}}).word in ("no reference", "converged")
     blown = bench(DECAY).run(Tool("", "located", "euler"), {"step": 0.05})
     assert blown.word == "blown up"
-    starts = Bench(hsdsl.load(GALLERY / "event-at-start.yaml"), {}, True)
+    starts = Bench(hsdsl.load(GALLERY / "event-at-start.yaml"), True)
     late = starts.run(Tool("", "relaxed", "dopri5"), {"tolerance": 1e-9, "relaxation": 1e-6})
     assert late.word == "converged"
     assert 1e-6 < late.rho < 1e-5  # three strips
@@ -153,7 +153,7 @@ def test_references_follow_the_numbers() -> None:
     assert slow.exact(1.0).state["x"] == pytest.approx(np.exp(-1))
     assert fast.exact(0.1).state["x"] == pytest.approx(np.exp(-5))
     assert decay.scene({"parameters": {"rate": 1.0}}) is slow
-    exact = Bench(hsdsl.load(GALLERY / "stiff-contact.yaml"), {}, False).scene({"step": 1e-3})
+    exact = Bench(hsdsl.load(GALLERY / "stiff-contact.yaml"), False).scene({"step": 1e-3})
     assert not isinstance(exact, str) and exact.exact.scheme == "exact"
 
 
@@ -200,18 +200,25 @@ BAD = [
 @pytest.mark.parametrize(("text", "message"), BAD)
 def test_axes_that_cannot_be(text: str, message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        read_axes(hsdsl.loads(DECAY), text, 2.0)
+        read_axes(hsdsl.loads(DECAY), text, 2.0, {})
 
 
 def test_axes() -> None:
-    x, y = read_axes(hsdsl.loads(DECAY), "h=1e-4:1e-1:4, initial.x=-1:1:3:lin", 2.0)
+    x, y = read_axes(hsdsl.loads(DECAY), "h=1e-4:1e-1:4, initial.x=-1:1:3:lin", 2.0, {})
     assert (x.kind, y.kind, x.logarithmic, y.logarithmic) == ("step", "initial", True, False)
     assert x.values == pytest.approx((1e-4, 1e-3, 1e-2, 1e-1))
     assert y.values == (-1, 0, 1)
-    assert y.arguments(0.5) == {"initial": {"x": 0.5}}
-    x, y = read_axes(hsdsl.loads(DECAY), "relaxation,rate", 2.0)
+    assert y.onto({"initial": {"y": 3}}, 0.5) == {"initial": {"y": 3, "x": 0.5}}
+    x, y = read_axes(hsdsl.loads(DECAY), "relaxation,rate", 2.0, {})
     assert (min(y.values), max(y.values)) == pytest.approx((10, 1000))
     assert (min(x.values), max(x.values)) == pytest.approx((2e-10, 2e-2))
+
+
+def test_a_range_left_out_is_about_the_value_that_runs_have() -> None:
+    derived = hsdsl.loads(DECAY.replace("{rate: 100}", "{half: 20, rate: 5*half}"))
+    for name, base in (("rate", {"parameters": {"half": 3}}), ("initial.x", {"initial": {"x": 15}})):
+        _, y = read_axes(derived, f"h,{name}", 2.0, base)
+        assert (min(y.values), max(y.values)) == pytest.approx((1.5, 150))
 
 
 def test_bounds_of_a_parameter_are_refused_before_anything_runs() -> None:

@@ -14,7 +14,7 @@ import heyoka as hy
 import numpy as np
 
 from hsdsl.chart.by_arcs import ToolArc, by_arcs
-from hsdsl.chart.result import Array, Refused, Result
+from hsdsl.chart.result import Array, NotFinite, Result
 from hsdsl.chart.scene import Scene
 from hsdsl.chart.translation import PlainEdge, PlainMode, as_function, translate
 
@@ -76,7 +76,7 @@ def _begun(ta: Any, t: float, x: Sequence[float]) -> Any:
 def _reached(outcome: Any, ta: Any) -> ToolArc:
     """Where an integrator has stopped; without samples."""
     if outcome == hy.taylor_outcome.err_nf_state:
-        raise Refused("the state is not finite")
+        raise NotFinite("the state is not finite")
     edge = None if outcome == hy.taylor_outcome.time_limit else -int(outcome) - 1
     return ToolArc(float(ta.time), ta.state.copy(), edge, NOTHING)
 

@@ -93,18 +93,18 @@ def stability_map(
     Raises UsageError: a name that cannot be varied, an empty range, or settings that no run can have.
     """
     base = {"parameters": dict(parameters or {}), "initial": dict(initial or {}), "settings": dict(settings or {})}
-    until = float(model.pipeline.prepare({k: v for k, v in base.items() if v}).settings.until)
-    x, y = read_axes(model, map, until)
+    until = float(model.pipeline.prepare(base).settings.until)
+    x, y = read_axes(model, map, until, base)
     _check_free(base, (x, y))
     tools = _tools(model, schemes, methods, against, {x.kind, y.kind})
     _check_ends(model, base, (x, y))
-    bench = Bench(model, base, with_rho)
+    bench = Bench(model, with_rho)
     places = [(k, j, i) for j in range(len(y.values)) for i in range(len(x.values)) for k in range(len(tools))]
     found: dict[tuple[int, int, int], Cell] = {}
 
     def work(place: tuple[int, int, int]) -> Cell:
         k, j, i = place
-        return bench.run(tools[k], _merged(x.arguments(x.values[i]), y.arguments(y.values[j])))
+        return bench.run(tools[k], y.onto(x.onto(base, x.values[i]), y.values[j]))
 
     for index, answer in in_processes(work, places, processes or cores(), patience):
         lost = isinstance(answer, Lost)
@@ -118,12 +118,6 @@ def stability_map(
         Panel(tool, cells, _limit(model, base, tool, x, y)) for tool, cells in zip(tools, grids, strict=True)
     )
     return StabilityMap(os.path.basename(model.program.path).removesuffix(".yaml"), x, y, panels)
-
-
-def _merged(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
-    """The arguments of both axes; both may be parameters."""
-    groups = {key: {**one[key], **other[key]} for key in one.keys() & other.keys()}
-    return {**one, **other, **groups}
 
 
 def _check_free(base: Mapping[str, Mapping[str, Any]], axes: Sequence[Axis]) -> None:
@@ -140,9 +134,7 @@ def _check_ends(model: Model, base: Mapping[str, Any], axes: Sequence[Axis]) -> 
     for axis in axes:
         if axis.kind in ("parameter", "initial"):
             for value in (axis.values[0], axis.values[-1]):
-                given = axis.arguments(value)
-                call = {group: {**base[group], **given.get(group, {})} for group in ("parameters", "initial")}
-                model.pipeline.prepare({**call, "settings": base["settings"] or None})
+                model.pipeline.prepare(axis.onto(base, value))
 
 
 def _tools(
@@ -170,8 +162,7 @@ def _limit(model: Model, base: Mapping[str, Any], tool: Tool, x: Axis, y: Axis) 
         return None
     found: list[float | None] = []
     for value in y.values:
-        given = y.arguments(value)
-        numbers = {group: {**base[group], **given.get(group, {})} for group in ("parameters", "initial")}
-        values = eigenvalues(model, numbers)
+        given = y.onto(base, value)
+        values = eigenvalues(model, {group: given[group] for group in ("parameters", "initial")})
         found.append(None if values is None else largest_step(tool.method, values, x.values[0] / 10, x.values[-1] * 10))
     return tuple(found) if any(found) else None

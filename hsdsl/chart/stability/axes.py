@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.errors import UsageError
 from hsdsl.model import Model
+from hsdsl.model.differentiate import start_by
 from hsdsl.model.values import with_parameters
 from hsdsl.names import did_you_mean, shown
 
@@ -30,24 +32,25 @@ class Axis:
     values: tuple[float, ...]
     logarithmic: bool
 
-    def arguments(self, value: float) -> dict[str, Any]:
-        """The arguments of a run at a value of this axis."""
-        if self.kind == "parameter":
-            return {"parameters": {self.name: value}}
-        if self.kind == "initial":
-            return {"initial": {self.name.removeprefix("initial."): value}}
-        return {self.kind: value}
+    def onto(self, arguments: Mapping[str, Any], value: float) -> dict[str, Any]:
+        """The arguments of a run with a value of this axis among them."""
+        if self.kind in DEFAULTS:
+            return {**arguments, self.kind: value}
+        group = "parameters" if self.kind == "parameter" else "initial"
+        return {**arguments, group: {**arguments.get(group, {}), self.name.removeprefix("initial."): value}}
 
 
-def read_axes(model: Model, text: str, until: float) -> tuple[Axis, Axis]:
+def read_axes(model: Model, text: str, until: float, base: Mapping[str, Any]) -> tuple[Axis, Axis]:
     """Read ``NAME[=FROM:TO[:COUNT[:lin]]],NAME[=...]``; values are spaced logarithmically, or evenly with ``lin``.
+
+    ``base`` has the parameters and initial values of all runs, about which a number varies that has no range.
 
     Raises UsageError: not two different names, a name that cannot vary, or a range that is empty or no range.
     """
     parts = [part.strip() for part in text.split(",") if part.strip()]
     if len(parts) != 2:
         raise UsageError(f"--map: expected two names with a comma between them, got '{shown(text)}'", EXAMPLE)
-    x, y = (_axis(model, part, until) for part in parts)
+    x, y = (_axis(model, part, until, base) for part in parts)
     setting = x.kind in DEFAULTS and x.kind == y.kind
     if x.name == y.name or setting or {x.kind, y.kind} == {"step", "tolerance"}:
         raise UsageError(f"--map: {x.name} and {y.name} exclude each other", EXAMPLE)
@@ -56,7 +59,7 @@ def read_axes(model: Model, text: str, until: float) -> tuple[Axis, Axis]:
     return x, y
 
 
-def _axis(model: Model, part: str, until: float) -> Axis:
+def _axis(model: Model, part: str, until: float, base: Mapping[str, Any]) -> Axis:
     name, equals, range_ = (piece.strip() for piece in part.partition("="))
     kind = SIZES.get(name) or _kind(model, name)
     if equals:
@@ -67,7 +70,8 @@ def _axis(model: Model, part: str, until: float) -> Axis:
     if kind in DEFAULTS:
         low, high = (end * (until if kind in IN_TIME else 1.0) for end in DEFAULTS[kind])
         return Axis(name, kind, _spaced(low, high, COUNT), True)
-    value = _present(model, name, kind)
+    values = with_parameters(model.pipeline.values(FLOAT64), base.get("parameters", {}))
+    value = start_by([name], base, values)[1][name]
     if not value > 0:
         raise UsageError(f"--map {name}: its value is {value:g}, so give a range", f"for example {name}=-1:1:20:lin")
     return Axis(name, kind, _spaced(value / 10, value * 10, COUNT), True)
@@ -118,12 +122,3 @@ def _range(name: str, text: str) -> tuple[tuple[float, ...], bool]:
 
 def _spaced(low: float, high: float, count: int) -> tuple[float, ...]:
     return tuple(np.geomspace(low, high, count).tolist())
-
-
-def _present(model: Model, name: str, kind: str) -> float:
-    """The value in the file."""
-    if kind == "initial":
-        start = model.simulate(0)(0.0, side="left")
-        return float(start.state.get(name.removeprefix("initial."), 0.0))
-    values = with_parameters(model.pipeline.values(FLOAT64), {}).parameters
-    return float(values[list(model.program.parameters).index(name)])

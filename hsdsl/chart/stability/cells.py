@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.chart.outcome import Tolerance, outcome, spans
+from hsdsl.chart.outcome import WITHIN, outcome, spans
 from hsdsl.chart.peers import prepare
-from hsdsl.chart.result import Refused, Result, Tool
+from hsdsl.chart.result import NotFinite, Refused, Result, Tool
 from hsdsl.chart.scene import Scene
 from hsdsl.errors import UsageError
 from hsdsl.exact import reference
@@ -27,7 +27,6 @@ from hsdsl.model.options import NUMERICAL
 CONVERGED, INACCURATE, OTHER = "converged", "inaccurate", "wrong transitions"
 BLOWN_UP, STUCK, REFUSED, UNKNOWN = "blown up", "stuck", "refused", "no reference"
 WORDS = (CONVERGED, INACCURATE, OTHER, BLOWN_UP, STUCK, REFUSED, UNKNOWN)
-WITHIN = Tolerance(state=0.05, time=0.005)  # of a converged run
 LARGE = 10.0  # spans of a state: a run that goes farther has blown up
 PRECISE = 1e-12  # the tolerance of a reference run
 SAMPLES = 400
@@ -53,14 +52,13 @@ class Cell:
 
 @dataclass
 class Bench:
-    """Runs of a model: ``base`` are the arguments that all of them have; references are kept by what varies.
+    """Runs of a model; references are kept by the numbers of a run.
 
     A model's exact execution is the reference where nothing but settings differs from the file; else it is a located
     run at a tolerance of 1e-12.
     """
 
     model: Model
-    base: Mapping[str, Any]
     with_rho: bool
     scenes: dict[tuple[Any, ...], Scene | str] = field(default_factory=dict[tuple[Any, ...], "Scene | str"])
 
@@ -73,7 +71,7 @@ class Bench:
             return None
 
     def run(self, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
-        """Run a tool with further arguments."""
+        """Run a tool with the arguments of `Model.simulate`."""
         scene = self.scene(arguments)
         if isinstance(scene, str):
             return Cell(UNKNOWN, why=scene)
@@ -81,23 +79,24 @@ class Bench:
             return self._peer(scene, tool, arguments) if tool.name else self._own(scene, tool, arguments)
         except UsageError as error:
             return Cell(REFUSED, why=str(error))
+        except NotFinite as end:
+            return Cell(BLOWN_UP, why=str(end))
         except Refused as refusal:
-            return Cell(BLOWN_UP if "finite" in str(refusal) else REFUSED, why=str(refusal))
+            return Cell(REFUSED, why=str(refusal))
 
     def scene(self, arguments: Mapping[str, Any]) -> Scene | str:
         """The reference at these numbers; a reason where there is none."""
-        numbers = {
-            group: {**self.base.get(group, {}), **arguments.get(group, {})} for group in ("parameters", "initial")
-        }
-        key = tuple(sorted((group, name, value) for group, given in numbers.items() for name, value in given.items()))
+        groups = ("parameters", "initial", "settings")
+        given = {group: dict[str, Any](arguments.get(group) or {}) for group in groups}
+        key = tuple((group, *sorted(numbers.items())) for group, numbers in given.items())
         if key not in self.scenes:
-            self.scenes[key] = self._scene(numbers)
+            self.scenes[key] = self._scene(given.pop("settings"), given)
         return self.scenes[key]
 
-    def _scene(self, numbers: dict[str, dict[str, Any]]) -> Scene | str:
-        exact = self.exact if not any(numbers.values()) and not self.base.get("settings") else None
+    def _scene(self, settings: dict[str, Any], numbers: dict[str, dict[str, Any]]) -> Scene | str:
+        exact = self.exact if not any(numbers.values()) and not settings else None
         if exact is None:
-            settings = {key: value for key, value in self.base.get("settings", {}).items() if key not in NUMERICAL}
+            settings = {key: value for key, value in settings.items() if key not in NUMERICAL}
             try:
                 given: dict[str, Any] = {"tolerance": PRECISE, "settings": settings, **numbers}
                 exact = self.model.simulate(scheme="located", method="auto", **given)
@@ -113,10 +112,8 @@ class Bench:
         return replace(made, countable=countable, **numbers)
 
     def _own(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
-        given: dict[str, Any] = {"parameters": scene.parameters, "initial": scene.initial}
-        given |= {key: value for key, value in arguments.items() if key not in given}
-        chosen = {"scheme": tool.scheme or None, "method": tool.method or None, "settings": self.base.get("settings")}
-        run = self.model.simulate(**chosen, **given)
+        given = {**arguments, "parameters": scene.parameters, "initial": scene.initial}
+        run = self.model.simulate(scheme=tool.scheme or None, method=tool.method or None, **given)
         cell = _cell(scene, scene.result(run), run.stop.reason)
         if cell.word in (CONVERGED, INACCURATE) and not _same_transitions(scene, run):
             cell = replace(cell, word=OTHER, why="other transitions")
@@ -146,8 +143,8 @@ def _cell(scene: Scene, result: Result, reason: str) -> Cell:
     elif found.error > LARGE:
         word = BLOWN_UP
     else:
-        counted = found.transitions is not None
-        word = OTHER if "transition" in found.why or ("mode" in found.why and not counted) else INACCURATE
+        others = ("transitions",) if found.transitions is not None else ("transitions", "modes")
+        word = OTHER if found.other in others else INACCURATE
     return Cell(word, nan, found.error, found.transitions, found.why)
 
 
