@@ -112,7 +112,7 @@ class Bench:
         return replace(made, countable=countable, **numbers)
 
     def _own(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
-        given = {**arguments, "parameters": scene.parameters, "initial": scene.initial}
+        given: dict[str, Any] = {**arguments, "parameters": scene.parameters, "initial": scene.initial}
         run = self.model.simulate(scheme=tool.scheme or None, method=tool.method or None, **given)
         cell = _cell(scene, scene.result(run), run.stop.reason)
         if cell.word in (CONVERGED, INACCURATE) and not _same_transitions(scene, run):
