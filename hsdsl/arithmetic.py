@@ -18,6 +18,7 @@ from typing import Any
 Number = Any  # float or mpmath.mpf, as the arithmetic makes them
 
 DOMAIN_ERRORS = (ValueError, OverflowError, ZeroDivisionError)
+TIE = 1e-12  # times closer than TIE |t| are the same instant
 NOTHING = 2.0**-960  # below this numbers of float64 have no digits left
 
 

@@ -8,12 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hsdsl.arithmetic import TIE
 from hsdsl.chart.result import Array, Result
 from hsdsl.chart.scene import Scene
 from hsdsl.chart.translation import PlainMode, PlainModel, as_function
 
 MOST_SECONDS = 60.0
-TIE = 1e-12  # of a run: times that are no further apart are one
 
 
 class ToolArc(NamedTuple):

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -219,6 +220,17 @@ class Execution(Deferred):
     def states(self) -> tuple[str, ...]:
         """The names of all states, in the order in which the run first has them."""
         return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))
+
+    def sizes(self, start: float = -inf, end: float = inf) -> dict[str, float]:
+        """The largest size that each state has at the rows of the run between two times, both included."""
+        found: dict[str, float] = {}
+        for arc in self.arcs:
+            times = self.times[arc.first : arc.last + 1].astype(float)
+            first, last = np.searchsorted(times, start), np.searchsorted(times, end, side="right")
+            rows = np.abs(self.values[arc.first + first : arc.first + last, : len(arc.states)].astype(float))
+            for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
+                found[name] = max(found.get(name, 0.0), size)
+        return found
 
     @property
     def shown(self) -> tuple[str, ...]:

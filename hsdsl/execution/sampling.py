@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
-from hsdsl.arithmetic import DOMAIN_ERRORS
+from hsdsl.arithmetic import DOMAIN_ERRORS, TIE
 from hsdsl.execution.parts import Arc
 from hsdsl.execution.samples import Array, Samples, split
 
@@ -67,11 +67,11 @@ class ArcTable:
 def within(execution: Execution, times: Any) -> tuple[Array, Array]:
     """Take times into the execution's number type, and say which of them are within the run.
 
-    A time outside the run by no more than the tie tolerance, 1e-12 of the run's length, counts as its end.
+    A time outside the run by no more than the tie tolerance, relative to the run's length, counts as its end.
     """
     instants = _as_times(execution, times)
     start, end = execution.time_span
-    slack = 1e-12 * max(abs(float(start)), abs(float(end)))
+    slack = TIE * max(abs(float(start)), abs(float(end)))
     inside = np.asarray((instants >= start - slack) & (instants <= end + slack), dtype=bool)
     return instants, inside
 

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
+from hsdsl.arithmetic import TIE
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 from hsdsl.fitting.data import Measurements
 from hsdsl.fitting.fit import Fit
+from hsdsl.names import INITIAL
 from hsdsl.sensitivity.result import Sensitivity
 from hsdsl.simulate.stops import show
 
@@ -24,7 +26,7 @@ TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends bef
 LARGEST = 1e100  # the weighted size of a column: its residuals have squares
 UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
 MOST_NAMED = 3
-TIE = 1e-12  # of a run: times that are no further apart are one
+AT_BOUND = 1e-12  # of a value: how near it comes to the bound that keeps it
 
 
 @dataclass
@@ -85,7 +87,7 @@ class Objective:
         slopes: list[Array] = []
         for name, column in self.measured.columns.items():
             weight, known = self.weights[name], np.isfinite(column)
-            far = TOO_FAR * max(1.0, self.size(name))
+            far = TOO_FAR * (self.size(name) or 1.0)
             off, moves = np.full(len(times), far), np.zeros((len(times), len(self.start)))
             if table is not None and name in table.values:
                 there = np.asarray(table.values[name], float)
@@ -101,6 +103,8 @@ def fitted(
 ) -> Fit:
     """Fit; ``sigma`` says that weights are inverse standard deviations.
 
+    A scale of zero is replaced by the size of the state in the first run.
+
     Raises UsageError: the run with the first values does not reach the measurements, or these are too large.
     """
     first = np.array([*objective.start.values()])
@@ -108,6 +112,8 @@ def fitted(
         if objective.size(name) > LARGEST:
             raise UsageError(f"the numbers of column {name} are too large for its standard deviation or weight")
     _check_start(objective, first)
+    sizes = {f"{INITIAL}{name}": size for name, size in objective.run(first).execution.sizes().items()}
+    scales = {name: scale or sizes.get(name, 0.0) or 1.0 for name, scale in scales.items()}
     results = [_solved(objective, first, bounds, scales)]
     begun = first
     for share in SHARES:
@@ -120,18 +126,38 @@ def fitted(
 def _solved(
     objective: Objective, first: Array, bounds: Mapping[str, tuple[float, float]], scales: Mapping[str, float]
 ) -> Any:
-    lower, upper = np.array([*bounds.values()], float).T
+    """SciPy's result of a fit to values as shares of their scales, with the values themselves."""
+    scale: Array = np.array([scales[name] for name in objective.start])
+    limits: Array = np.array([*bounds.values()], float)
+    lower: Array = limits[:, 0]
+    upper: Array = limits[:, 1]
+
+    def values(x: Array) -> Array:
+        return np.clip(x * scale, lower, upper)
+
+    def residuals(x: Array) -> Array:
+        return objective.residuals(values(x))
+
+    def slopes(x: Array) -> Array:
+        return objective.slopes(values(x)) * scale
+
     solve: Any = least_squares  # pyright: ignore[reportUnknownVariableType]
-    return solve(
-        objective.residuals,
-        np.clip(first, lower, upper),
-        jac=objective.slopes,
-        bounds=(lower, upper),
-        x_scale=np.array([scales[name] for name in objective.start]),
+    result: Any = solve(
+        residuals,
+        np.clip(first, lower, upper) / scale,
+        jac=slopes,
+        bounds=(lower / scale, upper / scale),
         ftol=PRECISE,
         xtol=PRECISE,
         gtol=PRECISE,
     )
+    shares: Array = np.asarray(result.x, float)
+    pushed: Array = np.where(
+        np.asarray(result.grad, float) < 0, upper, lower
+    )  # where the sum falls towards; SciPy stays inside
+    at = np.abs(pushed / scale - shares) <= AT_BOUND * np.maximum(1.0, np.abs(shares))
+    result.x = np.where(at, pushed, values(shares))
+    return result
 
 
 def _beginning(
@@ -143,7 +169,10 @@ def _beginning(
     part = Measurements(measured.times[early], {name: column[early] for name, column in measured.columns.items()})
     if part.count <= len(first):
         return first
-    return np.asarray(_solved(replace(objective, measured=part, bumps=[], _last=None), first, bounds, scales).x)
+    beginning = replace(objective, measured=part, bumps=[], _last=None)
+    found: Array = np.asarray(_solved(beginning, first, bounds, scales).x)
+    objective.evaluations = beginning.evaluations
+    return found
 
 
 def _check_start(objective: Objective, first: Array) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.arithmetic import TIE
 from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 from hsdsl.model.options import check_arguments, overrides_of
@@ -96,7 +97,7 @@ def _times_every(step: Array, until: Array) -> tuple[int, Callable[[], Array]]:
     if wrong := [value for value in step[np.isfinite(until)].tolist() if not value > 0]:
         raise UsageError(f"the time between samples must be positive, not {wrong[0]:g}")
     with np.errstate(invalid="ignore"):
-        count = np.floor(until / step * (1 + 1e-12)) + 1
+        count = np.floor(until / step * (1 + TIE)) + 1
     most = int(min(np.nanmax(count, initial=0), 2**62))
 
     def times() -> Array:

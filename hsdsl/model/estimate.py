@@ -6,12 +6,11 @@ from bisect import bisect_right
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hsdsl.arithmetic import Number
+from hsdsl.arithmetic import TIE, Number
 from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution, Transition
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.surfaces import TIE
 from hsdsl.simulate.verdict.agreement import Errors
 
 SAMPLES = 1000

@@ -80,7 +80,7 @@ def _bounds(values: Any, target: Target) -> tuple[float, float]:
 
 def _span(bounds: tuple[float, float]) -> float:
     span = bounds[1] - bounds[0]
-    return span if np.isfinite(span) and span > 0 else 1.0
+    return span if np.isfinite(span) else 0.0
 
 
 def _by_column(measured: Measurements, given: Mapping[str, float] | float | None) -> Mapping[str, float] | None:

@@ -43,7 +43,8 @@ def orbital_stability(
     values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters", model.program))
     by, known = start_by(wrt, call, values)
     run = model.simulate(**call)
-    scales = np.array([abs(known[t.label]) or _size(run, t.name) for t in by])
+    sizes = run.sizes()
+    scales = np.array([abs(known[t.label]) or sizes.get(t.name, 0.0) or 1.0 for t in by])
     ways = directions(len(by), whole(samples, "samples", 1), seed)
     total, done = len(radii) * len(ways), 0
 
@@ -67,13 +68,3 @@ def _distance(run: Execution, other: Execution, model: Model) -> tuple[float, fl
         return inf, inf
     found = distance_of_runs(run, other, model=model).interval
     return float(found.lower), float(found.upper)
-
-
-def _size(run: Execution, name: str) -> float:
-    """The largest size of a state in a run, 1 where it has none."""
-    sizes = [
-        float(np.max(np.abs(run.values[arc.first : arc.last + 1, arc.states.index(name)])))
-        for arc in run.arcs
-        if name in arc.states
-    ]
-    return max(sizes, default=0.0) or 1.0

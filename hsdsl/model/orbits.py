@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.defaults import DEFAULTS
+from hsdsl.arithmetic import FLOAT64, TIE
 from hsdsl.errors import UsageError
 from hsdsl.execution import Execution
 from hsdsl.model.differentiate import FINEST
@@ -25,7 +24,6 @@ from hsdsl.orbits.section import LONGER, NoReturn, Return, Section, without_nois
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
 from hsdsl.parts import meant_alone, numbers_of
 from hsdsl.sensitivity.result import Sensitivity
-from hsdsl.simulate.surfaces import TIE
 from hsdsl.written import written_edges
 
 if TYPE_CHECKING:
@@ -126,9 +124,10 @@ class Orbits:
             return self._moving.sensitivity(wrt, until=until, initial={"mode": mode, **start}, parameters=given, **call)
 
         parts, near = self.model.program.parts, self._guess
+        assert near is not None
         numbers = numbers_of(parts, mode) if parts else {}
-        sizes = np.array([near.sizes.get(x, 0.0) if near else 0.0 for x in states])
-        most = ENOUGH * (near.most + 1) if near else DEFAULTS["max_transitions"]
+        sizes = np.array([near.sizes.get(x, 0.0) for x in states])
+        most = ENOUGH * (near.most + 1)
         return Section(self.edge, mode, states, self.laps, self._phase, run, numbers, sizes, most)
 
     def _entered(self) -> Entered:
@@ -164,9 +163,9 @@ class Orbits:
                 change = float(np.max(moved, initial=0.0))
                 found.append((change, Guess(points[k], times[k], times[k + self.laps] - times[k], place)))
         first = run.arcs[0]
-        for place in dict.fromkeys(places[:1]):
-            if first.mode == place[0]:  # the run may begin on the orbit
-                found.append((np.inf, Guess(np.array(run.values[0][: len(place[1])], float), 0.0, times[0], place)))
+        if places and first.mode == places[0][0]:  # the run may begin on the orbit
+            start = np.array(run.values[0][: len(places[0][1])], float)
+            found.append((np.inf, Guess(start, 0.0, times[0], places[0])))
         if len(points) == 1:
             found.append((np.inf, Guess(points[0], times[0], times[0], places[0])))
         least = run.settings["until"] * TIE
@@ -323,10 +322,10 @@ class Orbits:
     def _sides(self, found: Closed, forced: bool) -> dict[str, Array]:
         """The multipliers for each order of simultaneous transitions, where they differ."""
         sides: dict[str, Array] = {}
-        passage, index = found.passage, found.passage.execution.transitions
-        for edge, side in (passage.sensitivity.sides if passage.sensitivity.breaks else {}).items():
+        sensitivity = found.passage.sensitivity
+        for edge, side in (sensitivity.sides if sensitivity.breaks else {}).items():
             passed = [made.index for made in side.execution.transitions if made.edge == self.edge]
-            if len(passed) >= self.laps and len(index) >= 1:
+            if len(passed) >= self.laps:
                 slopes = self.section({}).slopes(side, passed[self.laps - 1], side.wrt, None)
                 if not np.isnan(slopes).any():
                     sides[edge] = multipliers_of(found, slopes, forced)
@@ -343,14 +342,8 @@ def _numbers(model: Model, arguments: Mapping[str, Any]) -> dict[str, Any]:
 def _with_sizes(guess: Guess, run: Execution) -> Guess:
     """A guess with what the run does from a lap before it to a lap behind."""
     start, end = guess.phase - guess.time, guess.phase + guess.time
-    times, sizes = np.asarray(run.times, float), dict[str, float]()
-    for arc in run.arcs:
-        first, last = np.searchsorted(times[arc.first : arc.last + 1], [start, end])
-        for k, name in enumerate(arc.states) if last > first else ():
-            column = np.abs(np.asarray(run.values[arc.first + first : arc.first + last, k], float))
-            sizes[name] = max(sizes.get(name, 0.0), float(np.max(column)))
     made = sum(start <= float(each.time) <= end for each in run.transitions)
-    return replace(guess, sizes=sizes, most=made)
+    return replace(guess, sizes=run.sizes(start, end), most=made)
 
 
 def _still(found: Closed) -> bool:

@@ -10,7 +10,7 @@ from typing import Any, SupportsIndex
 
 import numpy as np
 
-from hsdsl.arithmetic import FLOAT64, Arithmetic, Number, multiprecision
+from hsdsl.arithmetic import FLOAT64, TIE, Arithmetic, Number, multiprecision
 from hsdsl.defaults import kept_digits, least_relaxation
 from hsdsl.errors import UsageError
 from hsdsl.integrators import AUTO, Method
@@ -21,7 +21,6 @@ from hsdsl.parts import meant
 from hsdsl.program import Program
 from hsdsl.simulate import Settings
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.surfaces import TIE
 
 EVERY, COUNT = "every=", "count="  # before the time between samples, and before their number, which may do without
 LEAST_DIGITS, MOST_DIGITS = 16, 10_000

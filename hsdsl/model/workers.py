@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hsdsl.arithmetic import TIE
 from hsdsl.execution import Execution, Transition
 from hsdsl.program import Program
 from hsdsl.runtime import structures
@@ -99,7 +100,7 @@ class ArrayRecorder:
         kept.outputs[i] = execution.outputs[-1]
         times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
         kept.crossed[i, : len(times)] = times
-        inside = np.flatnonzero(self.instances.time[i] <= end + 1e-12 * abs(float(end)))
+        inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
         samples = execution.sample(self.instances.time[i][inside])
         for k, name in enumerate(self.names):
             if name in samples.states:

@@ -32,12 +32,14 @@ class Return:
 
     With n states, ``point`` (n,) is where it leads and ``slopes`` (n + 1, n + 2) its derivatives: rows are the states
     and the time it takes, columns the states, the phase of the start, and the parameter that is followed (else 0).
+    ``index`` is that of the transition of the run that ends it.
     """
 
     point: Array
     time: float
     slopes: Array
     sensitivity: Sensitivity
+    index: int
 
     @property
     def execution(self) -> Execution:
@@ -102,7 +104,7 @@ class Section:
         slopes = self.slopes(found.as_made(), index, wrt, parameter)
         if not np.isfinite(slopes).all():
             raise NoReturn(f"no derivative exists there: {found.breaks[0][1] if found.breaks else 'it is not finite'}")
-        return Return(point, float(made.time), slopes, found)
+        return Return(point, float(made.time), slopes, found, index)
 
     def slopes(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Array:
         """The derivatives of a passage that ends with a transition."""

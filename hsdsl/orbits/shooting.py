@@ -13,9 +13,9 @@ from hsdsl.orbits.symmetry import Symmetry, symmetry
 MOST_STEPS, MOST_HALVINGS = 40, 12
 MOST_IDLE = 8  # steps in which the gap does not become half as large
 SMALLEST = 1e-10  # singular values below this share of the largest one are directions in which orbits form families
-CLOSED = 1e-9  # of the sizes of states: a residual below this is round-off of a run; so is one below the run's error
+CLOSED = 1e-9  # of the sizes of states: a residual below this is round-off or the error of a run
 ROUNDOFF = float(np.finfo(float).eps)
-COARSER = 1e-10  # a tolerance for runs that show how good others are
+COARSER = 1e-10  # a tolerance for runs that show how good others are, which keep 1e-13 where none is given
 
 
 @dataclass(frozen=True)
@@ -58,25 +58,24 @@ def closed(
     except NoReturn as error:
         raise NotClosed(str(error)) from None
     sizes = _sizes(passage, point, other)
-    enough = max(CLOSED, float(np.max(np.abs(passage.point - other.point) / sizes, initial=0.0)))
     best = _looked_at(point, phase, passage, sizes, multiple)
     here, mark, idle = best, best.residual, 0
     for _ in range(MOST_STEPS):
         if here.residual <= ROUNDOFF:
             return here
         try:
-            here = _damped(section, here, newton_step(here, multiple), multiple, enough)
+            here = _damped(section, here, newton_step(here, multiple), multiple)
         except NotClosed:
-            if best.residual < enough:
+            if best.residual < CLOSED:
                 return best
             raise
-        if here.residual >= best.residual and best.residual < enough:
+        if here.residual >= best.residual and best.residual < CLOSED:
             return best
         best = here if here.residual < best.residual else best
         mark, idle = (best.residual, 0) if best.residual < mark / 2 else (mark, idle + 1)
         if idle == MOST_IDLE:
             break
-    if best.residual < enough:
+    if best.residual < CLOSED:
         return best
     raise NotClosed(f"Newton's method comes no closer: the orbit does not close, by {best.residual:.2g} of the sizes")
 
@@ -92,14 +91,12 @@ def _sizes(passage: Return, point: Array, coarse: Return) -> Array:
 
     A state that is zero but for round-off, as the pitch of a symmetric body, has no size of its own.
     """
-    run = passage.execution
-    names = [by.removeprefix("initial.") for by in passage.sensitivity.wrt[: len(point)]]
-    found = np.maximum.reduce([np.abs(point), np.abs(passage.point), np.abs(passage.point - coarse.point) / COARSER])
-    for arc in run.arcs:
-        for k, name in enumerate(names):
-            if name in arc.states:
-                column = run.values[arc.first : arc.last + 1, arc.states.index(name)]
-                found[k] = max(found[k], float(np.max(np.abs(column.astype(float)))))
+    sizes = passage.execution.sizes(end=passage.time)
+    names = (by.removeprefix("initial.") for by in passage.sensitivity.wrt[: len(point)])
+    on_the_way: Array = np.array([sizes.get(name, 0.0) for name in names])
+    allowed = [each.sensitivity.setting.augmented.settings.tolerance for each in (passage, coarse)]
+    off = np.abs(passage.point - coarse.point) / max(float(each) for each in allowed if each is not None)
+    found = np.maximum.reduce([np.abs(point), np.abs(passage.point), off, on_the_way])
     return np.where(found > 0, found, 1.0)
 
 
@@ -125,10 +122,10 @@ def newton_step(here: Closed, multiple: float | None) -> Array:
     return step
 
 
-def _damped(section: Section, here: Closed, step: Array, multiple: float | None, enough: float) -> Closed:
-    """Take a step, halved until the run comes back and the gap does not grow much; a whole one where that is enough."""
+def _damped(section: Section, here: Closed, step: Array, multiple: float | None) -> Closed:
+    """Take a step, halved until the run comes back and the gap does not grow much; a whole one from a closed orbit."""
     problem = "the gap grows"
-    for halvings in range(MOST_HALVINGS if here.residual >= enough else 1):
+    for halvings in range(MOST_HALVINGS if here.residual >= CLOSED else 1):
         share = 0.5**halvings
         point, phase = here.point + share * step[:-1], here.phase + share * float(step[-1])
         try:
@@ -137,6 +134,6 @@ def _damped(section: Section, here: Closed, step: Array, multiple: float | None,
             problem = str(error)
             continue
         there = _looked_at(point, phase, passage, here.sizes, multiple)
-        if there.residual < 2 * here.residual or here.residual < enough:
+        if there.residual < 2 * here.residual or here.residual < CLOSED:
             return there
     raise NotClosed(f"Newton's method is stuck where the orbit does not close, by {here.residual:.2g}: {problem}")

@@ -12,11 +12,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, TIE, Number
 from hsdsl.errors import UsageError
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program, SampledInput
-from hsdsl.simulate.surfaces import TIE
 
 BEHIND = 4  # ties of time behind the end of a run, where inputs have the values behind a jump at the end
 

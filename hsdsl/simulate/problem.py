@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.arithmetic import TIE, Arithmetic, Number
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.settings import Settings
-from hsdsl.simulate.surfaces import TIE
 
 
 @dataclass(frozen=True, eq=False)

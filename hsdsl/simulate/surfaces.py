@@ -17,7 +17,6 @@ from hsdsl.kernel import ModeKernel, Vector
 from hsdsl.program import EdgeProgram
 
 ROUNDOFF_UNITS = 32
-TIE = 1e-12  # times closer than TIE |t| are the same instant
 SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_ITERATIONS = 200
 Condition = Callable[[int, Number, State], bool]

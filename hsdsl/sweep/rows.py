@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.arithmetic import TIE
 from hsdsl.execution import LEFT, Array, Ensemble
 from hsdsl.execution.samples import optional
 from hsdsl.simulate.stops import limit
@@ -114,7 +115,7 @@ def _samples(ensemble: Ensemble) -> dict[str, tuple[Array, Array]]:
     """Samples up to the end of each run, one behind the other."""
     times = ensemble.sample_times
     with np.errstate(invalid="ignore"):
-        inside = times <= (ensemble.time * (1 + 1e-12))[:, None]
+        inside = times <= (ensemble.time * (1 + TIE))[:, None]
     first = np.concatenate([[0], np.cumsum(inside.sum(axis=1))])
     columns = ensemble.samples | {"time": times}
     return {name: (first, column[inside]) for name, column in columns.items()}

@@ -113,7 +113,26 @@ def test_bounds_of_the_file() -> None:
     energy = np.where(times < np.sqrt(2 / 9.81), 9.81, 9.81 * 1.2)  # it gains energy, which e <= 1 forbids
     found = model.fit({"t": times, "energy": energy}, "e")
     assert found.values["e"] == pytest.approx(1)
-    assert found.at_bound in (("e",), ())
+    assert found.at_bound == ("e",)
+    times = np.linspace(0, 1, 50)  # before the second bounce
+    inside = model.fit({"t": times, "energy": np.where(times < np.sqrt(2 / 9.81), 9.81, 9.81 * 0.7**2)}, "e")
+    assert inside.values["e"] == pytest.approx(0.7) and inside.at_bound == ()
+
+
+@pytest.mark.parametrize("unit", [3e-14, 1.0, 2e9])
+def test_units_of_time_change_no_fit(unit: float) -> None:
+    """A decay and a first state of zero, in units of time and of the state that differ by the same factor."""
+    text = f"""
+hsdsl: 1
+parameters: {{k: {1.7 / unit}, u: {unit}}}
+modes: {{m: {{flow: {{x: 1 - k*x}}}}}}
+initial: {{mode: m, x: 0}}
+experiment: {{until: 4*u}}
+"""
+    times = np.linspace(0, 4, 9) * unit
+    data = {"t": times, "x": unit * (0.8 + (0.3 - 0.8) * np.exp(-times / (0.8 * unit)))}
+    found = hsdsl.loads(text).fit(data, "k,initial.x")
+    assert found.values == pytest.approx({"k": 1.25 / unit, "initial.x": 0.3 * unit}, rel=1e-9)
 
 
 def test_what_measurements_do_not_determine() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 from hsdsl import limits
-from hsdsl.arithmetic import FLOAT64, Number
+from hsdsl.arithmetic import FLOAT64, TIE, Number
 from hsdsl.backends.c import constant_bodies, switching_bodies
 from hsdsl.backends.c.printer import literal
 from hsdsl.defaults import DEFAULTS
@@ -18,7 +18,6 @@ from hsdsl.program import Program
 from hsdsl.simulate import Problem
 from hsdsl.simulate.control import LARGEST_SHARE
 from hsdsl.simulate.state_layouts import StateLayouts
-from hsdsl.simulate.surfaces import TIE
 from hsdsl.simulate.switches import same
 
 SETTINGS = ("until", "step", "relaxation", "max_transitions", "scale")  # in the order of page.h

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
+from hsdsl.arithmetic import TIE
 from hsdsl.expression import numeric
 from hsdsl.expression.scope import symbol
 from hsdsl.lint.analysis.mode_point import ModePoint, Unsure, ranked
@@ -20,7 +21,6 @@ _LOOSEST, _TIGHTEST = 0.01, 1e-15
 _MOST_SAMPLES = 10**6
 _SMALLER = "choose a smaller relaxation"
 _TIE_OF_WRITTEN_TIMES = 1e-9
-_TIE = 1e-12
 
 
 def starts_outside(subject: Subject) -> Iterator[Finding]:
@@ -117,7 +117,7 @@ def _recorded(subject: Subject, until: Number) -> Iterator[str]:
     for reference in subject.document.reference:
         for event in () if reference.settings else reference.transitions:
             time = subject.read(event if isinstance(event, Scalar) else event.time)
-            if numeric.finite(time) and abs(time - until) <= _TIE * abs(until):
+            if numeric.finite(time) and abs(time - until) <= TIE * abs(until):
                 edge = None if isinstance(event, Scalar) else event.edge
                 yield "a transition of the reference" if edge is None else edge.value
 

@@ -55,12 +55,7 @@ class RecordedRun:
     @cached_property
     def sizes(self) -> dict[str, float]:
         """The largest size that each state has in the run."""
-        found: dict[str, float] = {}
-        for arc in self.execution.arcs:
-            rows = np.abs(np.asarray(self.execution.values[arc.first : arc.last + 1, : len(arc.states)], dtype=float))
-            for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
-                found[name] = max(found.get(name, 0.0), size)
-        return found
+        return self.execution.sizes()
 
     @cached_property
     def crossed(self) -> dict[int, int]:
