@@ -12,7 +12,7 @@ import sympy as sp
 from hsdsl.expression import symbolic
 from hsdsl.expression.scope import Scope
 from hsdsl.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
-from hsdsl.functions import absolute, maximum, minimum, sign
+from hsdsl.functions import absolute, below, maximum, minimum
 from hsdsl.names import shown
 
 _OPPOSITE = {">": "<=", ">=": "<", "<": ">=", "<=": ">"}
@@ -40,12 +40,12 @@ class Reached:
     def holds(self, meaning: Mapping[Any, Any]) -> Any:
         """1 where it holds at values of its symbols, 0 elsewhere; at round-off of its surface if it is not strict."""
         margin = -2 * self._margin if self.strict else 2 * self._margin  # that of the crossing before, too
-        value = 2 * sign((self.residual + margin).xreplace(meaning))
-        return (1 + sign(value - 1 if self.strict else value + 1)) / 2
+        value = (self.residual + margin).xreplace(meaning)
+        return _positive(value) if self.strict else _not_negative(value)
 
     def nearly_holds(self, rate: Any, time: Any) -> Any:
         """1 where it holds, or counts as reached; 0 elsewhere."""
-        return (1 + sign(2 * sign(self.residual + 2 * self._reach(rate, time)) + 1)) / 2
+        return _not_negative(self.residual + 2 * self._reach(rate, time))
 
     def _reach(self, rate: Any, time: Any) -> Any:
         """The round-off of its surface function where a surface is crossed: the time has some, too."""
@@ -59,14 +59,23 @@ class Reached:
 
     def rises(self, rate: Any, time: Any) -> Any:
         """1 where it holds beyond round-off, or is on its surface and rises; 0 elsewhere."""
-        reach = self._reach(rate, time)
-        beyond, on = (1 + sign(2 * sign(self.residual - reach) - 1)) / 2, self.nearly_holds(rate, time)
-        return maximum(beyond, minimum(on, (1 + sign(2 * sign(rate) - 1)) / 2))
+        beyond = _positive(self.residual - self._reach(rate, time))
+        return maximum(beyond, minimum(self.nearly_holds(rate, time), _positive(rate)))
 
     def turns(self, other: Reached) -> bool | None:
         """Whether it turns true where another one does, or false; None where their surfaces are not the same."""
         same = self.residual == other.residual
         return same if same or self.residual == -other.residual else None
+
+
+def _positive(value: Any) -> Any:
+    """1 where a number is positive, 0 elsewhere: a truth of an instant, which has no switches of time."""
+    return below(-value, sp.S.Zero, sp.S.One, sp.S.Zero)
+
+
+def _not_negative(value: Any) -> Any:
+    """1 where a number is not negative, 0 elsewhere."""
+    return below(value, sp.S.Zero, sp.S.Zero, sp.S.One)
 
 
 def without_roundoff(expression: Any) -> Any:

@@ -18,7 +18,7 @@ from hsdsl.model.settings import whole
 from hsdsl.model.values import with_parameters
 from hsdsl.names import did_you_mean
 from hsdsl.orbits.branch import Branch
-from hsdsl.orbits.continuation import Follower, branch
+from hsdsl.orbits.continuation import CIRCLE, Follower, branch
 from hsdsl.orbits.orbit import Orbit, judged, multipliers_of, returning
 from hsdsl.orbits.section import LONGER, NoReturn, Return, Section, without_noise
 from hsdsl.orbits.shooting import COARSER, Closed, NotClosed, closed
@@ -261,7 +261,7 @@ class Orbits:
             follower = Follower(passage, first.closed, value, (low, high))
             parts = [branch(follower, -1.0)]
             lasted = first.period
-            parts.append(branch(follower, 1.0))
+            parts.append(branch(follower, 1.0) if parts[0][-1] != CIRCLE else (parts[0][0][-1:], [], CIRCLE))
         except NoReturn as error:
             raise UsageError(f"the orbit at {parameter} = {value:g} cannot be followed: {error}") from None
         (back, behind, _), (onward, ahead, _) = parts

@@ -32,7 +32,7 @@ class Branch:
     points : tuple of Point
         In the order of the branch: ``parameter``, ``state``, ``phase``, ``period``, ``multipliers``, ``unstable``.
     bifurcations : tuple of Bifurcation
-        ``kind`` (fold, flip, torus or grazing), ``parameter``, ``state``.
+        ``kind`` (fold, branch point, flip, torus or grazing), ``parameter``, ``state``.
     stable : list of (float, float)
         The ranges of the parameter of its stable pieces, in the order of the branch.
     ends : tuple of str

@@ -5,12 +5,13 @@ than unknowns. From an orbit a step goes along the tangent, and Newton's method 
 comes back to the branch across it (H. B. Keller, Numerical solution of bifurcation and nonlinear eigenvalue problems,
 1977). So a branch is followed around a fold.
 
-======== ===========================================================================================================
-fold     the parameter turns back: a multiplier passes 1
-flip     a multiplier passes -1: an orbit of twice the period begins or ends
-torus    a pair of complex multipliers passes the unit circle
-grazing  a transition of the orbit begins or ends, or its rate becomes zero; the branch ends where it is not smooth
-======== ===========================================================================================================
+============ =======================================================================================================
+fold         the parameter turns back: a multiplier passes 1
+branch point a multiplier passes 1 and the parameter goes on: another branch crosses, as of orbits without a symmetry
+flip         a multiplier passes -1: an orbit of twice the period begins or ends
+torus        a pair of complex multipliers passes the unit circle
+grazing      a transition of the orbit begins or ends, or its rate becomes zero; the branch ends where it is not smooth
+============ =======================================================================================================
 """
 
 from __future__ import annotations
@@ -20,10 +21,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
 from hsdsl.execution import Array
-from hsdsl.orbits.orbit import multipliers_of
+from hsdsl.orbits.orbit import LEAST_MARGIN, multipliers_of
 from hsdsl.orbits.section import NoReturn, Return
 from hsdsl.orbits.shooting import CLOSED, Closed, gap
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
@@ -33,7 +35,9 @@ MOST_POINTS, MOST_CORRECTIONS = 400, 8
 FIRST, LEAST, LARGEST = 0.02, 1e-7, 0.05  # steps relative to the sizes of states and to the range of the parameter
 CLOSE = 1e-6  # a share of the parameter's range: bifurcations of one kind that are closer are one
 PRECISE = 1e-12
-KINDS = ("fold", "flip", "torus", "grazing")
+NODES = 8  # of a step, where it is interpolated
+KINDS = ("fold", "branch point", "flip", "torus", "grazing")
+CIRCLE = "the branch is closed"
 
 
 @dataclass(frozen=True)
@@ -140,6 +144,19 @@ class Follower:
         ahead[self.kept] += length * here.tangent * self.scale[self.kept]
         return self.solution(ahead, here.tangent)
 
+    def comes_back(self, first: Solution, here: Solution, ahead: Solution) -> bool:
+        """Whether a step passes the first solution, whose phase is known up to periods: a branch may be a circle."""
+        missing, step = ((each.unknowns - here.unknowns) / self.scale for each in (first, ahead))
+        missing[-2] -= round(missing[-2])
+        if not 0 < missing @ step <= step @ step or np.linalg.norm(missing) > np.linalg.norm(step):
+            return False
+        try:
+            found = self.step(here, float(here.tangent @ missing[self.kept]))
+        except NoReturn:
+            return False
+        apart = (found.unknowns - here.unknowns) / self.scale - missing
+        return bool(np.max(np.abs(apart[self.kept])) < CLOSE)
+
     def point(self, here: Solution) -> Point:
         """What is reported of a solution."""
         n = len(here.unknowns) - 2
@@ -161,6 +178,7 @@ class Follower:
         pairs = [m for m in found.tolist() if m.imag > 0]
         return {
             "fold": float(here.tangent[-1]),
+            "branch point": float(here.tangent[-1] * np.prod(found - 1).real),
             "flip": float(np.prod(found + 1).real),
             "torus": float(np.prod([abs(m) - 1 for m in pairs])) if pairs else 1.0,
         }
@@ -169,7 +187,7 @@ class Follower:
 def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcation], str]:
     """Follow a branch in one way until the parameter leaves its range: its points, bifurcations, and why it ends."""
     low, high = sorted(follower.range)
-    here = previous = follower.first(way)
+    first = here = previous = follower.first(way)
     points, found, length = [follower.point(here)], list[Bifurcation](), FIRST
     while len(points) < MOST_POINTS:
         try:
@@ -197,12 +215,9 @@ def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcatio
         if not low <= points[-1].parameter <= high:
             points[-1] = _at_the_end(follower, points[-2], points[-1], min(max(points[-1].parameter, low), high))
             return points, [b for b in found if low <= b.parameter <= high], "the parameter is at the end of its range"
-        if (
-            len(points) > 8
-            and np.allclose(points[-1].state, points[0].state, rtol=1e-6)
-            and (abs(points[-1].parameter - points[0].parameter) < CLOSE * (high - low))
-        ):
-            return points, found, "the branch is closed"
+        if follower.comes_back(first, previous, here):
+            points[-1] = points[0]
+            return points, found, CIRCLE
     return points, found, f"{MOST_POINTS} orbits were found"
 
 
@@ -223,6 +238,8 @@ def _between(follower: Follower, here: Solution, ahead: Solution, length: float)
     for kind in before:
         if before[kind] * after[kind] >= 0:
             continue
+        if kind == "branch point" and _families(follower, here, ahead):
+            continue
         if kind == "torus" and len(_pairs(follower, here)) != len(_pairs(follower, ahead)):
             continue  # a pair became real on the way
 
@@ -230,12 +247,31 @@ def _between(follower: Follower, here: Solution, ahead: Solution, length: float)
             return follower.tests(follower.step(here, s))[kind]
 
         try:
-            solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
-            there = follower.step(here, solve(value, 0.0, length, xtol=PRECISE * length, rtol=1e-12))
+            if kind == "branch point":
+                there = _interpolated(follower, here, length, kind)
+            else:
+                solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
+                there = follower.step(here, solve(value, 0.0, length, xtol=PRECISE * length, rtol=1e-12)).unknowns
         except (NoReturn, ValueError):
-            there = ahead
-        found.append(Bifurcation(kind, float(there.unknowns[-1]), there.unknowns[:-2]))
+            there = ahead.unknowns
+        found.append(Bifurcation(kind, float(there[-1]), there[:-2]))
     return found
+
+
+def _interpolated(follower: Follower, here: Solution, length: float, kind: str) -> Array:
+    """The unknowns where a test is zero, from solutions around it: at it the equations have no single one."""
+    nodes = length * (1 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)) / 2
+    solutions = [follower.step(here, s) for s in nodes.tolist()]
+    rows = np.array([[*each.unknowns, follower.tests(each)[kind]] for each in solutions])
+    *unknowns, value = (Polynomial.fit(nodes, column, NODES - 1, domain=[0, length]) for column in rows.T)
+    solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
+    zero = solve(value, 0.0, length)
+    return np.array([each(zero) for each in unknowns])
+
+
+def _families(follower: Follower, *solutions: Solution) -> bool:
+    """Whether a multiplier is 1 but for its error, as on families of orbits."""
+    return any(np.any(np.abs(follower.multipliers(each) - 1) < LEAST_MARGIN) for each in solutions)
 
 
 def _pairs(follower: Follower, here: Solution) -> list[complex]:

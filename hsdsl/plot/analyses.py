@@ -23,7 +23,7 @@ BANDS = ("#0b5394", "#c8c8c8", "#b45f06")  # colours of distances over time
 DECADES = 12  # below the largest value: smaller ones are drawn there
 LONGEST = 40  # letters of a label of runs from nearby
 MOST = 12  # sequences of transitions in their legend
-MARKERS = {"fold": "o", "flip": "D", "torus": "s", "grazing": "X"}
+MARKERS = {"fold": "o", "branch point": "P", "flip": "D", "torus": "s", "grazing": "X"}
 
 
 @to_file

@@ -71,7 +71,7 @@ def _moves(
     ends: list[Number] = []
     for way in (step, -step):
         moved = [a + way * s for a, s in zip(values, (*columns, *slopes), strict=True)]
-        t, x, data = moved[0], moved[1 : len(columns)], _data(run, moved[len(columns) :], moved[0])
+        t, x, data = moved[0], moved[1 : len(columns)], data_at(run, moved[len(columns) :], moved[0])
         ends.append(run.problem.kernel.bind(run.index(place.mode.name), data).surfaces(t, *x)[k])
     slope = (ends[0] - ends[1]) / (2 * step)
     gradient, flow = place.kernel.gradients[k](place.t, *place.x), (0, *place.kernel.flow(place.t, *place.x))
@@ -81,8 +81,8 @@ def _moves(
     return abs(slope) > least and abs(slope) * step > place.roundoff_bound(k)
 
 
-def _data(run: RunView, parameters: Sequence[Number], t: Number) -> Sequence[Number]:
-    """Other parameters, with the inputs that follow from them."""
+def data_at(run: RunView, parameters: Sequence[Number], t: Number) -> Sequence[Number]:
+    """Other parameters at a time, with the inputs that follow from them."""
     program, timeline = run.problem.program, run.problem.timeline
     if any(given.times is None for given in program.inputs):
         timeline = make_timeline(program, run.problem.kernel, parameters, run.problem.settings.until)

@@ -126,7 +126,8 @@ class Sensitivity:
     @cached_property
     def ties(self) -> tuple[Tie, ...]:
         """The instants where the order of transitions may matter, with the derivatives of each order."""
-        return tuple(ties(RunView(self.setting.augmented, self.execution), self.wrt))
+        moving = [any(row) for row in zip(*self.setting.parameters.values(), strict=True)]
+        return tuple(ties(RunView(self.setting.augmented, self.execution), self.wrt, moving))
 
     @cached_property
     def sides(self) -> dict[str, Sensitivity]:

@@ -11,14 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Transition
+from hsdsl.kernel import ModeKernel
+from hsdsl.sensitivity.landing import data_at
 from hsdsl.sensitivity.state_names import derivative_name, own, shift_name
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.commutation import settle
+from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 
+POINTS, AROUND = 4, 2.0**-12  # where guards are compared: so many points, this share of sizes away
 Slopes = dict[str, Number]
 
 
@@ -45,13 +52,16 @@ class Tie:
     reason: str | None
 
 
-def ties(run: RunView, wrt: Sequence[str]) -> Iterator[Tie]:
-    """Look at every instant of an augmented run where guards are reached together, or one is landed on."""
+def ties(run: RunView, wrt: Sequence[str], moving: Sequence[bool]) -> Iterator[Tie]:
+    """Look at every instant of an augmented run where guards are reached together, or one is landed on.
+
+    ``moving`` says of each parameter of the model whether it moves with any name in ``wrt``.
+    """
     last: Transition | None = None
     tied_at: Number | None = None
     for made in run.transitions:
         tie = run.tie(made.time)
-        others = () if made.entry else _others(run, made)
+        others = () if made.entry else _others(run, made, moving)
         if others:
             yield _tie(run, made, others, wrt)
             tied_at = made.time
@@ -63,19 +73,37 @@ def ties(run: RunView, wrt: Sequence[str]) -> Iterator[Tie]:
         last = made
 
 
-def _others(run: RunView, made: Transition) -> tuple[str, ...]:
+def _others(run: RunView, made: Transition, moving: Sequence[bool]) -> tuple[str, ...]:
     """The edges tied with a transition but those with the same guard, which are reached with it from everywhere."""
     if not made.alternatives:
         return ()
     place, own = run.before(made)
-    slopes = [gradient(place.t, *place.x) for gradient in place.kernel.gradients]
-    least = run.arithmetic.sqrt(run.arithmetic.unit)
+    nearby, least = [*_nearby(run, place, moving)], run.arithmetic.sqrt(run.arithmetic.unit)
 
     def same(k: int) -> bool:
-        pairs = zip(slopes[own], slopes[k], strict=True)
-        return all(abs(a - b) <= least * max(abs(a), abs(b)) for a, b in pairs)
+        try:
+            values = [(surfaces[own], surfaces[k]) for surfaces in (kernel.surfaces(*z) for kernel, z in nearby)]
+        except DOMAIN_ERRORS:
+            return False
+        products = [(a * d, b * c) for (a, b), (c, d) in pairwise(values)]
+        return all(abs(a - b) <= least * max(abs(a), abs(b)) for a, b in products)
 
     return tuple(edge for edge in made.alternatives if not same(run.edge_at(place, edge)))
+
+
+def _nearby(run: RunView, place: Place, moving: Sequence[bool]) -> Iterator[tuple[ModeKernel, list[Number]]]:
+    """Points all around a place, with the parameters that move: two surfaces in one proportion there are one guard."""
+    values = [place.t, *place.x, *run.problem.timeline.at(place.t).data[: len(run.problem.program.parameters)]]
+    sizes = [abs(value) or 1.0 for value in values]
+    for i, x in enumerate(place.mode.states, 1):
+        sizes[i] = max(abs(values[i]), run.sizes.get(x, 0.0)) or 1.0
+    moves = np.ones(len(values))
+    moves[1 + len(place.x) :] = 0
+    moves[1 + len(place.x) : 1 + len(place.x) + len(moving)] = moving
+    for shares in AROUND * np.random.default_rng(0).uniform(-1, 1, (POINTS, len(values))) * moves:
+        t, *rest = (v + share * size for v, share, size in zip(values, shares.tolist(), sizes, strict=True))
+        x, parameters = rest[: len(place.x)], rest[len(place.x) :]
+        yield run.problem.kernel.bind(run.index(place.mode.name), data_at(run, parameters, t)), [t, *x]
 
 
 def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[str]) -> Tie:

@@ -62,6 +62,51 @@ def test_fold_and_grazing() -> None:
         assert point.parameter == pytest.approx(size * np.hypot(1 + p * v, q * v / forcing), rel=1e-9)
 
 
+def test_torus() -> None:
+    """The product of the multipliers is c**2 exp(-2 a T): on the unit circle where a is log(c)/T."""
+    text = OSCILLATOR.format(F=0.6, W=0.8).replace("c: 0.8", "c: 0.78")
+    branch = hsdsl.loads(text).continuation("impact", "a", -0.05, 0.05)
+    assert kinds(branch).keys() == {"torus"}
+    assert kinds(branch)["torus"] == pytest.approx(np.log(0.78) / (2 * np.pi / 0.8), rel=1e-10)
+
+
+def test_branch_point_of_two_laps() -> None:
+    """Where an orbit flips, the same orbit twice has a multiplier that passes 1: orbits of two laps cross there."""
+    text = OSCILLATOR.format(F=0.62, W=0.78).replace("c: 0.8", "c: 0.75")
+    once, twice = (hsdsl.loads(text).continuation("impact", "F", 0.5, 0.65, laps=laps) for laps in (1, 2))
+    assert kinds(once).keys() == {"flip"} and kinds(twice).keys() == {"branch point"}
+    assert kinds(twice)["branch point"] == pytest.approx(kinds(once)["flip"], rel=1e-10)
+    assert np.allclose(twice.stable, once.stable, rtol=1e-10)
+
+
+STOPS = """
+hsdsl: 1
+parameters: {{a: 0.1, c: 0.7, F: 2, W: {W}, s: 1}}
+modes:
+  free:
+    flow: {{x: v, v: F*cos(W*t) - 2*a*v - x}}
+    transitions:
+      - {{when: x >= s, to: free, name: right, reset: {{v: -c*v}}}}
+      - {{when: x <= -s, to: free, name: left, reset: {{v: -c*v}}}}
+initial: {{mode: free, x: 0.2, v: 0.4}}
+experiment: {{until: 300}}
+"""
+
+
+@pytest.mark.slow
+def test_orbits_that_lose_a_symmetry() -> None:
+    """Between two branch points of the symmetric orbit there is a circle of others, which turns at both."""
+    symmetric, others = (hsdsl.loads(STOPS.format(W=W)).continuation("right", "W", 0.9, 1.7) for W in (1.65, 1.25))
+    assert [found.kind for found in symmetric.bifurcations] == ["branch point"] * 2
+    assert [found.kind for found in others.bifurcations] == ["fold"] * 2
+    assert others.ends == ("the branch is closed",) * 2
+    assert np.array_equal(others.points[0].state, others.points[-1].state)
+    values = [sorted(found.parameter for found in branch.bifurcations) for branch in (symmetric, others)]
+    assert np.allclose(*values, rtol=1e-7)
+    (_, first), (second, _) = symmetric.stable
+    assert np.allclose([first, second], values[0])
+
+
 def test_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model, picture = tmp_path / "model.yaml", tmp_path / "branch.png"
     model.write_text(OSCILLATOR.format(F=0.6, W=0.8))

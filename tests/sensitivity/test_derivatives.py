@@ -319,6 +319,63 @@ def test_one_sided_derivatives() -> None:
         assert np.isclose((run.final.state["x"] - 1) / way, expected[first][0][0], rtol=1e-6)
 
 
+TWO_GUARDS = """
+hsdsl: 1
+parameters: {{a: 2, b: 0.25}}
+modes:
+  A:
+    flow: {{x: 1, y: b}}
+    transitions:
+      - {{when: x >= 2, to: B, name: one, reset: {{y: y + x - 2}}}}
+      - {{when: {guard}, to: B, name: two, reset: {{y: {lands}}}}}
+  B: {{flow: {{x: 1, y: 0}}}}
+initial: {{mode: A, x: 0.5, y: 0}}
+experiment: {{until: 3}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("guard", "lands", "wrt", "slopes"),
+    [
+        ("a*x >= 4", "y - 5*(x - 2)", "a", {"one": 0, "two": 5 - 0.25}),  # x of two is 4/a; y flows up to there
+        ("a*x >= 4", "y - 5*(x - 2)", "initial.x", None),  # the guards part by a alone
+        ("3*x >= 6", "y - 5*(x - 2)", "a", None),
+        ("x + (y - 3/8)**2 >= 2", "y + 2*(y - 3/8)", "initial.y", {"one": 1, "two": 3}),
+    ],
+)
+def test_guards_that_touch_are_two(guard: str, lands: str, wrt: str, slopes: dict[str, float] | None) -> None:
+    """Guards with one gradient at a point, that nearby executions reach one by one: in proportion they are one."""
+    found = hsdsl.loads(TWO_GUARDS.format(guard=guard, lands=lands)).sensitivity(wrt)
+    assert [made.alternatives for made in found.execution.transitions] == [("two",)]
+    assert found.exists is (slopes is None)
+    assert {first: side.final.state["y"][wrt] for first, side in found.sides.items()} == pytest.approx(slopes or {})
+
+
+DOSES = """
+hsdsl: 1
+parameters: {T: 2.25, k: 0.3, low: 1.5}
+modes:
+  before: {flow: {A: -k*A}, transitions: [{when: A <= low, to: after, name: falls}]}
+  after: {flow: {A: -k*A}, transitions: [{name: dose, EVENT, reset: {A: A + 2}}]}
+initial: {mode: before, A: 2}
+experiment: {until: 5}
+"""
+
+
+@pytest.mark.parametrize(
+    "event", ["event: t >= T", 'event: "t >= T and A < 1.2"', "event: t > T - 1, delay: 1, values: execution"]
+)
+def test_an_event_at_a_time_that_moves(event: str) -> None:
+    """What an event remembers jumps with its condition, and that is no jump of an input."""
+    model = hsdsl.loads(DOSES.replace("EVENT", event))
+    assert model.simulate().verdict.theorem == "holds"
+    found = model.sensitivity("T,k,initial.A")
+    assert found.exists is True
+    later = 2 * np.exp(-0.3 * (5 - 2.25))
+    exact = {"T": 0.3 * later, "k": -10 * np.exp(-0.3 * 5) - (5 - 2.25) * later, "initial.A": np.exp(-0.3 * 5)}
+    assert found.final.state["A"] == pytest.approx(exact, rel=1e-10)
+
+
 GRAZING = """
 hsdsl: 1
 parameters: {s: 1}
