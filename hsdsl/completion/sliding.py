@@ -10,7 +10,7 @@ takes it onto the surface along the difference of the flows: errors of steps do 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import sympy as sp
@@ -38,12 +38,17 @@ def with_sliding(system: HybridSystem) -> HybridSystem:
     found = slidings(system)
     if not found:
         return system
+    return replace(system, modes=(*with_entries(system, found), *(sliding.mode for sliding in found)))
+
+
+def with_entries(system: HybridSystem, found: Sequence[Sliding]) -> tuple[Mode, ...]:
+    """The modes of a system with the edges into slidings."""
     modes = {mode.name: mode for mode in system.modes}
     for sliding in found:
         for entry in sliding.entries:
             mode = modes[entry.source]
             modes[mode.name] = replace(mode, edges=(*mode.edges, entry))
-    return replace(system, modes=(*modes.values(), *(sliding.mode for sliding in found)))
+    return tuple(modes.values())
 
 
 def slidings(system: HybridSystem) -> list[Sliding]:
@@ -149,13 +154,31 @@ def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:
     seen: list[Edge] = []
     for mode, own in ((a, out), (b, back)):
         for edge in mode.edges:
-            if edge is own or any(_same(e, edge) for e in seen):
+            if edge is own:
+                continue
+            edge = _kept_on(name, a.states, out.surface.residual, edge)
+            if any(_same(e, edge) for e in seen):
                 continue
             seen.append(edge)
             taken = {e.name for e in found}
             label = edge.name if edge.name not in taken else f"{edge.name}_{mode.name}"
             found.append(replace(edge, name=label, source=name))
     return found
+
+
+def _kept_on(name: str, states: tuple[str, ...], r: sp.Expr, edge: Edge) -> Edge:
+    """An edge of a mode, as one that leads back to the sliding where it leads back to its mode and keeps the surface.
+
+    So a ball that comes to rest beside a sliding does so in it. Where nothing presses behind the reset, sliding ends.
+    """
+    resets = dict(zip(edge.target_states, zip(edge.reset, edge.reset_texts, strict=True), strict=True))
+    if edge.target != edge.source or edge.of_event or set(resets) != set(states):
+        return edge
+    reset, texts = zip(*map(resets.__getitem__, states), strict=True)
+    there = r.xreplace({symbol(state): value for state, value in zip(states, reset, strict=True)})
+    if sp.expand(there - r) != 0:
+        return edge
+    return replace(edge, target=name, target_states=states, reset=reset, reset_texts=texts)
 
 
 def _same(one: Edge, other: Edge) -> bool:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import sympy as sp
@@ -13,7 +13,7 @@ from hsdsl.completion.contact import Contact, contact
 from hsdsl.completion.insertions import Insertions, flow_style
 from hsdsl.completion.nearby import LONG, cancelled
 from hsdsl.completion.printer import inequality, text_of, wall
-from hsdsl.completion.sliding import Sliding, slidings
+from hsdsl.completion.sliding import Sliding, slidings, with_entries
 from hsdsl.expression.scope import symbol
 from hsdsl.source import Mapping, Node, Text, child
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
@@ -28,17 +28,25 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     A transition to the same mode enters the motion along its guard where the flight that follows it would last less
     than the parameter ``contact_time``. None where nothing can be completed.
     """
-    contacts = [(mode, found) for mode in system.modes for k in range(len(mode.edges)) if (found := contact(mode, k))]
     surfaces = slidings(system)
+    further = [_leaving_on_surface(sliding) for sliding in surfaces]
+    modes = {mode.name: mode for mode in (*with_entries(system, surfaces), *further)}
+    contacts = [found for mode in modes.values() for k in range(len(mode.edges)) if (found := contact(mode, k))]
     if not contacts and not surfaces:
         return None
-    writer = _Writer(text, root, system)
-    for sliding in surfaces:
-        for entry in sliding.entries:
-            writer.add_transition(entry.source, _transition(entry))
-    slide = [(_leaving_on_surface(s), s.mode.name) for s in surfaces]
-    for mode, name in slide + [writer.add_contact(*found) for found in contacts]:
-        writer.add_mode(_without_constant_guards(mode, system), name)
+    writer = _Writer(text, root, system, modes.values())
+    entries = [entry for sliding in surfaces for entry in sliding.entries]
+    for found in contacts:
+        entry, mode = writer.contact(found)
+        entries.append(entry)
+        further.append(mode)
+    written = {mode.name for mode in system.modes}
+    for entry in entries:
+        if entry.source in written:
+            writer.add_transition(entry)
+    for mode in further:
+        own = tuple(entry for entry in entries if entry.source == mode.name)
+        writer.add_mode(_without_constant_guards(replace(mode, edges=(*mode.edges, *own)), system))
     return writer.insertions.result()
 
 
@@ -64,15 +72,15 @@ def _without_constant_guards(mode: Mode, system: HybridSystem) -> Mode:
 class _Writer:
     """The modes and transitions that are inserted into the text of a model, with names that are free."""
 
-    def __init__(self, text: Text, root: Node, system: HybridSystem) -> None:
+    def __init__(self, text: Text, root: Node, system: HybridSystem, modes: Iterable[Mode]) -> None:
         assert isinstance(root, Mapping)
         self._root, self._system, self.insertions = root, system, Insertions(text)
-        self._names = {mode.name for mode in system.modes} | {p.name for p in system.parameters}
+        self._names = {mode.name for mode in modes} | {p.name for p in system.parameters}
         self._time: str | None = None
 
-    def add_contact(self, mode: Mode, found: Contact) -> tuple[Mode, str]:
-        """Add the transition into a motion along a guard; return its mode and the name of that."""
-        k = found.edge
+    def contact(self, found: Contact) -> tuple[Edge, Mode]:
+        """The transition into a motion along a guard, and its mode."""
+        mode, k = found.base, found.edge
         edge = mode.edges[k]
         label = f"contact_{mode.name}" + ("" if "->" in edge.name else f"_{edge.name}")
         name = self._free(re.sub(r"\W", "_", label))
@@ -88,7 +96,7 @@ class _Writer:
         condition = soon if edge.condition is None else sp.And(edge.condition, soon)
         landing = edge.reset if found.order == 1 else tuple(cancelled(after(value)) for value in found.landing)
         entry = replace(edge, name=f"{mode.name}->{name}", target=name, condition=condition, reset=landing)
-        self.add_transition(mode.name, _transition(replace(entry, priority=edge.priority + 1)))
+        entry = replace(entry, priority=edge.priority + 1)
         edges = list(found.mode.edges)
         for j in (k, *range(len(mode.edges), len(edges))):
             edges[j] = replace(edges[j], name=f"{name}->{mode.name}", reset=_onto_guard(mode, found))
@@ -96,7 +104,7 @@ class _Writer:
             time = symbol(self._contact_time())
             depth = time * found.push if found.order == 1 else time**2 * found.push / 2
             edges[j] = replace(edges[j], condition=end, reset=_onto_guard(mode, found, depth))
-        return replace(found.mode, edges=tuple(edges)), name
+        return entry, replace(found.mode, name=name, edges=tuple(edges))
 
     def _free(self, name: str) -> str:
         while name in self._names:
@@ -116,22 +124,23 @@ class _Writer:
                 self.insertions.append(parameters, entry, entry)
         return self._time
 
-    def add_transition(self, mode: str, fields: dict[str, str]) -> None:
-        """Add a transition behind those of a mode."""
-        node = child(child(child(self._root, "modes"), mode), "transitions")
+    def add_transition(self, edge: Edge) -> None:
+        """Add a transition behind those of its mode."""
+        node = child(child(child(self._root, "modes"), edge.source), "transitions")
         assert node is not None
+        fields = _transition(edge)
         self.insertions.append(node, flow_style(fields), "\n".join(_transition_lines(fields, node.place.start[2])))
 
-    def add_mode(self, mode: Mode, name: str) -> None:
+    def add_mode(self, mode: Mode) -> None:
         """Add a mode behind the others."""
         node = child(self._root, "modes")
         assert node is not None
         end = "" if mode.edges else "  # hsdsl: ignore[HS425] no transition leads out of this motion"
-        block = f"{name}:{end}\n" + "".join(f"  {line}\n" for line in _mode_lines(mode, self._system))
+        block = f"{mode.name}:{end}\n" + "".join(f"  {line}\n" for line in _mode_lines(mode, self._system))
         edges = ", ".join(flow_style(_transition(edge)) for edge in mode.edges)
         parts = [f"flow: {flow_style(_flow(mode))}", *_rest(mode, self._system)]
         parts += [f"transitions: [{edges}]"] if mode.edges else []
-        self.insertions.append(node, f"{name}: {{{', '.join(parts)}}}", block.rstrip("\n"))
+        self.insertions.append(node, f"{mode.name}: {{{', '.join(parts)}}}", block.rstrip("\n"))
 
 
 def _onto_guard(mode: Mode, found: Contact, depth: sp.Expr = sp.S.Zero) -> tuple[sp.Expr, ...]:

@@ -33,10 +33,9 @@ from hsdsl.simulate.verdict.recorded_run import RecordedRun
 Passage = Callable[[Array, float, float], tuple[Return, float | None, float]]
 MOST_POINTS, MOST_CORRECTIONS = 400, 8
 FIRST, LEAST, LARGEST = 0.02, 1e-7, 0.05  # steps relative to the sizes of states and to the range of the parameter
-CLOSE = 1e-6  # a share of the parameter's range: bifurcations of one kind that are closer are one
+CLOSE = 1e-6  # of the sizes of states and of the parameter's range: solutions that are no further apart are one
 PRECISE = 1e-12
 NODES = 8  # of a step, where it is interpolated
-KINDS = ("fold", "branch point", "flip", "torus", "grazing")
 CIRCLE = "the branch is closed"
 
 
@@ -62,12 +61,12 @@ class Point:
     @property
     def unstable(self) -> int:
         """How many multipliers are above one in size."""
-        return int(np.sum(np.abs(self.multipliers) > 1 + CLOSED))
+        return int(np.sum(np.abs(self.multipliers) > 1 + LEAST_MARGIN))
 
 
 @dataclass(frozen=True)
 class Bifurcation:
-    """A place of a branch where orbits change: one of :data:`KINDS`, the parameter, and the state there.
+    """A place of a branch where orbits change: its kind (the table above), the parameter, and the state there.
 
     It lies between the points ``after`` and the next one of the branch.
     """
@@ -223,8 +222,7 @@ def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcatio
 
 def sequence(here: Solution) -> list[str]:
     """The transitions of a period."""
-    tie = 1e-9 * here.passage.time
-    return [made.edge for made in here.passage.execution.transitions if made.time <= here.passage.time + tie]
+    return [made.edge for made in here.passage.execution.transitions[: here.passage.index + 1]]
 
 
 def _turns(here: Solution, ahead: Solution) -> bool:

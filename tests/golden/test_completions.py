@@ -166,6 +166,24 @@ def test_sliding_on_a_circle_with_a_tangential_exit(method: str, engine: str) ->
     assert [t.time for t in run.transitions] == pytest.approx([math.log(2), 1.335949117872369], abs=1e-10)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("start", [-0.2, -2.5])
+def test_a_ball_comes_to_rest_beside_a_sliding(start: float, method: str, engine: str) -> None:
+    """Flights of 1, 2/3, 4/9, ... end at t = 2.5; sliding begins before or behind that, with y' = 1 + 2 (1 - w)/3."""
+    modes = """
+  a: {flow: {x: 1, h: v, v: -8, y: 1}, transitions: [
+    {when: x >= t/4, to: b}, {name: hit, when: h <= 0, to: a, reset: {v: -2*v/3}}]}
+  b: {flow: {h: v, v: -8, x: -2, y: 3}, transitions: [
+    {when: x <= t/4, to: a}, {name: hit, when: h <= 0, to: b, reset: {v: -2*v/3}}]}"""
+    run = sliding(modes, f"x: {start}, y: 0, h: 1, v: 0", 5, method=method, engine=engine, tolerance=1e-11)
+    begins = -start / (1 - 1 / 4)
+    assert run.stop.reason == "until" and run.final.mode == "sliding_a_b"
+    assert run.final.state["y"] == pytest.approx(begins + 1.5 * (5 - begins), abs=1e-9)
+    assert [run.final.state[name] for name in "xhv"] == pytest.approx([5 / 4, 0, 0], abs=1e-9)
+    assert run.verdict.theorem == "left" and any("along the guard of hit" in reason for reason in run.verdict.reasons)
+
+
 def test_long_sliding_on_a_curve_does_not_drift() -> None:
     """Two flows press on the circle from both sides for ever, and turn along it."""
     modes = """
@@ -264,6 +282,13 @@ COMPLETED = {
     flow: {x: 0.8, y: -0.5}
     transitions:
       - {when: y <= 1, to: b}""", "x: -0.3, y: -0.3", 3),
+    # comes to rest before it slides
+    "slides beside a ball at rest": ordinary("""
+  a: {flow: {x: 1, h: v, v: -8, y: 1}, transitions: [
+    {when: x >= 0.4*sin(2*t), to: b}, {name: hit, when: h <= 0, to: a, reset: {v: -v/3}}]}
+  b: {flow: {x: -1.5, h: v, v: -8, y: 3}, transitions: [
+    {when: x <= 0.4*sin(2*t), to: a}, {name: hit, when: h <= 0, to: b, reset: {v: -v/3}}]}""",
+                                             "x: -1.5, h: 0.7, v: 0, y: 0", 2.5),
     # numbers of many digits
     "slides on a curve": ordinary("""
   a: {flow: {x: 0.7654321, y: 0.912345}, transitions: [{when: y - 0.34567*sin(1.2345*x) >= 0, to: b}]}

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from hsdsl.arithmetic import Number
+from hsdsl.enclosures import Range
 from hsdsl.execution import Arc
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
@@ -28,7 +29,7 @@ def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]
     if not any(edge.conditional for edge in edges):
         return
     with np.errstate(all="ignore"):
-        kernel, (first, last) = steps.bound(run), steps.ends()
+        kernel, (first, last) = steps.bound(run), (_recorded(run, steps, after) for after in (0, 1))
         before, after = (kernel.surfaces(*end) for end in (first, last))
     for k, edge in enumerate(edges):
         if not edge.conditional:
@@ -44,6 +45,13 @@ def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]
             reached = place.value(k) > 0 or abs(place.value(k)) <= level
             if reached and (finding := undecided_condition(run, place, k, row + 1, passed)):
                 yield finding
+
+
+def _recorded(run: RunView, steps: Parts, after: int) -> list[Range]:
+    """Time and states of the rows where steps begin, or of those after them: a polynomial ends beside its row."""
+    rows, execution = steps.row + after, run.execution
+    points = np.column_stack([execution.times[rows], execution.values[rows][:, : steps.bernstein.shape[1]]])
+    return [Range(column, column) for column in points.astype(float).T]
 
 
 def shares_between(start: float, end: float) -> list[float]:
