@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -166,7 +167,6 @@ class Sensitivity:
     def _landings(self, ways: Mapping[str, Slopes]) -> list[tuple[Any, str]]:
         """The first landing on a guard from which executions nearby go on in different ways."""
         view = RunView(self.setting.plain, self.execution)
-        tied = {show(tie.time) for tie in self.ties}
 
         def along(row: Slopes) -> Slopes:
             return {way: sum(row[by] * part for by, part in parts.items()) for way, parts in ways.items()}
@@ -175,7 +175,9 @@ class Sensitivity:
         moved = [along({by: own[by][i] for by in self.wrt}) for i in range(len(names))]
         parameters = {way: tuple(row[way] for row in moved) for way in ways}
         for made in self.execution.transitions:
-            if show(made.time) in tied:  # its orders have been looked at
+            if any(
+                abs(made.time - tie.time) <= view.problem.tie(tie.time) for tie in self.ties
+            ):  # its orders are known
                 continue
             after = made.after or {}
             time = self._shifts(after)
@@ -309,8 +311,8 @@ class Sensitivity:
         if not plain.program.modes[index].states:
             return [0] * len(x)
         segments = plain.timeline.segments
-        earlier = [s for s in segments if s.start < t or s is segments[0]]
-        segment = plain.timeline.at(t) if after else earlier[-1]
+        earlier = bisect_left(segments, t, key=lambda each: each.start) - 1
+        segment = plain.timeline.at(t) if after else segments[max(0, earlier)]
         return plain.kernel.bind(index, segment.data).flow(t, *x)
 
     def _rests(self, mode: str) -> bool:

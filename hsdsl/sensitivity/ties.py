@@ -60,7 +60,7 @@ def ties(run: RunView, wrt: Sequence[str], moving: Sequence[bool]) -> Iterator[T
     last: Transition | None = None
     tied_at: Number | None = None
     for made in run.transitions:
-        tie = run.tie(made.time)
+        tie = run.problem.tie(made.time)
         others = () if made.entry else _others(run, made, moving)
         if others:
             yield _tie(run, made, others, wrt)
@@ -108,7 +108,7 @@ def _nearby(run: RunView, place: Place, moving: Sequence[bool]) -> Iterator[tupl
 
 def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[str]) -> Tie:
     place, _ = run.before(made)
-    since = 2 * run.tie(made.time)
+    since = 2 * run.problem.tie(made.time)
     orders: list[Order] = []
     for edge in (made.edge, *others):
         try:
