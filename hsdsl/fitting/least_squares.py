@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
 from hsdsl.errors import UsageError
-from hsdsl.execution import Array
+from hsdsl.execution import Array, Execution
 from hsdsl.fitting.data import Measurements
 from hsdsl.fitting.fit import Fit
 from hsdsl.sensitivity.result import Sensitivity
@@ -24,6 +24,11 @@ TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends bef
 LARGEST = 1e100  # the weighted size of a column: its residuals have squares
 UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
 MOST_NAMED = 3
+BESIDE = 1e-6  # of the first value: what is nearer to a bound may be at it
+JUMP = 1e-8  # of the size of a column: less is no jump
+MOST_CROSSED = 32  # measurements that transitions pass
+LONGER = 1.25  # of the time of measurements
+FURTHER, NARROW = 1.1, 1e-6  # so many times as far, and by this share of the time, transitions are moved over them
 TIE = 1e-12  # of a run: times that are no further apart are one
 
 
@@ -114,24 +119,100 @@ def fitted(
         begun = _beginning(objective, share, begun, bounds, scales)
     if not np.array_equal(begun, first):
         results.append(_solved(objective, begun, bounds, scales))
-    return _fit(objective, min(results, key=lambda result: result.cost), bounds, sigma)
+    return _fit(objective, min(results, key=lambda result: result.cost), bounds, sigma, scales)
 
 
 def _solved(
     objective: Objective, first: Array, bounds: Mapping[str, tuple[float, float]], scales: Mapping[str, float]
 ) -> Any:
+    """A minimum near values, from which no transition is better off beyond the measurement next to it."""
     lower, upper = np.array([*bounds.values()], float).T
-    solve: Any = least_squares  # pyright: ignore[reportUnknownVariableType]
-    return solve(
-        objective.residuals,
-        np.clip(first, lower, upper),
-        jac=objective.slopes,
-        bounds=(lower, upper),
-        x_scale=np.array([scales[name] for name in objective.start]),
-        ftol=PRECISE,
-        xtol=PRECISE,
-        gtol=PRECISE,
-    )
+    sizes = np.array([scales[name] for name in objective.start])
+
+    def solved(first: Array) -> Any:
+        solve: Any = least_squares  # pyright: ignore[reportUnknownVariableType]
+        return solve(
+            objective.residuals,
+            np.clip(first, lower, upper),
+            jac=objective.slopes,
+            bounds=(lower, upper),
+            x_scale=sizes,
+            ftol=PRECISE,
+            xtol=PRECISE,
+            gtol=PRECISE,
+        )
+
+    best = solved(first)
+    for _ in range(MOST_CROSSED):
+        tried = (solved(best.x + step) for step in _steps_across(objective, best.x, sizes))
+        better = next((each for each in tried if each.cost < (1 - PRECISE) * best.cost), None)
+        if better is None:
+            break
+        best = better
+    return best
+
+
+@dataclass(frozen=True)
+class WrongSide:
+    """A measurement that agrees better with the other side of the transition next to it.
+
+    ``gain`` is what the sum of squares would lose there, ``late`` how much later than the transition it is, and
+    ``slope`` has the derivatives of the transition's time.
+    """
+
+    gain: float
+    late: float
+    slope: Array
+    sentence: str
+
+
+def _wrong_sides(objective: Objective, x: Array) -> list[WrongSide]:
+    """Those of a run with these values, the largest gains first: no derivative shows them.
+
+    The run goes on for a while, since its next transition may be one that was measured.
+    """
+    measured, there = objective.measured, list[WrongSide]()
+    found = objective.evaluate(objective.named(x), LONGER * float(measured.times.max()))
+    end = float(found.execution.times[-1])
+    for made, moves in zip(found.execution.transitions, found.as_made().transitions, strict=True):
+        slope, time = np.array([moves.time[by] for by in found.wrt], float), float(made.time)
+        near = TIE * max(time, end)
+        if not np.isfinite(slope).all() or not np.any(slope) or not near < time < end - near:
+            continue
+        later = measured.times > time
+        for rows in (np.flatnonzero(~later)[-1:], np.flatnonzero(later & (measured.times <= end))[:1]):
+            for at in measured.times[rows].tolist():
+                gain = _gain(objective, found.execution, at, [time - near, time + near][:: -1 if at > time else 1])
+                if gain > 0:
+                    sentence = f"the measurement at t = {show(at)} agrees better with the other side of {made.edge} at "
+                    there.append(WrongSide(gain, at - time, slope, f"{sentence}t = {show(time)}"))
+    return sorted(there, key=lambda each: -each.gain)
+
+
+def _gain(objective: Objective, run: Execution, at: float, sides: Sequence[float]) -> float:
+    """What squares at a time lose where the run is on the other side of a transition, from the first of two times."""
+    own, table, gain = run.sample([at]), run.sample(sorted(sides)), 0.0
+    order = np.argsort(np.argsort(sides))
+    for name, column in objective.measured.columns.items():
+        jump = float(np.diff(np.asarray(table[name], float)[order])[0])
+        if not abs(jump) > JUMP * objective.size(name) / objective.weights[name]:
+            continue
+        for y in column[objective.measured.times == at].tolist():
+            off = float(own[name][0]) - y
+            change = off**2 - (off + jump) ** 2
+            gain += objective.weights[name] ** 2 * change if np.isfinite(change) else 0.0  # was not measured
+    return gain
+
+
+def _steps_across(objective: Objective, x: Array, sizes: Array) -> Iterator[Array]:
+    """Steps by which a transition passes a measurement on its wrong side, those that change the others least."""
+    end, slopes = float(objective.measured.times.max()), objective.slopes(x) * sizes
+    shape = np.linalg.pinv(slopes.T @ slopes, rcond=UNKNOWN)
+    for each in _wrong_sides(objective, x)[:MOST_NAMED]:
+        way = shape @ (each.slope * sizes)
+        rate = float(each.slope * sizes @ way)
+        if rate > 0:
+            yield sizes * way * (FURTHER * each.late + np.copysign(NARROW * end, each.late)) / rate
 
 
 def _beginning(
@@ -157,8 +238,14 @@ def _check_start(objective: Objective, first: Array) -> None:
         )
 
 
-def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, float]], sigma: bool) -> Fit:
-    x = np.asarray(result.x, float)
+def _fit(
+    objective: Objective,
+    result: Any,
+    bounds: Mapping[str, tuple[float, float]],
+    sigma: bool,
+    scales: Mapping[str, float],
+) -> Fit:
+    x = _at_bounds(objective, np.asarray(result.x, float), bounds, np.array([scales[name] for name in objective.start]))
     residuals, slopes, found = objective.residuals(x), objective.slopes(x), objective.run(x)
     free = max(1, len(residuals) - len(x))
     variance = float(np.sum(residuals**2)) / free
@@ -182,10 +269,25 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
         str(result.message) if reached.all() else ends,
         objective.evaluations,
         at,
-        (*_close_transitions(found, objective.measured, covariance), *objective.bumps),
+        (*_close_transitions(found, objective.measured, covariance), *_named_sides(objective, x), *objective.bumps),
         objective.measured,
         found.run,
     )
+
+
+def _at_bounds(objective: Objective, x: Array, bounds: Mapping[str, tuple[float, float]], sizes: Array) -> Array:
+    """The values, those next to a bound at it where that is no worse: the method comes near it, and never there."""
+    limits = np.array([*bounds.values()], float).T
+    near = np.abs(limits - x) <= BESIDE * sizes
+    there = np.where(near[0], limits[0], np.where(near[1], limits[1], x))
+    if np.array_equal(there, x):
+        return x
+    worse = np.sum(objective.residuals(there) ** 2) > np.sum(objective.residuals(x) ** 2)
+    return x if worse else there
+
+
+def _named_sides(objective: Objective, x: Array) -> list[str]:
+    return [each.sentence for each in _wrong_sides(objective, x)[:MOST_NAMED]]
 
 
 def _covariance(slopes: Array) -> Array:
