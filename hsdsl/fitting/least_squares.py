@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,88 +14,18 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 from hsdsl.fitting.data import Measurements
 from hsdsl.fitting.fit import Fit
+from hsdsl.fitting.objective import Objective
+from hsdsl.fitting.wrong_sides import MOST_SIDES, UNKNOWN, steps_across, wrong_sides
 from hsdsl.names import INITIAL
 from hsdsl.sensitivity.result import Sensitivity
 from hsdsl.simulate.stops import show
 
-Evaluate = Callable[[Mapping[str, float], float], Sensitivity]
-Progress = Callable[[int, Mapping[str, float], float], None]
 SHARES = (0.25, 0.5)  # of the time: fits of the beginning of the measurements, from which the whole is tried as well
 PRECISE = 1e-15  # changes of values and of the sum that end a fit
-TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends before a measurement
 LARGEST = 1e100  # the weighted size of a column: its residuals have squares
-UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
 MOST_NAMED = 3
 AT_BOUND = 1e-12  # of a value: how near it comes to the bound that keeps it
-
-
-@dataclass
-class Objective:
-    """Weighted residuals of runs and their derivatives; the last run is kept.
-
-    ``start`` has the values of the names by which runs are changed, ``weights`` a factor for each column.
-    """
-
-    evaluate: Evaluate
-    measured: Measurements
-    weights: Mapping[str, float]
-    start: Mapping[str, float]
-    progress: Progress | None = None
-    evaluations: int = 0
-    bumps: list[str] = field(default_factory=list[str])
-    _last: tuple[bytes, Array, Array, Sensitivity] | None = None
-
-    def residuals(self, x: Array) -> Array:
-        """The residuals of a run with these values, weighted, one behind the other."""
-        return self._at(x)[1]
-
-    def slopes(self, x: Array) -> Array:
-        """Their derivatives, (number of residuals, number of values)."""
-        return self._at(x)[2]
-
-    def run(self, x: Array) -> Sensitivity:
-        """The run."""
-        return self._at(x)[3]
-
-    def _at(self, x: Array) -> tuple[bytes, Array, Array, Sensitivity]:
-        key = np.asarray(x, float).tobytes()
-        if self._last is None or self._last[0] != key:
-            self._last = (key, *self._computed(x))
-            self.evaluations += 1
-            if self.progress is not None:
-                self.progress(self.evaluations, self.named(x), float(np.sum(self._last[1] ** 2)))
-        return self._last
-
-    def size(self, name: str) -> float:
-        """The largest size of a column, weighted."""
-        column = self.measured.columns[name]
-        with np.errstate(over="ignore"):
-            return float(self.weights[name] * np.max(np.abs(column[np.isfinite(column)]), initial=0.0))
-
-    def named(self, x: Array) -> dict[str, float]:
-        """Values by name."""
-        return dict(zip(self.start, np.asarray(x, float).tolist(), strict=True))
-
-    def _computed(self, x: Array) -> tuple[Array, Array, Sensitivity]:
-        times = self.measured.times
-        found = self.evaluate(self.named(x), float(times.max()))
-        if found.breaks:
-            self.bumps += [reason for _, reason in found.breaks if reason not in self.bumps]
-        reached = times <= float(found.execution.times[-1])
-        table = found.as_made().sample(times[reached]) if reached.any() else None
-        residuals: list[Array] = []
-        slopes: list[Array] = []
-        for name, column in self.measured.columns.items():
-            weight, known = self.weights[name], np.isfinite(column)
-            far = TOO_FAR * (self.size(name) or 1.0)
-            off, moves = np.full(len(times), far), np.zeros((len(times), len(self.start)))
-            if table is not None and name in table.values:
-                there = np.asarray(table.values[name], float)
-                off[reached] = np.where(np.isfinite(there), weight * (there - column[reached]), far)
-                moves[reached] = np.nan_to_num(weight * np.asarray(table.slopes[name], float), posinf=0, neginf=0)
-            residuals.append(off[known])
-            slopes.append(moves[known])
-        return np.concatenate(residuals), np.concatenate(slopes), found
+MOST_CROSSED = 32  # measurements that transitions pass
 
 
 def fitted(
@@ -126,36 +56,39 @@ def fitted(
 def _solved(
     objective: Objective, first: Array, bounds: Mapping[str, tuple[float, float]], scales: Mapping[str, float]
 ) -> Any:
-    """SciPy's result of a fit to values as shares of their scales, with the values themselves."""
-    scale: Array = np.array([scales[name] for name in objective.start])
+    """A minimum near values, from which no transition is better off beyond the measurement next to it."""
+    sizes: Array = np.array([scales[name] for name in objective.start])
     limits: Array = np.array([*bounds.values()], float)
+    best = _minimum(objective, first, limits, sizes)
+    for _ in range(MOST_CROSSED):
+        tried = (_minimum(objective, best.x + step, limits, sizes) for step in steps_across(objective, best.x, sizes))
+        better = next((each for each in tried if each.cost < (1 - PRECISE) * best.cost), None)
+        if better is None:
+            break
+        best = better
+    return best
+
+
+def _minimum(objective: Objective, first: Array, limits: Array, sizes: Array) -> Any:
+    """SciPy's result of a fit to values as shares of their sizes, with the values themselves."""
     lower: Array = limits[:, 0]
     upper: Array = limits[:, 1]
 
     def values(x: Array) -> Array:
-        return np.clip(x * scale, lower, upper)
+        return np.clip(x * sizes, lower, upper)
 
     def residuals(x: Array) -> Array:
         return objective.residuals(values(x))
 
     def slopes(x: Array) -> Array:
-        return objective.slopes(values(x)) * scale
+        return objective.slopes(values(x)) * sizes
 
     solve: Any = least_squares  # pyright: ignore[reportUnknownVariableType]
-    result: Any = solve(
-        residuals,
-        np.clip(first, lower, upper) / scale,
-        jac=slopes,
-        bounds=(lower / scale, upper / scale),
-        ftol=PRECISE,
-        xtol=PRECISE,
-        gtol=PRECISE,
-    )
+    start, within = np.clip(first, lower, upper) / sizes, (lower / sizes, upper / sizes)
+    result: Any = solve(residuals, start, jac=slopes, bounds=within, ftol=PRECISE, xtol=PRECISE, gtol=PRECISE)
     shares: Array = np.asarray(result.x, float)
-    pushed: Array = np.where(
-        np.asarray(result.grad, float) < 0, upper, lower
-    )  # where the sum falls towards; SciPy stays inside
-    at = np.abs(pushed / scale - shares) <= AT_BOUND * np.maximum(1.0, np.abs(shares))
+    pushed: Array = np.where(np.asarray(result.grad, float) < 0, upper, lower)  # the sum falls towards it
+    at = np.abs(pushed / sizes - shares) <= AT_BOUND * np.maximum(1.0, np.abs(shares))  # SciPy stays inside
     result.x = np.where(at, pushed, values(shares))
     return result
 
@@ -187,7 +120,7 @@ def _check_start(objective: Objective, first: Array) -> None:
 
 
 def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, float]], sigma: bool) -> Fit:
-    x = np.asarray(result.x, float)
+    x: Array = np.asarray(result.x, float)
     residuals, slopes, found = objective.residuals(x), objective.slopes(x), objective.run(x)
     free = max(1, len(residuals) - len(x))
     variance = float(np.sum(residuals**2)) / free
@@ -211,7 +144,11 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
         str(result.message) if reached.all() else ends,
         objective.evaluations,
         at,
-        (*_close_transitions(found, objective.measured, covariance), *objective.bumps),
+        (
+            *_close_transitions(found, objective.measured, covariance),
+            *(each.sentence for each in wrong_sides(objective, x)[:MOST_SIDES]),
+            *objective.bumps,
+        ),
         objective.measured,
         found.run,
     )

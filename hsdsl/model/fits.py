@@ -13,7 +13,8 @@ from hsdsl.errors import UsageError
 from hsdsl.execution import Array
 from hsdsl.fitting.data import Measurements, measurements
 from hsdsl.fitting.fit import Fit
-from hsdsl.fitting.least_squares import Objective, Progress, fitted
+from hsdsl.fitting.least_squares import fitted
+from hsdsl.fitting.objective import Objective, Progress
 from hsdsl.model.differentiate import start_by, varied
 from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.values import with_parameters

@@ -132,6 +132,23 @@ def test_an_end_at_a_wall() -> None:
     assert np.isnan([found.final.time["k"], found.final.state["x"]["k"]]).all()
 
 
+@pytest.mark.parametrize("until", [3, 2e7])
+def test_instants_are_told_apart_however_long_the_run_goes_on(until: float) -> None:
+    text = f"""
+hsdsl: 1
+parameters: {{gap: 3e-7}}
+modes:
+  a: {{flow: {{x: 1}}, transitions: [{{when: x >= 2, to: b}}]}}
+  b: {{flow: {{x: 3}}, transitions: [{{when: x >= 2 + gap, to: c}}]}}
+  c: {{flow: {{x: 0}}}}
+initial: {{mode: a, x: 0}}
+experiment: {{until: {until}}}
+"""
+    found = hsdsl.loads(text).sensitivity("gap")
+    assert found.exists and found.final.state["x"]["gap"] == 1
+    assert found.transitions[1].time["gap"] == pytest.approx(1 / 3)
+
+
 def test_a_start_on_a_guard() -> None:
     """Derivatives are those of the executions that start inside: below the floor a ball bounces without end."""
     model = hsdsl.load("models/gallery/event-at-start.yaml")

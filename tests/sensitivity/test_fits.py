@@ -113,7 +113,7 @@ def test_bounds_of_the_file() -> None:
     energy = np.where(times < np.sqrt(2 / 9.81), 9.81, 9.81 * 1.2)  # it gains energy, which e <= 1 forbids
     found = model.fit({"t": times, "energy": energy}, "e")
     assert found.values["e"] == pytest.approx(1)
-    assert found.at_bound == ("e",)
+    assert found.at_bound == ("e",) and "at its bound" in found.summary
     times = np.linspace(0, 1, 50)  # before the second bounce
     inside = model.fit({"t": times, "energy": np.where(times < np.sqrt(2 / 9.81), 9.81, 9.81 * 0.7**2)}, "e")
     assert inside.values["e"] == pytest.approx(0.7) and inside.at_bound == ()
@@ -149,6 +149,28 @@ def test_a_measurement_at_a_transition_is_named() -> None:
     run = model.simulate().sample(times)
     found = model.fit({"t": times, "h": run["h"] + 0.01 * np.cos(40 * times)}, "e,g")
     assert any("bounce" in reason for reason in found.nonsmooth)
+
+
+@pytest.mark.parametrize("columns", ["v", "hv"])
+@pytest.mark.parametrize("first", [(0.78, 1.36), (0.71, 1.45), (0.74, 1.5)])
+def test_transitions_pass_measurements(columns: str, first: tuple[float, float]) -> None:
+    """With other values bounces are on the wrong sides of measured speeds, which no derivative shows."""
+    model, times = hsdsl.loads(BALL), np.linspace(0, 2.3, 47)[1:]
+    run = model.simulate(until=2.3, parameters={"e": 0.75}, initial={"h": 1.4}, tolerance=1e-13).sample(times)
+    start = {"parameters": {"e": first[0]}, "initial": {"h": first[1]}}
+    found = model.fit({"t": times, **{name: run[name] for name in columns}}, "e,initial.h", **start)
+    assert [*found.values.values()] == pytest.approx([0.75, 1.4], abs=1e-9)
+    assert not found.nonsmooth
+
+
+def test_a_measurement_on_the_wrong_side_is_named() -> None:
+    """The speed at 0.44 s is that of after a bounce, which the heights have at 0.4515 s."""
+    times = np.linspace(0.04, 0.84, 21)
+    run = hsdsl.loads(BALL).simulate(tolerance=1e-13).sample(times)
+    wrong = run["v"].copy()
+    wrong[10] = 0.7 * 9.81 * 0.4515
+    found = hsdsl.loads(BALL).fit({"t": times, "h": run["h"], "v": wrong}, "e,g,initial.h", sigma={"h": 1e-4, "v": 1})
+    assert any("t = 0.44 agrees better with the other side of bounce" in reason for reason in found.nonsmooth)
 
 
 DOSED = """
@@ -190,7 +212,7 @@ def test_a_run_that_ends_early_is_worse_than_any_measurement(monkeypatch: pytest
     data = {"t": [0.5, 1.0], "x": [0.9, 0.95]}
     found = hsdsl.loads(ENDING).fit(data, "p", sigma={"x": 1e-5})
     assert found.values["p"] == pytest.approx(1, abs=1e-6)  # the nearest to 0.9*2 at which the run does not end
-    monkeypatch.setattr("hsdsl.fitting.least_squares.TOO_FAR", 1e-9)
+    monkeypatch.setattr("hsdsl.fitting.objective.TOO_FAR", 1e-9)
     ended = hsdsl.loads(ENDING).fit(data, "p", sigma={"x": 1e-5})
     assert not ended.success
     assert "before the last measurement" in ended.message
