@@ -14,11 +14,11 @@ from hsdsl.completion.insertions import Insertions, flow_style
 from hsdsl.completion.nearby import LONG, cancelled
 from hsdsl.completion.printer import inequality, text_of, wall
 from hsdsl.completion.sliding import Sliding, slidings, with_entries
+from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.expression.scope import symbol
 from hsdsl.source import Mapping, Node, Text, child
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
-TIME_OF_CONTACT = "1e-6"
 WIDTH, INDENT = 120, 6  # of a line, and of the transitions in a mode that is written
 
 
@@ -26,7 +26,7 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     """The text of a model with a mode for each motion along a guard, and for each sliding.
 
     A transition to the same mode enters the motion along its guard where the flight that follows it would last less
-    than the parameter ``contact_time``. None where nothing can be completed.
+    than the parameter ``contact_time``, at first the default relaxation. None where nothing can be completed.
     """
     surfaces = slidings(system)
     further = [_leaving_on_surface(sliding) for sliding in surfaces]
@@ -116,7 +116,8 @@ class _Writer:
         if self._time is None:
             self._time = self._free("contact_time")
             parameters = child(self._root, "parameters")
-            entry = f"{self._time}: {TIME_OF_CONTACT}"
+            until = float(self._system.experiment.until.xreplace(self._system.parameter_values(sp.Expr.xreplace)))
+            entry = f"{self._time}: {float(least_relaxation(DEFAULTS['relaxation'], until)):g}"
             if parameters is None or not isinstance(parameters, Mapping) or not parameters.entries:
                 (key, _) = self._root.entries["modes"]
                 self.insertions.insert(key.place.start[0], f"parameters: {{{entry}}}\n")

@@ -73,12 +73,3 @@ def start_sizes(run: Run, mode: int, x: State) -> State:
     moved = (time * total((abs(d) * s for d, s in zip(row, first, strict=True)), zero) for row in rows)
     found = tuple(map(max, first, moved))
     return found if all(map(run.arithmetic.isfinite, found)) else nothing
-
-
-def instant(run: Run, here: ModeState, slope: State) -> Number:
-    """A time in which no state moves by more than about half the digits of its scale."""
-    least = run.settings.until
-    for s, f in zip(here.arc.scales, slope, strict=True):
-        if s > 0 and least * abs(f) > s:
-            least = s / abs(f)
-    return run.arithmetic.sqrt(run.arithmetic.unit) * least

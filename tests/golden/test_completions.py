@@ -348,8 +348,21 @@ experiment: {until: 5}
     written = hsdsl.loads(text).completed()
     assert written is not None and "# gravity" in written and "# floor" in written and written.startswith("# mine\n")
     assert "# bounces\n      - {when:" in written and "\n\n# begins in the air\ninitial:" in written
-    assert "contact_time: 1e-6" in written and "  contact_fly:\n" in written
+    assert "contact_time: 1e-06" in written and "  contact_fly:\n" in written
     assert hsdsl.loads(written).system.modes[1].name == "contact_fly"
+
+
+def test_the_time_of_contact_is_a_share_of_short_runs() -> None:
+    text = ordinary(
+        """
+  a: {flow: {h: v, v: -g}, transitions: [{when: h <= 0, to: a, reset: {v: -v/2}}]}""",
+        "h: 0, v: g*T/3",
+        1,
+    )
+    text = text.replace("modes:", "parameters: {T: 4e-9, g: 2/T**2}\nmodes:").replace("until: 1}", "until: 2*T}")
+    written = hsdsl.loads(text).completed()
+    assert written is not None and "contact_time: 8e-15" in written
+    assert abs(hsdsl.loads(written).simulate(completion="none").final["h"]) < 1e-9
 
 
 def test_long_transitions_are_written_a_line_for_each_key() -> None:
