@@ -120,7 +120,7 @@ def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> E
         guards = [Crossing(k, wall.theta, wall.time, wall.state, wall.depth) for k in standing]
     if not guards:
         return None
-    guards += unseen(run, here, span, min(guards, key=lambda c: c.time), {c.edge for c in guards})
+    guards = with_unseen(run, here, span, guards)
     chosen, alternatives = choose(here, guards, run)
     write(here, span, chosen)
     return Event(chosen, alternatives, chosen.time, largest(here, before, span, chosen))
@@ -171,12 +171,16 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
     return touched(run, here, span, k, pieces)
 
 
-def unseen(run: Run, here: ModeState, span: Span, first: Crossing, seen: set[int]) -> list[Crossing]:
-    """Crossings before a first one of surfaces that rise by less than a step's polynomials are off by."""
-    t, x, found = span.t, span.x, list[Crossing]()
+def with_unseen(run: Run, here: ModeState, span: Span, guards: list[Crossing]) -> list[Crossing]:
+    """Crossings, with those before the first one that rise by less than a step's polynomials are off by.
+
+    A surface may be beyond its guard so and be crossed again behind the first one.
+    """
+    t, x, first, found = span.t, span.x, min(guards, key=lambda c: c.time), {c.edge: c for c in guards}
     start, end = here.kernel.surfaces(t, *x), here.kernel.surfaces(first.time, *first.state)
+    tied = {c.edge for c in guards if c.time - first.time <= run.tie(first.time)}
     for k in range(len(here.mode.edges)):
-        if k in seen or here.surfaces.releases(k) or not first.theta > 0:
+        if k in tied or here.surfaces.releases(k) or not first.theta > 0:
             continue
         bound = here.surfaces.roundoff_bound
         if not end[k] > 0 or not end[k] > bound(k, first.time, first.state) or start[k] > bound(k, t, x):
@@ -191,8 +195,8 @@ def unseen(run: Run, here: ModeState, span: Span, first: Crossing, seen: set[int
             s = close_bracket(residual, (s, start[k]), (first.theta, end[k]), s, run.arithmetic.unit * first.theta)
         time, q = span.point(s)
         if here.kernel.conditions[k](time, *q)[0] or (k in here.surfaces.active and holds_next(run, here, k, time, q)):
-            found.append(Crossing(k, s, time, q, run.arithmetic.zero))
-    return found
+            found[k] = Crossing(k, s, time, q, run.arithmetic.zero)
+    return list(found.values())
 
 
 def settled(here: ModeState, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:

@@ -589,3 +589,25 @@ experiment: {until: 1}
     run = hsdsl.loads(text).simulate(engine=engine)
     after = 1 - (2 * math.pi - 6.23) / 1.6
     assert run.final.state["y"] == pytest.approx(7.8 / 1.6 * (after - math.sin(1.6 * after) / 1.6), abs=1e-9)
+
+
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "dop853"])
+@pytest.mark.parametrize("speed", ["8e-7", "1.4e-6"])
+def test_a_low_rise_counts_where_another_guard_goes_first_and_a_high_one_follows(speed: str, method: str) -> None:
+    """A body slips beyond its floor by less than a long step tells, and would be there again at its end."""
+    text = f"""
+hsdsl: 1
+modes:
+  wait: {{flow: {{y: v, v: 0, w: 0, c: 1}}, transitions: [
+    {{when: c >= 2, to: a, reset: {{y: 0, v: -{speed}, w: 1, c: 0}}}}]}}
+  a:
+    flow: {{y: v, v: w - 5*(t - 2), w: 0, c: 1}}
+    transitions:
+      - {{name: floor, when: y <= 0, if: v < 0, to: a, reset: {{v: -v/3}}}}
+      - {{name: clock, when: c >= 7e-7, to: a, reset: {{w: -2, c: -10}}}}
+initial: {{mode: wait, y: 1, v: 0, w: 1, c: 0}}
+experiment: {{until: 7}}
+"""
+    run = assert_engines_agree(hsdsl.loads(text), method=method)
+    assert [made.edge for made in run.transitions if made.source == "a"][:2] == ["floor", "clock"]
+    assert run.stop.reason == "until" and run.final.state["y"] == pytest.approx(0, abs=1e-9)

@@ -138,8 +138,8 @@ static int guards_at(hs_run *run, const hs_crossing *wall) {
   return count;
 }
 
-/* Add crossings before the first one, of `count`, of surfaces that rise by less than the step's polynomials are off by:
-   how many there are then, or RAISED. */
+/* Crossings, with those before the first one, of `count`, that rise by less than the step's polynomials are off by: how
+   many there are then, or RAISED. A surface may be beyond its guard so and be crossed again behind the first one. */
 static int with_unseen(hs_run *run, int count) {
   const hs_mode *mode = run->here.table;
   const hs_span *span = &run->span;
@@ -150,9 +150,11 @@ static int with_unseen(hs_run *run, int count) {
     if (run->crossings[i].time < first->time) first = &run->crossings[i];
   if (!(first->theta > 0)) return count;
   for (int k = 0; k < mode->edges; k++) {
-    int was = releases(run, k);
-    for (int i = 0; i < seen; i++) was |= run->crossings[i].edge == k;
-    if (was) continue;
+    int place = count;
+    for (int i = 0; i < seen; i++)
+      if (run->crossings[i].edge == k) place = i;
+    hs_crossing *const found = &run->crossings[place];
+    if (releases(run, k) || (place < count && found->time - first->time <= tie(first->time))) continue;
     hs_real start, end, before, noise, s = 0.0;
     if (!known && mode->values(run->here.p, first->time, first->state, run->values)) return RAISED;
     known = !(run->values[k] > 0);
@@ -165,14 +167,17 @@ static int with_unseen(hs_run *run, int count) {
     const hs_real unit = HS_UNIT * first->theta;
     if (!(start > 0) && close_bracket(run, residual_of, 0, k, 0.0, start, first->theta, end, 0.0, unit, &s))
       return RAISED;
-    hs_crossing *const found = &run->crossings[count];
+    const hs_time later = found->time;
     if (span_point(run, s, &found->time, &found->state)) return RAISED;
     const int holds = condition(run, k, found->time, found->state);
     if (holds == RAISED) return RAISED;
-    if (!holds && !(run->active_surfaces[k] && holds_next(run, k, found->time, found->state))) continue;
+    if (!holds && !(run->active_surfaces[k] && holds_next(run, k, found->time, found->state))) {
+      found->time = later; /* not tied with the first one: its state does not count */
+      continue;
+    }
     found->edge = k;
     found->theta = s, found->depth = 0.0;
-    count++;
+    count += place == count;
   }
   return count;
 }
