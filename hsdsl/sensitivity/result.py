@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -173,14 +174,23 @@ class Sensitivity:
         names, own = self.setting.plain.program.parameters, self.setting.parameters
         moved = [along({by: own[by][i] for by in self.wrt}) for i in range(len(names))]
         parameters = {way: tuple(row[way] for row in moved) for way in ways}
+        arcs = {jump: list(part) for jump, part in groupby(self.execution.arcs, key=lambda arc: arc.jump)}
+        sizes: dict[str, float] = {}
         for made in self.execution.transitions:
+            for name, size in view.sizes_in(arcs.get(made.index, ())).items():
+                sizes[name] = max(sizes.get(name, 0.0), size)
             if show(made.time) in tied:  # its orders have been looked at
                 continue
             after = made.after or {}
             time = self._shifts(after)
             state = self._followed(made.target, made.time, after, time, True)
             rows = {x: along(row) for x, row in state.items()}
-            if found := next(parted(view, landing(view, made), along(time), rows, parameters), None):
+            had = {x: {by: sizes.get(derivative_name(x, by), 0.0) for by in self.wrt} for x in rows}
+            largest = {
+                x: {way: sum(row[by] * abs(part) for by, part in parts.items()) for way, parts in ways.items()}
+                for x, row in had.items()
+            }
+            if found := next(parted(view, landing(view, made), along(time), rows, parameters, largest), None):
                 return [(made.time, f"at t = {show(made.time)} {made.edge} leads onto {found}")]
         return []
 
@@ -225,7 +235,8 @@ class Sensitivity:
     def reasons(self) -> tuple[str, ...]:
         """Why they do not exist, or are not known to."""
         own = (*self.starts, *(reason for _, reason in self.breaks))
-        return own if self._smooth.theorem == "holds" else (*own, *self.touches, *self._smooth.reasons)
+        further = () if self._smooth.theorem == "holds" else (*self.touches, *self._smooth.reasons)
+        return (*own, *(reason for reason in further if not any(reason in told for told in own)))
 
     def _exists_at(self, index: int) -> bool:
         """Whether the derivatives of a transition exist."""

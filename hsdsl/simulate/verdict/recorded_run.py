@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -55,8 +55,12 @@ class RecordedRun:
     @cached_property
     def sizes(self) -> dict[str, float]:
         """The largest size that each state has in the run."""
+        return self.sizes_in(self.execution.arcs)
+
+    def sizes_in(self, arcs: Iterable[Arc]) -> dict[str, float]:
+        """The largest size that each state has in some arcs of the run."""
         found: dict[str, float] = {}
-        for arc in self.execution.arcs:
+        for arc in arcs:
             rows = np.abs(np.asarray(self.execution.values[arc.first : arc.last + 1, : len(arc.states)], dtype=float))
             for name, size in zip(arc.states, rows.max(axis=0, initial=0.0).tolist(), strict=True):
                 found[name] = max(found.get(name, 0.0), size)
