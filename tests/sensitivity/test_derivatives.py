@@ -466,6 +466,8 @@ def test_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert obey(words) == 0
     text = capsys.readouterr().out
     assert "they exist: yes" in text and "d/d initial.v" in text
+    assert obey([*words, "--at", "end"]) == 2
+    assert "there is no part 'end'" in capsys.readouterr().err
     assert obey([*words, "--json", "--at", "outputs", "--set", "experiment.samples=4"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["samples"]["times"] == [0, 1, 2, 3]

@@ -48,7 +48,8 @@ def plot_stability(found: StabilityMap) -> Figure:
         _draw(axes, found, panel, measure, span)
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
-    for axes in grid[-1]:
+    for axes in list(grid.flat[: len(panels)])[-columns:]:  # the lowest of each column
+        axes.xaxis.set_tick_params(labelbottom=True)
         axes.set_xlabel(found.x.label, parse_math=False)
     for axes in grid[:, 0]:
         axes.set_ylabel(found.y.label, parse_math=False)
