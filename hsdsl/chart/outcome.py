@@ -60,11 +60,11 @@ class Outcome:
 
 def outcome(scene: Scene, result: Result, within: Tolerance, verdict: Verdict | None = None) -> Outcome:
     """Judge a result against the scene's exact execution; ``verdict`` is what the tool itself says about its run."""
-    error, others = compared(scene, result, within.time)
+    error, others, missing = compared(scene, result, within.time)
     known = "" if verdict is None else verdict.theorem
     until, last = float(scene.grid[-1]), float(scene.exact.final.time)
     ends = until - last > SAME_END * until  # the exact execution ends before the run is to end
-    other, why = _difference(scene, result, others, error, within)
+    other, why = _difference(scene, result, others, missing, error, within)
     if result.problem:
         word = "right" if ends and not other else "stops"
         return Outcome(word, result.problem, error, result.transitions, known, other)
@@ -74,8 +74,8 @@ def outcome(scene: Scene, result: Result, within: Tolerance, verdict: Verdict | 
     return Outcome(word, why, error, result.transitions, known, other)
 
 
-def compared(scene: Scene, result: Result, slack: float) -> tuple[float, int]:
-    """The largest error of a sample, as a share of a state's span, and how many samples have another mode.
+def compared(scene: Scene, result: Result, slack: float) -> tuple[float, int, bool]:
+    """The largest error of a sample as a share of a state's span, how many have another mode, and if one lacks values.
 
     Each sample is compared with the exact execution over all times no farther away than ``slack`` of the run, jumps
     with both their sides. Modes that the model does not have (along a surface) may be any.
@@ -88,14 +88,15 @@ def compared(scene: Scene, result: Result, slack: float) -> tuple[float, int]:
     last = np.minimum(np.searchsorted(times, scene.grid + wide, side="right"), len(times) - 1)
     if result.transitions is None:  # a miss just before the end shows in the last sample alone
         first[-1] = last[-1] - 1
-    worst, others = nan, 0
+    worst, others, missing = nan, 0, False
     for i in np.flatnonzero((scene.grid <= until) & (result.modes != "")):
         at = slice(first[i], last[i])
         outside = np.maximum(np.maximum(low[at] - result.values[i], result.values[i] - high[at]), 0) / span
         worst = np.fmax(worst, np.where(np.isnan(outside), 0, outside).max(axis=1).min())
         near = slice(first[i], last[i] + 1)
+        missing |= bool((~np.isfinite(result.values[i]) & np.isfinite(values[near]).all(axis=0)).any())
         others += not bool(((modes[near] == result.modes[i]) | free[near]).any())
-    return float(worst), others
+    return float(worst), others, missing
 
 
 def _exact_curve(scene: Scene) -> tuple[Array, Array, Array]:
@@ -126,14 +127,15 @@ def spans(scene: Scene) -> Array:
     return np.where(span > 0, span, np.where(size > 0, size, 1.0))
 
 
-def _difference(scene: Scene, result: Result, others: int, error: float, within: Tolerance) -> tuple[str, str]:
+def _difference(
+    scene: Scene, result: Result, others: int, missing: bool, error: float, within: Tolerance
+) -> tuple[str, str]:
     """What of a result differs from the exact execution, in a word and a sentence; empty where nothing does."""
     fewest, most = scene.countable
     if not result.problem and result.transitions is not None and not fewest <= result.transitions <= most:
         return "transitions", f"{result.transitions} transition{'s' * (result.transitions != 1)} instead of {most:g}"
     if others:
         return "modes", f"another mode at {others} of {len(scene.grid)} samples"
-    missing = ~np.isfinite(result.values[scene.clear]) & np.isfinite(scene.exact_values[scene.clear])
-    if not result.problem and bool(missing.any()):
+    if not result.problem and missing:
         return "values", "no finite value where the exact execution has one"
     return ("values", f"an error of {error:.2g} of the span") if error > within.state else ("", "")

@@ -24,7 +24,7 @@ def sensitivity(
     model: Model,
     *,
     wrt: Annotated[str, option("A,B", WRT)],
-    at: Annotated[At | None, option("final|transitions|outputs", AT)] = None,
+    part: Annotated[At | None, option("final|transitions|outputs", AT, "--at")] = None,
     overrides: Annotated[list[str] | None, overriding(AS_RUN)] = None,
     until: Until = None,
     located: Located,
@@ -44,7 +44,7 @@ def sensitivity(
         call = located.settings(overrides, until=until, precision=precision)
         loaded = load(model)
         found = loaded.sensitivity(wrt, **call)
-        parts = (at,) if at else ALWAYS
+        parts = (part,) if part else ALWAYS
         nearby = _nearby(loaded, wrt, call, answer.hidden) if stability else None
         if nearby is not None:
             draw(nearby, plot)

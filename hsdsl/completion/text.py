@@ -116,7 +116,8 @@ class _Writer:
         if self._time is None:
             self._time = self._free("contact_time")
             parameters = child(self._root, "parameters")
-            until = float(self._system.experiment.until.xreplace(self._system.parameter_values(sp.Expr.xreplace)))
+            values = self._system.parameter_values(sp.Expr.xreplace)
+            until = float(sp.N(self._system.experiment.until.xreplace(values)))
             entry = f"{self._time}: {float(least_relaxation(DEFAULTS['relaxation'], until)):g}"
             if parameters is None or not isinstance(parameters, Mapping) or not parameters.entries:
                 (key, _) = self._root.entries["modes"]

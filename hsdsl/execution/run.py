@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf
@@ -221,10 +221,10 @@ class Execution(Deferred):
         """The names of all states, in the order in which the run first has them."""
         return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))
 
-    def sizes(self, start: float = -inf, end: float = inf) -> dict[str, float]:
-        """The largest size that each state has at the rows of the run between two times, both included."""
+    def sizes(self, arcs: Iterable[Arc] | None = None, start: float = -inf, end: float = inf) -> dict[str, float]:
+        """The largest size that each state has at the rows of arcs, all by default, between two times or at them."""
         found: dict[str, float] = {}
-        for arc in self.arcs:
+        for arc in self.arcs if arcs is None else arcs:
             times = self.times[arc.first : arc.last + 1].astype(float)
             first, last = np.searchsorted(times, start), np.searchsorted(times, end, side="right")
             rows = np.abs(self.values[arc.first + first : arc.first + last, : len(arc.states)].astype(float))

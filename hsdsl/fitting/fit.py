@@ -12,7 +12,7 @@ import numpy as np
 from hsdsl.calls import checks_methods
 from hsdsl.execution import Array, Execution
 from hsdsl.fitting.data import Measurements
-from hsdsl.names import called, visible
+from hsdsl.names import called, counted, visible
 from hsdsl.report.alike import condensed
 from hsdsl.report.json_form import plain
 from hsdsl.report.words import number
@@ -62,7 +62,11 @@ class Fit:
     def __repr__(self) -> str:
         values = ", ".join(f"{name} {number(value, 6)}" for name, value in self.values.items())
         of = visible(called(self.execution.title, self.execution.model))
-        return f"<Fit of {of}: {visible(values)}, {self.measured.count} measurements, {self.evaluations} runs>"
+        return f"<Fit of {of}: {visible(values)}, {self._counts}>"
+
+    @property
+    def _counts(self) -> str:
+        return f"{counted(self.measured.count, 'measurement')}, {counted(self.evaluations, 'run')}"
 
     def _repr_html_(self) -> str:
         """Show the values and a picture in notebooks."""
@@ -88,7 +92,7 @@ class Fit:
 
     def _lines(self) -> Iterator[str]:
         run = self.execution
-        yield f"{called(run.title, run.model)}: {self.measured.count} measurements, {self.evaluations} runs"
+        yield f"{called(run.title, run.model)}: {self._counts}"
         width = max(map(len, self.values))
         for name, value in self.values.items():
             deviation = self.deviations[name]
@@ -105,5 +109,7 @@ class Fit:
         from hsdsl.plot.analyses import plot_measured
 
         values = ", ".join(f"{name} = {number(value, 6)}" for name, value in self.values.items())
-        heading = f"fit to {self.measured.count} measurements: {values}; left over {number(self.deviation, 4)}"
+        heading = (
+            f"fit to {counted(self.measured.count, 'measurement')}: {values}; left over {number(self.deviation, 4)}"
+        )
         plot_measured(path, self.execution, self.measured.times, self.measured.columns, self.units, heading)

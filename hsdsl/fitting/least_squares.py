@@ -17,7 +17,7 @@ from hsdsl.fitting.fit import Fit
 from hsdsl.fitting.objective import Objective
 from hsdsl.fitting.wrong_sides import MOST_SIDES, UNKNOWN, steps_across, wrong_sides
 from hsdsl.names import INITIAL
-from hsdsl.sensitivity.result import Sensitivity
+from hsdsl.sensitivity.result import SampleSlopes, Sensitivity
 from hsdsl.simulate.stops import show
 
 SHARES = (0.25, 0.5)  # of the time: fits of the beginning of the measurements, from which the whole is tried as well
@@ -109,14 +109,26 @@ def _beginning(
 
 
 def _check_start(objective: Objective, first: Array) -> None:
-    run = objective.run(first).execution
-    end = float(objective.measured.times.max())
+    found, measured = objective.run(first), objective.measured
+    run, end = found.execution, float(measured.times.max())
     if float(run.times[-1]) < end:
         raise UsageError(
             f"the run with the first values ends at t = {show(run.times[-1])} ({run.stop.reason}), before the last "
             f"measurement at t = {show(end)}",
             "begin with other values by --set NAME=VALUE",
         )
+    table = found.as_made().sample(measured.times)
+    for name, column in measured.columns.items():
+        if not np.isfinite(_column(table, name)[np.isfinite(column)]).any():
+            raise UsageError(
+                f"the run with the first values has no {name} at any time at which it was measured",
+                "begin with other values by --set NAME=VALUE, or leave the column out",
+            )
+
+
+def _column(table: SampleSlopes, name: str) -> Array:
+    """A state or output at the times of a table, NaN where a mode lacks it."""
+    return np.asarray(table.values.get(name, np.full(len(table.times), np.nan)), float)
 
 
 def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, float]], sigma: bool) -> Fit:
@@ -133,7 +145,7 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
     measured = objective.measured.columns
     left_over = {name: np.full(len(times), np.nan) for name in measured}
     for name, column in measured.items():
-        left_over[name][reached] = np.asarray(table.values[name], float) - column[reached]
+        left_over[name][reached] = _column(table, name) - column[reached]
     ends = f"the run ends at t = {show(run.times[-1])} ({run.stop.reason}), before the last measurement"
     return Fit(
         values,

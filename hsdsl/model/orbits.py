@@ -16,7 +16,7 @@ from hsdsl.model.options import check_arguments, overrides_of
 from hsdsl.model.pipeline import Pipeline
 from hsdsl.model.settings import whole
 from hsdsl.model.values import with_parameters
-from hsdsl.names import did_you_mean
+from hsdsl.names import counted, did_you_mean
 from hsdsl.orbits.branch import Branch
 from hsdsl.orbits.continuation import CIRCLE, Follower, branch
 from hsdsl.orbits.orbit import Orbit, judged, multipliers_of, returning
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 REFUSED = ("step", "scheme", "samples", "precision")
 MOST_GUESSES = 6
+MOST_NAMED = 4  # transitions in a hint
 ENOUGH = 16  # times as many transitions as the guess makes, in a lap that another one is looked for
 SHORTER = "passages become ever shorter, so the execution ends in a point"
 NO_TIME = "Newton's method goes to where a passage takes no time"
@@ -188,15 +189,9 @@ class Orbits:
         guesses = self.guesses(run)
         ending = "" if run.stop.complete else f"; the run stops at t = {run.times[-1]:g}: {run.stop.message}"
         if not guesses:
-            targets = [made.target for made in run.transitions if made.edge == self.edge]
-            how = "makes the transition {} at one instant only" if targets else "does not make the transition {}"
-            how = "makes the transition {} into other modes of parts each time" if len(set(targets)) > 1 else how
-            raise UsageError(
-                f"the run {how.format(self.edge)} up to t = {run.times[-1]:g}{ending or f' ({run.stop.reason})'}",
-                "try more laps"
-                if len(set(targets)) > 1
-                else "choose another section, a later end, or other initial values",
-            )
+            how, hint = self._passes(run)
+            end = f"up to t = {run.times[-1]:g}{ending or f' ({run.stop.reason})'}"
+            raise UsageError(f"the run {how} {end}", hint)
         problem = ""
         for guess in guesses:
             try:
@@ -206,6 +201,21 @@ class Orbits:
         problem = SHORTER if problem == NO_TIME and self._shortens(run) else problem
         rests = any(mode.held is not None for mode in self.model.program.modes)
         raise UsageError(f"no periodic orbit was found near the run: {problem}{ending}", COMPLETE if rests else CLOSER)
+
+    def _passes(self, run: Execution) -> tuple[str, str]:
+        """What the run makes of the section where that gives no guess, and a hint."""
+        targets = [made.target for made in run.transitions if made.edge == self.edge]
+        if len(set(targets)) > 1:
+            return f"makes the transition {self.edge} into other modes of parts each time", "try more laps"
+        made = list(dict.fromkeys(made.edge for made in run.transitions if made.edge != self.edge))
+        other = f"choose another section ({', '.join(made[:MOST_NAMED])})" if made else "choose another section"
+        hint = f"{other}, a later end, or other initial values"
+        if not targets:
+            return f"does not make the transition {self.edge}", hint
+        if len(targets) > self.laps:
+            return f"makes the transition {self.edge} at one instant only", hint
+        hint = f"{counted(self.laps, 'lap')} need {self.laps + 1} of them: choose a later end"
+        return f"makes the transition {self.edge} only {counted(len(targets), 'time')}", hint
 
     def _shortens(self, run: Execution) -> bool:
         """Whether each passage of a run is shorter than the one before it."""
@@ -343,7 +353,7 @@ def _with_sizes(guess: Guess, run: Execution) -> Guess:
     """A guess with what the run does from a lap before it to a lap behind."""
     start, end = guess.phase - guess.time, guess.phase + guess.time
     made = sum(start <= float(each.time) <= end for each in run.transitions)
-    return replace(guess, sizes=run.sizes(start, end), most=made)
+    return replace(guess, sizes=run.sizes(None, start, end), most=made)
 
 
 def _still(found: Closed) -> bool:

@@ -122,17 +122,22 @@ class Branch:
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the state that varies most over the parameter to a .png or .svg file, with its bifurcations."""
         from hsdsl.plot.analyses import plot_branch
+        from hsdsl.plot.panel import label
+        from hsdsl.simulate.verdict.run_view import RunView
 
         states = np.array([p.state for p in self.points])
         drift = [k for k, name in enumerate(self.states) if name in self.first.drift]
-        spread = np.ptp(states, axis=0) / np.maximum(np.max(np.abs(states), axis=0), 1e-300)
+        lap = RunView(self.first.sensitivity.setting.plain, self.first.execution)
+        sizes = [lap.sizes.get(name, 0.0) for name in self.states]  # a state may be round-off at the section alone
+        spread = np.ptp(states, axis=0) / np.maximum(sizes, np.max(np.abs(states), axis=0) + 1e-300)
         spread[drift] = -1
         k = int(np.argmax(spread))
+        units = self.first.units
         marks = [(b.kind, b.parameter, float(b.state[k])) for b in self.bifurcations]
         plot_branch(
             path,
-            self.parameter,
-            self.states[k],
+            label(self.parameter, units),
+            f"{label(self.states[k], units)} after the section",
             [(value, float(state[k]), stable) for value, state, stable in self.knots],
             marks,
             f"{called(self.first.execution.title, self.first.execution.model)}: orbits through {self.section}",

@@ -84,8 +84,14 @@ class Orbit:
         from hsdsl.plot.orbit import plot_orbit
 
         states = [x for x in self.state if x not in self.drift]
-        title = f"{called(self.execution.title, self.execution.model)}: {self.verdict}, {shown(self.multipliers)}"
-        plot_orbit(path, self.execution, states, self.multipliers, self.period, title)
+        name = called(self.execution.title, self.execution.model)
+        title = f"{name}: {self.verdict}, multipliers {shown(self.multipliers)}"
+        plot_orbit(path, self.execution, states, self.multipliers, self.period, title, self.units)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of the model, by name."""
+        return self.sensitivity.setting.plain.program.units
 
     @property
     def sensitivity(self) -> Sensitivity:

@@ -12,7 +12,7 @@ import numpy as np
 
 from hsdsl.execution import Array, Execution
 from hsdsl.plot.curves import curves, limits_of, line
-from hsdsl.plot.panel import label
+from hsdsl.plot.panel import label, time_label
 from hsdsl.plot.style import FAINT, PALETTE, legend_below, to_file
 from hsdsl.report import words
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 BANDS = ("#0b5394", "#c8c8c8", "#b45f06")  # colours of distances over time
 DECADES = 12  # below the largest value: smaller ones are drawn there
+TITLE = 90  # letters of a line of a title
 LONGEST = 40  # letters of a label of runs from nearby
 MOST = 12  # sequences of transitions in their legend
 MARKERS = {"fold": "o", "branch point": "P", "flip": "D", "torus": "s", "grazing": "X"}
@@ -67,7 +68,7 @@ def measured(
         axis.plot(*along, color=PALETTE[0], label="run")
         axis.plot(times, column, ".", color=PALETTE[1], markersize=max(3.0, 7.0 - len(times) / 50), label="measured")
         axis.set_ylabel(label(name, units), parse_math=False)
-    axes[-1].set_xlabel(f"time t [{units['t']}]" if "t" in units else "time t", parse_math=False)
+    axes[-1].set_xlabel(time_label(units), parse_math=False)
     figure.suptitle(words.heading(run), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
     axes[0].set_title(fill(values, 110), loc="left", fontsize=8.5, color="#555555", parse_math=False)
     legend_below(figure, axes[0].get_legend_handles_labels()[0], 9.0)
@@ -123,7 +124,7 @@ def plot_branch(
     marks: Sequence[tuple[str, float, float]],
     title: str,
 ) -> Figure:
-    """Draw points (parameter, state, stable) in their order, and marks (kind, parameter, state).
+    """Draw points (parameter, state, stable) in their order, and marks (kind, parameter, state), with labels of axes.
 
     Stable orbits are solid, others dashed. A point that ends a stable or unstable piece has None.
     """
@@ -145,6 +146,6 @@ def plot_branch(
             axis.plot([p for p, _ in found], [x for _, x in found], marker, color=PALETTE[1], label=kind)
     legend_below(figure, axis.get_legend_handles_labels()[0], 8.0)
     axis.set_xlabel(parameter, parse_math=False)
-    axis.set_ylabel(f"{state} after the section", parse_math=False)
-    axis.set_title(title, loc="left", fontsize=10, parse_math=False)
+    axis.set_ylabel(state, parse_math=False)
+    axis.set_title(fill(title, TITLE), loc="left", fontsize=10, parse_math=False)
     return figure

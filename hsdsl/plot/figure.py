@@ -18,7 +18,17 @@ from hsdsl.execution import Execution
 from hsdsl.names import shown
 from hsdsl.parts import short_names
 from hsdsl.plot.curves import Curves, GuardLine, curves, modes_of
-from hsdsl.plot.panel import MOST_BANDS, MOST_ROWS, draw_panel, draw_ribbons, draw_rows, name_bands, raise_of, rows_of
+from hsdsl.plot.panel import (
+    MOST_BANDS,
+    MOST_ROWS,
+    draw_panel,
+    draw_ribbons,
+    draw_rows,
+    name_bands,
+    raise_of,
+    rows_of,
+    time_label,
+)
 from hsdsl.plot.phase import draw_phase
 from hsdsl.plot.style import fills, legend_below, looks
 from hsdsl.plot.view import Pair, View
@@ -155,7 +165,7 @@ def _time_labels(axes: Sequence[Axes], across: int, view: View) -> None:
         if i + across < len(axes):
             axis.tick_params(labelbottom=False)
         else:
-            axis.set_xlabel(f"time t [{view.units['t']}]" if "t" in view.units else "time t", parse_math=False)
+            axis.set_xlabel(time_label(view.units), parse_math=False)
 
 
 def _headings(figure: FigureBase, top: Axes, runs: Sequence[Execution], view: View, plan: Plan) -> None:

@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hsdsl.execution import Array, Execution
+from hsdsl.plot.panel import label, time_label
 from hsdsl.plot.style import FAINT, PALETTE, to_file
 
 if TYPE_CHECKING:
@@ -21,13 +22,18 @@ LETTERS = 90  # of a line of the title
 
 
 @to_file
-def plot_orbit(run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str) -> Figure:
+def plot_orbit(
+    run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str, units: Mapping[str, str]
+) -> Figure:
     """Draw a run over one period; jumps are dotted."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(10, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)
     _draw_run(left, run, states, period)
+    across, up = (states[0], states[1]) if len(states) > 1 else ("t", states[0])
+    left.set_xlabel(label(across, units) if len(states) > 1 else time_label(units), parse_math=False)
+    left.set_ylabel(label(up, units), parse_math=False)
     draw_circle(right, multipliers)
     figure.suptitle(textwrap.fill(title, LETTERS), x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False)
     return figure
@@ -59,8 +65,6 @@ def _draw_run(axis: Axes, run: Execution, states: Sequence[str], period: float) 
             break
     if first is not None and before is not None:  # the jump of the section closes the orbit
         _draw_jump(axis, before, first if len(states) > 1 else (before[0], first[1]))
-    axis.set_xlabel(states[0] if len(states) > 1 else "time t", parse_math=False)
-    axis.set_ylabel(states[1] if len(states) > 1 else states[0], parse_math=False)
 
 
 def _draw_jump(axis: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
@@ -76,3 +80,5 @@ def draw_circle(axis: Axes, multipliers: Array) -> None:
         axis.plot([m.real for m in chosen], [m.imag for m in chosen], "o", color=colour)
     axis.set_aspect("equal", "datalim")
     axis.set_title("Floquet multipliers", fontsize=9)
+    axis.set_xlabel("real part")
+    axis.set_ylabel("imaginary part")

@@ -73,6 +73,11 @@ def label(name: str, units: Mapping[str, str]) -> str:
     return f"{name} [{units[name]}]" if name in units else name
 
 
+def time_label(units: Mapping[str, str]) -> str:
+    """Label an axis of time."""
+    return label("time t", {"time t": units["t"]} if "t" in units else {})
+
+
 def draw_bands(axis: Axes, data: Curves) -> None:
     """Colour the background by mode."""
     for mode, fill in fills(data.modes).items():

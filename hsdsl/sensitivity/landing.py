@@ -12,6 +12,7 @@ from typing import Any
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Transition
 from hsdsl.simulate.input_segments import make_timeline
+from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 
@@ -31,18 +32,22 @@ def parted(
     time: Row,
     state: Mapping[str, Row],
     parameters: Mapping[str, Sequence[Number]],
+    sizes: Mapping[str, Row] | None = None,
     crossing: bool = False,
 ) -> Iterator[str]:
     """The surfaces that part executions near a place where a run begins or goes on, and what moves them there.
 
     ``time`` and ``state`` are the derivatives of the place's time and states, ``parameters`` those of all parameters by
-    each target. With ``crossing`` a surface that is crossed at once counts too.
+    each target, ``sizes`` the largest that those of the states have been. With ``crossing`` a surface that is crossed
+    at once counts too.
     """
     for k in place.mode.surfaces:
         try:
             if _begins_on(place, k, crossing):
-                moved = (by for by, slopes in parameters.items() if _moves(run, place, k, time[by], state, by, slopes))
-                for by in moved:
+                for by, slopes in parameters.items():
+                    had = [sizes[x][by] if sizes else 0.0 for x in place.mode.states]
+                    if not _moves(run, place, k, time[by], [state[x][by] for x in place.mode.states], had, slopes):
+                        continue
                     yield f"the surface of {place.name(k)}, and from nearby, moved by {by}, beyond it or not"
                     return
         except DOMAIN_ERRORS:
@@ -59,10 +64,16 @@ def _begins_on(place: Place, k: int, crossing: bool) -> bool:
 
 
 def _moves(
-    run: RunView, place: Place, k: int, time: Number, state: Mapping[str, Row], by: str, slopes: Sequence[Number]
+    run: RunView,
+    place: Place,
+    k: int,
+    time: Number,
+    state: Sequence[Number],
+    had: Sequence[Number],
+    slopes: Sequence[Number],
 ) -> bool:
-    """Whether a surface has a derivative by a target that is not round-off of differences."""
-    columns: list[Number] = [time, *(state[x][by] for x in place.mode.states)]
+    """Whether a surface has a derivative by a target that is not round-off, of differences or of the derivatives."""
+    columns: list[Number] = [time, *state]
     values: list[Number] = [place.t, *place.x, *run.problem.timeline.at(place.t).data[: len(slopes)]]
     largest: Number = max(abs(v) for v in (*columns, *slopes))
     if not largest > 0:
@@ -77,7 +88,12 @@ def _moves(
     gradient, flow = place.kernel.gradients[k](place.t, *place.x), (0, *place.kernel.flow(place.t, *place.x))
     terms = [abs(g) * (abs(s) + abs(f * time)) for g, s, f in zip(gradient, columns, flow, strict=True)]
     through = abs(slope - sum(g * s for g, s in zip(gradient, columns, strict=True)))
+    noise = [
+        ROUNDOFF_UNITS * run.arithmetic.unit * size + f * abs(time)
+        for size, f in zip(had, place.flow_roundoff(), strict=True)
+    ]
     least = run.arithmetic.sqrt(run.arithmetic.sqrt(run.arithmetic.unit)) * max(*terms, through)
+    least = max(least, sum(abs(g) * n for g, n in zip(gradient[1:], noise, strict=True)))
     return abs(slope) > least and abs(slope) * step > place.roundoff_bound(k)
 
 

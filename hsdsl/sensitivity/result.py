@@ -6,6 +6,7 @@ from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -174,16 +175,23 @@ class Sensitivity:
         names, own = self.setting.plain.program.parameters, self.setting.parameters
         moved = [along({by: own[by][i] for by in self.wrt}) for i in range(len(names))]
         parameters = {way: tuple(row[way] for row in moved) for way in ways}
+        arcs = {jump: list(part) for jump, part in groupby(self.execution.arcs, key=lambda arc: arc.jump)}
+        sizes: dict[str, float] = {}
         for made in self.execution.transitions:
-            if any(
-                abs(made.time - tie.time) <= view.problem.tie(tie.time) for tie in self.ties
-            ):  # its orders are known
-                continue
+            for name, size in self.execution.sizes(arcs.get(made.index, ())).items():
+                sizes[name] = max(sizes.get(name, 0.0), size)
+            if any(abs(made.time - tie.time) <= view.problem.tie(tie.time) for tie in self.ties):
+                continue  # its orders have been looked at
             after = made.after or {}
             time = self._shifts(after)
             state = self._followed(made.target, made.time, after, time, True)
             rows = {x: along(row) for x, row in state.items()}
-            if found := next(parted(view, landing(view, made), along(time), rows, parameters), None):
+            had = {x: {by: sizes.get(derivative_name(x, by), 0.0) for by in self.wrt} for x in rows}
+            largest = {
+                x: {way: sum(row[by] * abs(part) for by, part in parts.items()) for way, parts in ways.items()}
+                for x, row in had.items()
+            }
+            if found := next(parted(view, landing(view, made), along(time), rows, parameters, largest), None):
                 return [(made.time, f"at t = {show(made.time)} {made.edge} leads onto {found}")]
         return []
 
@@ -228,7 +236,8 @@ class Sensitivity:
     def reasons(self) -> tuple[str, ...]:
         """Why they do not exist, or are not known to."""
         own = (*self.starts, *(reason for _, reason in self.breaks))
-        return own if self._smooth.theorem == "holds" else (*own, *self.touches, *self._smooth.reasons)
+        further = () if self._smooth.theorem == "holds" else (*self.touches, *self._smooth.reasons)
+        return (*own, *(reason for reason in further if not any(reason in told for told in own)))
 
     def _exists_at(self, index: int) -> bool:
         """Whether the derivatives of a transition exist."""

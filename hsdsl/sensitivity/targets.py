@@ -44,4 +44,6 @@ def _target(label: str, program: Program, states: Sequence[str]) -> Target:
     hint = f"did you mean '{INITIAL}{label}'?" if label in states else meant_alone(label, known)
     if label in (given.name for given in program.inputs):
         hint = "an input is no number; differentiate by a parameter that its expression or samples depend on"
+    if name == "mode" and name != label:
+        hint = "the initial mode is no number"
     raise UsageError(f"the model has no parameter or initial state '{label}'", hint)

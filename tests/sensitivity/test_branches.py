@@ -175,3 +175,30 @@ experiment: {until: 60}
     first = found.points[0]
     assert first.period < 0.01 * found.first.period
     assert (first.parameter - 0.8) * (first.parameter - 0.7) == pytest.approx(0.8 * 0.7 * level**2, rel=0.01)
+
+
+STUCK = """
+hsdsl: 1
+parameters: {J: 1.7, m: 0.4, k: 2.3, c: 0.05, d: 0.4, drive: {value: 2, unit: N*m}, static: 1.7, kinetic: 0.9}
+let: {shaft: k*x + c*(u - v)}
+modes:
+  on:
+    flow: {x: u - v, u: (drive - d*u - shaft)/J, v: (shaft - kinetic - (static - kinetic)*exp(-v/0.7))/m}
+    transitions: [{name: sticks, when: v <= 0, to: back}]
+  back:
+    flow: {x: u - v, u: (drive - d*u - shaft)/J, v: (shaft + kinetic + (static - kinetic)*exp(v/0.7))/m}
+    transitions: [{name: turns, when: v >= 0, to: on}]
+units: {u: rad/s}
+initial: {mode: on, x: 0.2, u: 0.4, v: 0.1}
+experiment: {until: 40, completion: auto}
+"""
+
+
+def test_a_picture_shows_no_state_that_is_round_off_at_the_section(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[Any] = []
+    monkeypatch.setattr("hsdsl.plot.analyses.plot_branch", lambda *given: drawn.extend(given))
+    model = hsdsl.loads(hsdsl.loads(STUCK).completed())
+    model.continuation("sliding_on_back->on", "drive", 1.98, 2.02).plot(tmp_path / "branch.png")
+    assert drawn[1:3] == ["drive [N*m]", "u [rad/s] after the section"]  # v is zero there

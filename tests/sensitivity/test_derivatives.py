@@ -420,6 +420,11 @@ def test_near_grazing() -> None:
     assert np.isclose(found.transitions[0].time["s"], 1 / np.sqrt(1 - s * s), rtol=1e-8)
 
 
+def test_the_reason_of_a_stop_is_given_once() -> None:
+    found = hsdsl.load("models/gallery/stick-slip.yaml").simulate(completion="none").sensitivity("belt")
+    assert len(found.reasons) == 1 and "the run ends there (zeno)" in found.reasons[0]
+
+
 def test_a_zeno_point_ends_derivatives() -> None:
     found = hsdsl.load("models/bouncing-ball.yaml").sensitivity("e", until=13)
     assert found.exists is False
@@ -438,6 +443,33 @@ def test_derivatives_through_sticking(written: bool) -> None:
     ends = [model.simulate(until=6, parameters={"belt": 0.1 + d}, tolerance=1e-13).final.state for d in (1e-6, -1e-6)]
     for name, row in found.final.state.items():
         assert row["belt"] == pytest.approx((ends[0][name] - ends[1][name]) / 2e-6, rel=1e-6)
+
+
+STRIBECK = """
+hsdsl: 1
+parameters: {J: 1.7, m: 0.4, k: 2.3, c: 0.05, d: 0.3, drive: 1.9, static: 1.5, kinetic: 0.9, fast: 0.7}
+let: {shaft: k*x + c*(u - v)}
+modes:
+  on:
+    flow: {x: u - v, u: (drive - d*u - shaft)/J, v: (shaft - kinetic - (static - kinetic)*exp(-v/fast))/m}
+    transitions: [{name: sticks, when: v <= 0, to: back}]
+  back:
+    flow: {x: u - v, u: (drive - d*u - shaft)/J, v: (shaft + kinetic + (static - kinetic)*exp(v/fast))/m}
+    transitions: [{name: turns, when: v >= 0, to: on}]
+initial: {mode: on, x: 0.2, u: 0.4, v: 0.1}
+experiment: {until: 4, completion: auto}
+"""
+
+
+@pytest.mark.parametrize(("wrt", "value"), [("c", 0.05), ("fast", 0.7), ("static", 1.5), ("kinetic", 0.9), ("J", 1.7)])
+def test_derivatives_through_the_end_of_sticking(wrt: str, value: float) -> None:
+    """Executions from nearby land on the surface, too, where the flow is zero by cancellation."""
+    model = hsdsl.loads(STRIBECK)
+    found = model.sensitivity(wrt)
+    assert found.exists is True and not found.reasons
+    ends = [model.simulate(parameters={wrt: value + d}, tolerance=1e-13).final.state for d in (1e-6, -1e-6)]
+    for x, row in found.final.state.items():
+        assert row[wrt] == pytest.approx((ends[0][x] - ends[1][x]) / 2e-6, rel=1e-5, abs=1e-7)
 
 
 LANDING = """
@@ -481,6 +513,7 @@ def test_moving_jumps_are_refused() -> None:
     [
         ("C", {}, "no parameter or initial state 'C'", "'c'"),
         ("v", {}, "no parameter or initial state 'v'", "'initial.v'"),
+        ("initial.mode", {}, "no parameter or initial state 'initial.mode'", "no number"),
         ("", {}, "got none", "for example"),
         ("c", {"step": 1e-3}, "no argument 'step'", ""),
         ("c", {"scheme": "relaxed"}, "no argument 'scheme'", ""),
@@ -507,6 +540,8 @@ def test_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert obey(words) == 0
     text = capsys.readouterr().out
     assert "they exist: yes" in text and "d/d initial.v" in text
+    assert obey([*words, "--at", "end"]) == 2
+    assert "there is no part 'end'" in capsys.readouterr().err
     assert obey([*words, "--json", "--at", "outputs", "--set", "experiment.samples=4"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["samples"]["times"] == [0, 1, 2, 3]

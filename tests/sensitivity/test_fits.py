@@ -304,3 +304,25 @@ experiment: {until: 2}
     assert (height.get_ylabel(), speed.get_xlabel()) == ("h [m]", "time t [s]")
     assert not np.isnan(height.get_lines()[0].get_ydata()).any()  # the height does not jump
     assert np.isnan(speed.get_lines()[0].get_ydata()).any()
+
+
+TWO_STATES = """hsdsl: 1
+parameters: {rate: 1.3}
+modes:
+  fill: {flow: {x: rate}, transitions: [{when: x >= 2, to: heat, reset: {T: 5}}]}
+  heat: {flow: {x: 0, T: 3*rate}, transitions: [{when: T >= 9, to: fill, reset: {x: 0}}]}
+initial: {mode: fill, x: 0}
+experiment: {until: 6}
+"""
+
+
+def test_measurements_of_a_state_where_the_run_lacks_it_are_refused() -> None:
+    """It heats from 1.54 to 2.56."""
+    model = hsdsl.loads(TWO_STATES)
+    with pytest.raises(UsageError, match="has no T at any time at which it was measured"):
+        model.fit({"t": [0.4, 1.1], "T": [5.5, 6]}, "rate")
+    found = model.fit(
+        {"t": [0.4, 1.8, 2.2], "T": [5.5, 6, 7.6], "x": [0.5, np.nan, np.nan]}, "rate", weights={"T": 1, "x": 1}
+    )
+    assert np.isnan(found.residuals["T"][0]) and np.isfinite(found.residuals["T"][1:]).all()
+    assert "1 measurement," in model.fit({"t": [0.4], "x": [1]}, "rate").summary

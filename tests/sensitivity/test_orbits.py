@@ -14,6 +14,8 @@ import hsdsl
 from hsdsl import UsageError
 from hsdsl.cli.verbs import obey
 from hsdsl.orbits.section import Section
+from hsdsl.plot import style
+from hsdsl.plot.panel import label
 
 BELT = "models/gallery/stick-slip.yaml"
 OSCILLATOR = "models/oscillator-with-stop-1.yaml"
@@ -192,6 +194,11 @@ experiment: {{until: 20}}
         (OSCILLATOR, {"section": "x"}, "no transition 'x'"),
         (OSCILLATOR, {"section": "impact", "laps": 0}, "laps"),
         (OSCILLATOR, {"section": "impact", "until": 0.01}, "does not make the transition impact"),
+        (
+            "models/thermostat.yaml",
+            {"section": "switch_off", "laps": 5},
+            "makes the transition switch_off only 3 times",
+        ),
         (OSCILLATOR, {"section": "impact", "step": 1}, "no argument 'step'"),
         ("examples/orbits/compass-walker.yaml", {"section": "heel_strike", "period": 1}, "does not depend on time"),
         ("models/bouncing-ball.yaml", {"section": "bounce"}, "ever shorter"),
@@ -348,3 +355,22 @@ def test_shifts_of_several_states_together(section: str, moving: set[str]) -> No
     assert drift.keys() == moving
     assert set(orbit.drift) - moving == {"y", "ground"}
     assert len(set(np.round(list(drift.values()), 9))) == 1
+
+
+def test_a_section_that_is_not_made_is_answered_with_those_that_are() -> None:
+    with pytest.raises(UsageError, match="does not make the transition catches_up") as caught:
+        hsdsl.load(BELT).orbit("catches_up")
+    assert "slower->sliding_slower_faster" in (caught.value.hint or "")
+
+
+def test_the_axes_of_a_picture_have_units(tmp_path: Path) -> None:
+    orbit = hsdsl.load("examples/orbits/compass-walker.yaml").orbit("heel_strike")
+    seen: list[Any] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(style, "write_figure", lambda figure, *_: seen.append(figure))
+        orbit.plot(tmp_path / "orbit.png")
+    left, right = seen[0].axes
+    first, second = [x for x in orbit.state if x not in orbit.drift][:2]
+    assert (left.get_xlabel(), left.get_ylabel()) == tuple(label(x, orbit.units) for x in (first, second))
+    assert (right.get_xlabel(), right.get_ylabel()) == ("real part", "imaginary part")
+    assert "stable, multipliers" in seen[0].get_suptitle()

@@ -178,10 +178,10 @@ BAD = [
     ("h,rat", "there is no setting, parameter or initial value 'rat'"),
     ("h,x", "it is a state"),
     ("h,t", "it is time"),
-    ("h,h", "exclude each other"),
+    ("h,h", "got h twice"),
     ("h,step", "exclude each other"),
     ("h,tolerance", "exclude each other"),
-    ("rate,rate", "exclude each other"),
+    ("rate,rate", "got rate twice"),
     ("h=1:1:5,rate", "expected FROM below TO"),
     ("h=2:1,rate", "expected FROM below TO"),
     ("h=1e-3:1:1,rate", "2 to 400 values"),
@@ -266,3 +266,17 @@ def test_cells_without_a_reference_are_hatched(tmp_path: Path) -> None:
     assert words == {"no reference"}
     plot_stability(tmp_path / "map.svg", found)
     assert "<pattern" in (tmp_path / "map.svg").read_text()
+
+
+@pytest.mark.parametrize("count", [1, 4, 5])
+def test_every_column_of_panels_has_an_axis_with_numbers(count: int) -> None:
+    methods = ["euler", "heun", "midpoint", "ralston", "rk4"][:count]
+    found = stability_map(
+        hsdsl.loads(DECAY), "h=1e-3:1e-2:2,rate=10:40:2", methods=methods, with_rho=False, processes=1
+    )
+    figure = plot_stability.__wrapped__(found)
+    panels = [axes for axes in figure.axes if axes.get_visible()]
+    lowest = panels[-min(3, count) :]
+    assert {axes.get_subplotspec().colspan.start for axes in lowest} == set(range(min(3, count)))
+    assert [axes for axes in panels if axes.get_xlabel() == "h"] == lowest
+    assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in lowest)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -31,6 +31,12 @@ class Axis:
     kind: str
     values: tuple[float, ...]
     logarithmic: bool
+    unit: str = ""
+
+    @property
+    def label(self) -> str:
+        """Its name with its unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def onto(self, arguments: Mapping[str, Any], value: float) -> dict[str, Any]:
         """The arguments of a run with a value of this axis among them."""
@@ -52,11 +58,15 @@ def read_axes(model: Model, text: str, until: float, base: Mapping[str, Any]) ->
         raise UsageError(f"--map: expected two names with a comma between them, got '{shown(text)}'", EXAMPLE)
     x, y = (_axis(model, part, until, base) for part in parts)
     setting = x.kind in DEFAULTS and x.kind == y.kind
-    if x.name == y.name or setting or {x.kind, y.kind} == {"step", "tolerance"}:
+    if x.name == y.name:
+        raise UsageError(f"--map: expected two names, got {x.name} twice", EXAMPLE)
+    if setting or {x.kind, y.kind} == {"step", "tolerance"}:
         raise UsageError(f"--map: {x.name} and {y.name} exclude each other", EXAMPLE)
     if len(x.values) * len(y.values) > MOST_CELLS:
         raise UsageError(f"--map: expected at most {MOST_CELLS:,} runs, got {len(x.values) * len(y.values):,}")
-    return x, y
+    units = model.program.units
+    names = ("t" if axis.kind == "step" else axis.name.removeprefix("initial.") for axis in (x, y))
+    return replace(x, unit=units.get(next(names), "")), replace(y, unit=units.get(next(names), ""))
 
 
 def _axis(model: Model, part: str, until: float, base: Mapping[str, Any]) -> Axis:

@@ -48,10 +48,11 @@ def plot_stability(found: StabilityMap) -> Figure:
         _draw(axes, found, panel, measure, span)
     for axes in grid.flat[len(panels) :]:
         axes.set_visible(False)
-    for axes in grid[-1]:
-        axes.set_xlabel(found.x.name)
+    for axes in list(grid.flat[: len(panels)])[-columns:]:  # the lowest of each column
+        axes.xaxis.set_tick_params(labelbottom=True)
+        axes.set_xlabel(found.x.label, parse_math=False)
     for axes in grid[:, 0]:
-        axes.set_ylabel(found.y.name)
+        axes.set_ylabel(found.y.label, parse_math=False)
     figure.suptitle(found.name, fontsize=10)
     shown = f"{measure} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else ""
     _legend(figure, found, columns + (columns > 2), shown)

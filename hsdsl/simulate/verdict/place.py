@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from math import isfinite
 
-from hsdsl.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.enclosures import Range, Undecided
+from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
+from hsdsl.enclosures import Range, Undecided, as_range
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
 from hsdsl.program import ModeProgram
@@ -41,6 +42,16 @@ class Place:
         gradient, slope = self.kernel.gradients[k](self.t, *self.x), self.kernel.flow(self.t, *self.x)
         terms = (abs(g * f) for g, f in zip(gradient[1:], slope, strict=True))
         return TANGENT_UNITS * self.surfaces.arithmetic.unit * sum(terms, abs(gradient[0]))
+
+    def flow_roundoff(self) -> list[Number]:
+        """A bound on the round-off of each component of the flow, also of one that is zero by cancellation; else 0."""
+        units = self.surfaces.arithmetic.unit / FLOAT64.unit
+        try:
+            flow = self.enclosing().flow(*(Range(float(a), float(a)) for a in (self.t, *self.x)))
+        except (Undecided, *DOMAIN_ERRORS):
+            return [0.0 for _ in self.x]
+        widths = [float(f.high - f.low) for f in map(as_range, flow)]
+        return [units * width if isfinite(width) else 0.0 for width in widths]
 
     def roundoff_bound(self, k: int) -> Number:
         """Round-off of surface k."""
