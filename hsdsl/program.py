@@ -83,12 +83,16 @@ class Tape:
 
 @dataclass(frozen=True)
 class SampledInput:
-    """A sampled input: exact samples, or None where they are expressions of parameters (routine ``input_i``)."""
+    """A sampled input: exact samples, or None where they are expressions of parameters (routine ``input_i``).
+
+    Where a flow or a surface has its slope, as of one that a sliding follows, a kink of it is a jump: it is ``sloped``.
+    """
 
     name: str
     hold: Hold
     times: tuple[Fraction, ...] | None
     values: tuple[Fraction, ...] | None
+    sloped: bool = False
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from hsdsl.completion.nearby import (
 )
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.derivatives import derivative, lie_derivative
+from hsdsl.functions import sign
 from hsdsl.system import TIME, Edge, Mode, Surface
 
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
@@ -137,10 +138,10 @@ def _constrained(near: Nearby):
     if is_zero(size, at):  # the reset does not contract: a shear
         return None
     rows: dict[int, sp.Expr] = {}
-    part, away = product(part, slopes), product(part, moved)
+    part, away, sided = product(part, slopes), product(part, moved), _sided(own, count, at)
     for i, correction in zip(near.changed, product(part, sp.Matrix(list(map(near.flow, among)))), strict=True):
         flow = near.flow(near.states[i])
-        rows[i] = flow if is_zero(correction, at) else cancelled(flow - correction / size)
+        rows[i] = flow if is_zero(correction, at) else cancelled(flow - correction / size) * sided
     projection: dict[int, dict[sp.Symbol, sp.Expr]] = {}
     for i, shares in zip(near.changed, part.tolist(), strict=True):
         found = {x: cancelled(share / size) for x, share in zip(among, shares, strict=True)}
@@ -149,6 +150,19 @@ def _constrained(near: Nearby):
     for i, correction in zip(near.changed, away, strict=True):
         landing[i] = cancelled(landing[i] - correction / size)
     return rows, projection, tuple(landing), at
+
+
+def _sided(own: sp.Matrix, count: int, at: Point) -> sp.Expr:
+    """1 where kinks of a reset are on the sides that a point is on; no value at those beyond which it keeps less.
+
+    That is on an edge of what it keeps, as of `max(u - v, 0)` at u = 0: no one flow is known there.
+    """
+    found = sp.S.One
+    for kink in sorted(own.atoms(sign), key=str):
+        here = sp.Integer(1 if value_at(kink.args[0], at) > 0 else -1)
+        if rank(own.xreplace({kink: -here}), at) > count:
+            found *= 2 / (kink**2 + here * kink)
+    return found
 
 
 def _direction(near: Nearby, last: sp.Expr, projection: dict[int, dict[sp.Symbol, sp.Expr]], at: Point):

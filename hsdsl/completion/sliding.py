@@ -19,10 +19,13 @@ from hsdsl.completion.contact import zero_surface
 from hsdsl.completion.nearby import cancelled
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.derivatives import lie_derivative
-from hsdsl.expression.scope import symbol
+from hsdsl.expression.scope import slope_symbol, symbol
+from hsdsl.functions import atan2, below, floor, sign
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Surface
 
 PART = sp.Rational(1, 1024)  # of the run: a surface's size alone, zero where all states in it are, bounds no rate
+JUMP = sp.Rational(1, 2**26)  # of the size of a surface: the root of the round-off; steps leave it by less
+JUMPING = (floor, sign, below, atan2)
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ def slidings(system: HybridSystem) -> list[Sliding]:
         while name in names:
             name, number = f"{base}_{number}", number + 1
         names.add(name)
-        found.append(_sliding(name, a, out, b, back, system.experiment.until))
+        found.append(_sliding(system, name, a, out, b, back))
     return found
 
 
@@ -97,16 +100,22 @@ def _factor(one: Edge, other: Edge) -> sp.Number:
     return factor if {each: value * factor for each, value in s.items()} == dict(r) else sp.S.Zero
 
 
-def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr) -> Sliding:
+def _sliding(system: HybridSystem, name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> Sliding:
     states = [symbol(state) for state in a.states]
     flows = a.flow, tuple(b.vector_field[x] for x in states)
-    r = out.surface.residual
-    outwards, inwards = (cancelled(lie_derivative(r, mode.vector_field)) for mode in (a, b))
+    r, until = out.surface.residual, system.experiment.until
+    moving = {symbol(given.name): slope_symbol(given.name) for given in system.inputs if given.hold == "linear"}
+    outwards, inwards = (cancelled(lie_derivative(r, {**mode.vector_field, **moving})) for mode in (a, b))
     slopes = [sp.diff(r, x) for x in states]
-    curved = any(slope.free_symbols & {TIME, *states} for slope in (*slopes, sp.diff(r, TIME)))
+    curved = any(slope.free_symbols & {TIME, *states, *moving} for slope in (*slopes, sp.diff(r, TIME)))
     pressing = cancelled(outwards - inwards)
-    size = (PART * until * pressing) ** 2 + sum((slope * x) ** 2 for slope, x in zip(slopes, states, strict=True))
-    share, back_to = outwards / pressing, r / sp.sqrt(size) if curved else sp.S.Zero
+
+    def size(part: sp.Expr) -> sp.Expr:
+        """The size of the surface, not below what it may move by in a part of the run."""
+        terms = ((slope * x) ** 2 for slope, x in zip(slopes, states, strict=True))
+        return sp.sqrt((part * until * pressing) ** 2 + sp.Add(*terms))
+
+    share, back_to = outwards / pressing, r / size(PART) if curved else sp.S.Zero
 
     def blended(f: sp.Expr | None, g: sp.Expr | None) -> sp.Expr | None:
         """A flow or an output in between."""
@@ -127,12 +136,13 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr)
 
     leave_a = leave(a, zero_surface(-outwards), out.priority)
     leave_b = leave(b, zero_surface(inwards), back.priority)
+    thrown = _thrown(system, r, leave_a, leave_b, JUMP * size(sp.S.One))
     mode = replace(
         a,
         name=name,
         flow=flow,
         flow_texts=tuple(map(text_of, flow)),
-        edges=(leave_a, leave_b, *_others(name, a, out, b, back)),
+        edges=(leave_a, leave_b, *thrown, *_others(name, a, out, b, back)),
         walls=tuple(dict.fromkeys((*a.walls, *b.walls))),
         outputs=tuple(map(blended, a.outputs, b.outputs)),
         scene=tuple(map(blended, a.scene, b.scene)),
@@ -142,6 +152,24 @@ def _sliding(name: str, a: Mode, out: Edge, b: Mode, back: Edge, until: sp.Expr)
     into_a = replace(out, name=f"{a.name}->{name}", priority=out.priority + 1, **enter)
     into_b = replace(back, name=f"{b.name}->{name}", priority=back.priority + 1, **enter)
     return Sliding(mode, (_where(into_a, sp.Lt(inwards, 0)), _where(into_b, sp.Gt(outwards, 0))))
+
+
+def _thrown(system: HybridSystem, r: sp.Expr, leave_a: Edge, leave_b: Edge, least: sp.Expr) -> list[Edge]:
+    """The edges by which a surface that jumps away from a state leaves it behind, in one mode or the other.
+
+    They go before those that put it on the surface.
+    """
+    given = {symbol(each.name): each.hold for each in system.inputs}
+    known = {TIME, *given, *system.parameter_symbols}
+    switched = (e for e in r.atoms(*JUMPING) if e.free_symbols <= known and e.free_symbols & {TIME, *given})
+    if not any(given.get(x) == "zero" for x in r.free_symbols) and not any(switched):
+        return []
+    found: list[Edge] = []
+    for edge, beyond in ((leave_a, -r - least), (leave_b, r - least)):
+        name, states = f"{edge.name}_behind", edge.target_states
+        stay = {"reset": tuple(map(symbol, states)), "reset_texts": states, "priority": edge.priority + 1}
+        found.append(replace(edge, name=name, surface=zero_surface(beyond), **stay))
+    return found
 
 
 def _where(edge: Edge, condition: sp.Basic) -> Edge:

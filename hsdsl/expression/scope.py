@@ -243,6 +243,11 @@ def symbol(name: str) -> sp.Symbol:
     return sp.Symbol(name, real=True)
 
 
+def slope_symbol(name: str) -> sp.Symbol:
+    """The symbol of how fast a sampled input changes, by no name that a file can have."""
+    return sp.Symbol(f"{name}'", real=True)
+
+
 def state(name: str) -> Value:
     """A state's value."""
     return Value(symbol(name), uses=frozenset((name,)))

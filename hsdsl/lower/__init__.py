@@ -22,6 +22,7 @@ from hsdsl import limits
 from hsdsl import program as lowered
 from hsdsl.completion import Overlay, overlays
 from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
+from hsdsl.expression.scope import slope_symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import OutOfTime, timebox
 from hsdsl.lower.constants import constants, initial_order, initial_values, lower_constants, lower_expressions
@@ -68,12 +69,16 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
     experiment = system.experiment
     indices = {mode.name: i for i, mode in enumerate(system.modes)}
     modes, contacts = _modes(system, names, indices, both)
+    slidings = [mode for mode in system.modes if mode.slides]
+    sloped = {
+        x for mode in slidings for e in (*mode.flow, *(s.residual for s in mode.surfaces)) for x in e.free_symbols
+    }
     return lowered.Program(
         path=system.path,
         digest=system.digest,
         title=system.title,
         parameters=tuple(p.name for p in system.parameters),
-        inputs=tuple(_sampled(i) for i in system.inputs),
+        inputs=tuple(_sampled(i, slope_symbol(i.name) in sloped) for i in system.inputs),
         modes=modes,
         contacts=contacts,
         parts=system.parts,
@@ -122,6 +127,7 @@ def _with_contacts(edges: tuple[lowered.EdgeProgram, ...], found: Overlay) -> tu
     return tuple(whole)
 
 
-def _sampled(given: SampledInput) -> lowered.SampledInput:
+def _sampled(given: SampledInput, sloped: bool) -> lowered.SampledInput:
     exact = not any(isinstance(v, sp.Basic) for v in given.times + given.values)
-    return lowered.SampledInput(given.name, given.hold, given.times if exact else None, given.values if exact else None)
+    times, values = (given.times, given.values) if exact else (None, None)
+    return lowered.SampledInput(given.name, given.hold, times, values, sloped)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from hsdsl.expression.scope import symbol
+from hsdsl.expression.scope import slope_symbol, symbol
 from hsdsl.system import TIME, HybridSystem
 
 
@@ -15,7 +15,7 @@ from hsdsl.system import TIME, HybridSystem
 class Names:
     """The numbered symbols for the file's names in generated code.
 
-    ``data`` has the arguments of `bind`; ``shared`` maps parameters, sampled inputs and switches;
+    ``data`` has the arguments of `bind`; ``shared`` maps parameters, sampled inputs, their slopes and switches;
     ``inputs`` has the value of each sampled input at the start of its segment, whose slope by the input is 1.
     """
 
@@ -33,6 +33,7 @@ def number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
     for i, sampled in enumerate(system.inputs):
         start, slope, since = (symbol(f"{letter}{i}") for letter in "abc")
         shared[symbol(sampled.name)] = start + slope * (TIME - since) if sampled.hold == "linear" else start
+        shared[slope_symbol(sampled.name)] = slope
         data += [start, slope, since]
         starts.append(start)
     numbers = tuple(symbol(f"k{i}") for i in range(len(switches)))

@@ -71,7 +71,9 @@ def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number]
             _line(given, times, values, start if start < until else until + TIE * until)
             for given, (times, values) in zip(program.inputs, samples, strict=True)
         ]
-        held = tuple(a for given, (a, _, _) in zip(program.inputs, lines, strict=True) if given.hold == "zero")
+        both = list(zip(program.inputs, lines, strict=True))
+        held = tuple(a for given, (a, _, _) in both if given.hold == "zero")
+        held += tuple(slope for given, (_, slope, _) in both if given.sloped)
         data = (*parameters, *(number for line in lines for number in line), *(zero for _ in program.switches))
         segments.append(Segment(start, end, data, jump=bool(segments) and held != held_before))
         held_before = held

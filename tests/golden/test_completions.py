@@ -184,6 +184,58 @@ def test_a_ball_comes_to_rest_beside_a_sliding(start: float, method: str, engine
     assert run.verdict.theorem == "left" and any("along the guard of hit" in reason for reason in run.verdict.reasons)
 
 
+SET_POINT = """
+hsdsl: 1
+inputs: {{w: {{times: [0, 1, 2], values: {values}, hold: {hold}}}}}
+modes:
+  a: {{flow: {{x: 1, y: 1}}, transitions: [{{when: x >= w, to: b}}]}}
+  b: {{flow: {{x: -{back}, y: 4}}, transitions: [{{when: x <= w, to: a}}]}}
+initial: {{mode: a, x: {x}, y: 0}}
+experiment: {{until: 3, completion: auto}}
+"""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("hold", "values", "back", "x", "right"),
+    [
+        # w' is 0.4, -3 and 0: the share of b is (1 - w')/6, then 2/3 and 1/6
+        ("linear", [0, 0.4, -2.6], 5, -0.3, (-2.6, 0.5 + 0.5 * 1.3 + 3 + 1.5)),
+        # b cannot follow -3: it meets w again at t = 2.5
+        ("linear", [0, 0.4, -2.6], 2, -0.3, (-2.6, 0.5 + 0.5 * 1.6 + 6 + 0.5 * 2)),
+        # a catches up 0.5 behind the first jump, b 0.4 behind the second one
+        ("zero", [0, 0.5, -0.3], 2, -0.5, (-0.3, 0.5 + 1 + 0.5 + 1 + 1.6 + 1.2)),
+        ("zero", [0, 1e-5, -1e-5], 2, -0.5, (-1e-5, 0.5 + 1 + 1e-5 + 2 * (1 - 1e-5) + 4e-5 + 2 * (1 - 1e-5))),
+    ],
+)
+def test_sliding_follows_a_surface_that_a_sampled_input_moves(
+    hold: str, values: list[float], back: float, x: float, right: tuple[float, float], method: str, engine: str
+) -> None:
+    model = hsdsl.loads(SET_POINT.format(hold=hold, values=values, back=back, x=x))
+    run = model.simulate(method=method, engine=engine)
+    assert run.stop.reason == "until" and run.verdict.theorem == "left"
+    assert (run.final.state["x"], run.final.state["y"]) == pytest.approx(right, abs=1e-8)
+
+
+def test_a_surface_that_moves_with_a_ramp_of_samples_is_not_written() -> None:
+    model = hsdsl.loads(SET_POINT.format(hold="linear", values=[0, 1, 0], back=2, x=-0.3))
+    with pytest.raises(hsdsl.UsageError, match="moves with the sampled input w"):
+        model.completed()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_sliding_stays_on_a_surface_that_switches_of_time_move(engine: str) -> None:
+    modes = """
+  a: {flow: {x: 1, y: 1}, transitions: [{when: x >= 0.4*floor(t) + abs(t - 2.5)/4, to: b}]}
+  b: {flow: {x: -3, y: 3}, transitions: [{when: x <= 0.4*floor(t) + abs(t - 2.5)/4, to: a}]}"""
+    run = sliding(modes, "x: 0.625, y: 0", 3.5, engine=engine, tolerance=1e-11)
+    # two jumps are met again after 0.4/(5/4) each; behind the third one the rest of the run is too short for that
+    caught, falling, rising = 2 * 0.4 / 1.25, 1 + 2 * 5 / 16, 1 + 2 * 3 / 16
+    right = falling * (2.5 - caught) + caught + rising * 0.5 + 0.5
+    assert run.final.state["y"] == pytest.approx(right, abs=1e-8)
+
+
 def test_long_sliding_on_a_curve_does_not_drift() -> None:
     """Two flows press on the circle from both sides for ever, and turn along it."""
     modes = """

@@ -611,3 +611,27 @@ experiment: {{until: 7}}
     run = assert_engines_agree(hsdsl.loads(text), method=method)
     assert [made.edge for made in run.transitions if made.source == "a"][:2] == ["floor", "clock"]
     assert run.stop.reason == "until" and run.final.state["y"] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("reset", ["max(u + 0.5*(1 + e)*v, 0)", "select(u + 0.5*(1 + e)*v, u + 0.5*(1 + e)*v, 0)"])
+@pytest.mark.parametrize("speed", [1.5, 3])
+def test_no_body_falls_through_its_floor_on_an_edge_of_what_its_reset_keeps(
+    speed: float, reset: str, engine: str
+) -> None:
+    """Friction of impacts stops a body before or behind its Zeno point: there no one flow is known."""
+    text = f"""
+hsdsl: 1
+parameters: {{e: 0.4}}
+modes:
+  a:
+    flow: {{x: u, y: v, u: 0, v: -8}}
+    transitions: [{{name: floor, when: y <= 0, to: a, reset: {{v: -e*v, u: "{reset}"}}}}]
+initial: {{mode: a, x: 0, y: 0.25, u: {speed}, v: 0}}
+experiment: {{until: 5}}
+"""
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.stop.reason != "until" and run.verdict.theorem != "holds"
+    assert min(run.values[:, run.states.index("y")]) > -1e-9
+    before_rest = speed < 3
+    assert (run.stop.time < 0.59) == before_rest and (before_rest or run.stop.time == pytest.approx(3 / 4, abs=1e-3))
