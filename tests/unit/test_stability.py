@@ -178,10 +178,10 @@ BAD = [
     ("h,rat", "there is no setting, parameter or initial value 'rat'"),
     ("h,x", "it is a state"),
     ("h,t", "it is time"),
-    ("h,h", "exclude each other"),
+    ("h,h", "twice"),
     ("h,step", "exclude each other"),
     ("h,tolerance", "exclude each other"),
-    ("rate,rate", "exclude each other"),
+    ("rate,rate", "twice"),
     ("h=1:1:5,rate", "expected FROM below TO"),
     ("h=2:1,rate", "expected FROM below TO"),
     ("h=1e-3:1:1,rate", "2 to 400 values"),
@@ -273,3 +273,12 @@ def test_every_column_of_panels_has_an_axis_with_numbers(count: int) -> None:
     assert {axes.get_subplotspec().colspan.start for axes in lowest} == set(range(min(3, count)))
     assert [axes for axes in panels if axes.get_xlabel() == "h"] == lowest
     assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in lowest)
+
+
+def test_names_are_checked_and_may_be_one_text() -> None:
+    model = hsdsl.loads(DECAY)
+    found = stability_map(model, "h=1e-3:1e-2:2,rate=10:40:2", methods="euler, rk4", schemes="located", with_rho=False)
+    assert [panel.tool.label for panel in found.panels] == ["located euler", "located rk4"]
+    for words in ({"methods": "rk5"}, {"schemes": ["locate"]}, {"against": "scypi"}):
+        with pytest.raises(UsageError, match="there is no"):
+            stability_map(model, "h,rate", **words)
