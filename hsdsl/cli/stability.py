@@ -9,7 +9,7 @@ from typer import Option
 
 from hsdsl.cli.console import progress, say, write_table
 from hsdsl.cli.options import Answer, Model, option, overriding, values_of
-from hsdsl.cli.texts import check_target, known_names
+from hsdsl.cli.texts import check_target
 from hsdsl.errors import UsageError
 
 MAP = (
@@ -39,9 +39,7 @@ def stability(
     with answer.reporting():
         from hsdsl.chart import PEERS
         from hsdsl.chart.stability import stability_map
-        from hsdsl.integrators import METHODS
         from hsdsl.model import load
-        from hsdsl.simulate import SCHEMES
 
         check_target(out, "--out", (".csv",))
         check_target(plot, "--plot")
@@ -50,11 +48,9 @@ def stability(
         options = values_of(overrides)
         by_set: dict[str, str] = options["settings"]
         options |= {
-            "schemes": known_names(by_set.pop("scheme", None) if scheme is None else scheme, (*SCHEMES,), "--scheme"),
-            "methods": known_names(
-                by_set.pop("method", None) if method is None else method, ("auto", *METHODS), "--method"
-            ),
-            "against": known_names(",".join(PEERS) if against == "all" else against, (*PEERS,), "--against"),
+            "schemes": (by_set.pop("scheme", None) if scheme is None else scheme) or (),
+            "methods": (by_set.pop("method", None) if method is None else method) or (),
+            "against": ",".join(PEERS) if against == "all" else against or (),
         }
         with progress(answer.hidden) as show:
 

@@ -280,3 +280,12 @@ def test_every_column_of_panels_has_an_axis_with_numbers(count: int) -> None:
     assert {axes.get_subplotspec().colspan.start for axes in lowest} == set(range(min(3, count)))
     assert [axes for axes in panels if axes.get_xlabel() == "h"] == lowest
     assert all(axes.xaxis.get_tick_params()["labelbottom"] for axes in lowest)
+
+
+def test_names_are_checked_and_may_be_one_text() -> None:
+    model = hsdsl.loads(DECAY)
+    found = stability_map(model, "h=1e-3:1e-2:2,rate=10:40:2", methods="euler, rk4", schemes="located", with_rho=False)
+    assert [panel.tool.label for panel in found.panels] == ["located euler", "located rk4"]
+    for words in ({"methods": "rk5"}, {"schemes": ["locate"]}, {"against": "scypi"}):
+        with pytest.raises(UsageError, match="there is no"):
+            stability_map(model, "h,rate", **words)

@@ -12,10 +12,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from hsdsl.chart.peers import PEERS
 from hsdsl.chart.result import Tool
 from hsdsl.chart.stability.axes import SIZES, Axis, read_axes
 from hsdsl.chart.stability.cells import STUCK, WORDS, Bench, Cell
@@ -24,7 +25,9 @@ from hsdsl.errors import UsageError
 from hsdsl.integrators import METHODS
 from hsdsl.limits import cores
 from hsdsl.model import Model
+from hsdsl.names import did_you_mean
 from hsdsl.processes import Lost, in_processes
+from hsdsl.simulate import SCHEMES
 
 __all__ = ["WORDS", "Axis", "Cell", "Panel", "StabilityMap", "stability_map"]
 Progress = Callable[[int, int], None]
@@ -57,9 +60,9 @@ def stability_map(
     model: Model,
     map: str = PLANE,
     *,
-    schemes: Sequence[str] = (),
-    methods: Sequence[str] = (),
-    against: Sequence[str] = (),
+    schemes: str | Sequence[str] = (),
+    methods: str | Sequence[str] = (),
+    against: str | Sequence[str] = (),
     parameters: Mapping[str, Any] | None = None,
     initial: Mapping[str, Any] | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -74,11 +77,11 @@ def stability_map(
     ----------
     map : str
         Two axes as ``"h=1e-4:1e-1:20,relaxation"``, see :func:`hsdsl.chart.stability.axes.read_axes`.
-    schemes, methods : sequence of str
+    schemes, methods : str or sequence of str
         Ours, a panel for each pair; left out, ``relaxed`` on maps of relaxation, the file's scheme on others, and rk4
         on maps of h, auto on others.
-    against : sequence of str
-        Names of :data:`hsdsl.chart.PEERS`; they take no step.
+    against : str or sequence of str
+        Names, with commas between them in one text, of :data:`hsdsl.chart.PEERS`; they take no step.
     parameters, initial, settings : mapping, optional
         Overrides of every run.
     with_rho : bool
@@ -96,6 +99,8 @@ def stability_map(
     until = float(model.pipeline.prepare(base).settings.until)
     x, y = read_axes(model, map, until, base)
     _check_free(base, (x, y))
+    schemes, against = _named(schemes, SCHEMES, "--scheme"), _named(against, PEERS, "--against")
+    methods = _named(methods, ("auto", *METHODS), "--method")
     tools = _tools(model, schemes, methods, against, {x.kind, y.kind})
     _check_ends(model, base, (x, y))
     bench = Bench(model, with_rho)
@@ -135,6 +140,15 @@ def _check_ends(model: Model, base: Mapping[str, Any], axes: Sequence[Axis]) -> 
         if axis.kind in ("parameter", "initial"):
             for value in (axis.values[0], axis.values[-1]):
                 model.pipeline.prepare(axis.onto(base, value))
+
+
+def _named(names: str | Sequence[str], known: Collection[str], option: str) -> list[str]:
+    """Names that are given alone, or in a text with commas between them."""
+    found = [name.strip() for name in names.split(",") if name.strip()] if isinstance(names, str) else list(names)
+    for name in found:
+        if name not in known:
+            raise UsageError(f"{option}: there is no '{name}'", did_you_mean(name, known))
+    return found
 
 
 def _tools(
