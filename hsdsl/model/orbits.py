@@ -257,15 +257,21 @@ class Orbits:
         def passage(point: Array, phase: float, at: float) -> tuple[Return, float | None, float]:
             nonlocal lasted
             parameters = self._parameters | {parameter: at}
-            found = self.section(parameters).follow(point, phase, 1.5 * lasted, parameter, longer=1)
+            try:
+                found = self.section(parameters).follow(point, phase, 1.5 * lasted, parameter, longer=1)
+            except UsageError as error:  # beyond the bounds of the file
+                raise NoReturn(str(error)) from None
             if not found.time > SHRUNK * first.period:
                 raise NoReturn(SHORTER)
             lasted = found.time if lasted / LONGER < found.time < lasted * LONGER else lasted
             if multiple is None:
                 return found, None, 0.0
-            step = 1e-6 * abs(high - low)
-            around = [multiple * (self.forcing(parameters | {parameter: at + way}) or 0.0) for way in (-step, 0, step)]
-            return found, around[1], (around[2] - around[0]) / (2 * step)
+            step = 1e-6 * abs(high - low)  # within the range, which may end at a bound of the file
+            ends = max(at - step, min(at, low, high)), min(at + step, max(at, low, high))
+            before, here, behind = (
+                multiple * (self.forcing(parameters | {parameter: each}) or 0.0) for each in (ends[0], at, ends[1])
+            )
+            return found, here, (behind - before) / (ends[1] - ends[0])
 
         try:
             follower = Follower(passage, first.closed, value, (low, high))
@@ -291,6 +297,8 @@ class Orbits:
         low, high = (float(values.number(value, f"the range of {parameter}")) for value in (start, end))
         if not low != high:
             raise UsageError(f"expected a range of {parameter}, got {low:g} to {high:g}")
+        for end in (low, high):
+            with_parameters(values, {parameter: end})  # within the bounds of the file
         own = float(values.parameters[known.index(parameter)])
         return low, high, own if min(low, high) <= own <= max(low, high) else low
 

@@ -143,6 +143,18 @@ class Follower:
         ahead[self.kept] += length * here.tangent * self.scale[self.kept]
         return self.solution(ahead, here.tangent)
 
+    def reach(self, here: Solution, value: float) -> float:
+        """The length of a step along the tangent to where the parameter has a value."""
+        rate = float(here.tangent[-1] * self.scale[-1])
+        return (value - float(here.unknowns[-1])) / rate if rate else np.inf
+
+    def at(self, here: Solution, length: float, value: float) -> Solution:
+        """The solution where the parameter has a value, a step further."""
+        ahead, along = here.unknowns.copy(), np.zeros(len(self.kept))
+        ahead[self.kept] += length * here.tangent * self.scale[self.kept]
+        ahead[-1], along[-1] = value, np.sign(here.tangent[-1])
+        return self.solution(ahead, along)
+
     def comes_back(self, first: Solution, here: Solution, ahead: Solution) -> bool:
         """Whether a step passes the first solution, whose phase is known up to periods: a branch may be a circle."""
         missing, step = ((each.unknowns - here.unknowns) / self.scale for each in (first, ahead))
@@ -189,30 +201,33 @@ def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcatio
     first = here = previous = follower.first(way)
     points, found, length = [follower.point(here)], list[Bifurcation](), FIRST
     while len(points) < MOST_POINTS:
+        end = high if here.tangent[-1] > 0 else low
+        reach = follower.reach(here, end)
         try:
-            ahead = follower.step(here, length)
+            ahead = follower.step(here, length) if length < reach else None
+            last = ahead is None or not low <= ahead.unknowns[-1] <= high
+            ahead = follower.at(here, reach, end) if ahead is None or last else ahead
             same = sequence(ahead) == sequence(here)
         except NoReturn as problem:
-            ahead, same, why = None, False, str(problem)
+            ahead, same, last, why = None, False, False, str(problem)
         else:
             why = "the orbit makes other transitions from there on"
         if ahead is None or not same or _turns(here, ahead):
-            length /= 2
+            length = min(length, reach) / 2
             if length >= LEAST:
                 continue
             if ahead is None or not same:
                 found.append(replace(_grazing(previous, here), after=len(points) - 1))
                 return points, found, why
         assert ahead is not None
-        passed = _between(follower, here, ahead, length)
+        passed = _between(follower, here, ahead, min(length, reach))
         if len(passed) > 1 and length > LEAST:  # each has a step of its own, so the orbits on both its sides are known
-            length /= 2
+            length = min(length, reach) / 2
             continue
         found += [replace(each, after=len(points) - 1) for each in passed]
         previous, here, length = here, ahead, min(LARGEST, 1.3 * length)
         points.append(follower.point(here))
-        if not low <= points[-1].parameter <= high:
-            points[-1] = _at_the_end(follower, points[-2], points[-1], min(max(points[-1].parameter, low), high))
+        if last:
             return points, [b for b in found if low <= b.parameter <= high], "the parameter is at the end of its range"
         if follower.comes_back(first, previous, here):
             points[-1] = points[0]
@@ -294,16 +309,3 @@ def _rates(here: Solution) -> list[float]:
     run = RecordedRun(found.setting.augmented, found.execution)
     made = run.transitions[: len(sequence(here))]
     return [float(place.rate(k)) for place, k in map(run.before, made)]
-
-
-def _at_the_end(follower: Follower, before: Point, last: Point, value: float) -> Point:
-    """The last point, brought back to the end of the parameter's range along the chord."""
-    share = (value - before.parameter) / (last.parameter - before.parameter)
-    start = np.concatenate([before.state + share * (last.state - before.state), [0.0, value]])
-    start[-2] = before.phase + share * (last.phase - before.phase)
-    along = np.zeros(len(follower.kept))
-    along[-1] = 1.0
-    try:
-        return follower.point(follower.solution(start, along))
-    except NoReturn:
-        return replace(last, parameter=value)

@@ -129,6 +129,17 @@ def test_bad_ranges(text: str, sentence: str, tmp_path: Path, capsys: pytest.Cap
     assert sentence in capsys.readouterr().err
 
 
+def test_a_range_that_ends_at_a_bound_of_the_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "model.yaml"
+    model.write_text(OSCILLATOR.format(F=0.6, W=0.8).replace("c: 0.8", "c: {value: 0.8, min: 0.7, max: 0.83}"))
+    words = ["orbit", str(model), "--section", "impact", "--continue"]
+    assert obey([*words, "c=0.83:0.7"]) == 0
+    text = capsys.readouterr().out
+    assert all(f"to c = {end}: the parameter is at the end of its range" in text for end in (0.7, 0.83))
+    assert obey([*words, "c=0.75:0.9"]) == 2
+    assert capsys.readouterr().err.startswith("hsdsl: parameter c = 0.9 is beyond its maximum 0.83\n")
+
+
 def test_bad_call() -> None:
     with pytest.raises(UsageError, match="no transition"):
         hsdsl.loads(OSCILLATOR.format(F=0.6, W=0.8)).continuation("hit", "F", 0, 1)
