@@ -115,5 +115,5 @@ def test_a_state_may_appear_as_late_as_others_may_change(command, model):
 
 
 def test_the_axes_of_a_map_have_units():
-    axes = read_axes(hsdsl.loads(APPEARS), "h,k", 1.9)
+    axes = read_axes(hsdsl.loads(APPEARS), "h,k", 1.9, {})
     assert [axis.label for axis in axes] == ["h [s]", "k [m]"]
