@@ -21,6 +21,7 @@ from hsdsl.parts import Part
 from hsdsl.sparsity import Elimination, Variation, elimination, variation
 
 LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
+CURVED = re.compile(r"\w\(|/")
 JUMPS = re.compile(r"\b(?:sign|floor|atan2|select)\(")
 STEEP = ("sqrt", "asin", "acos", "acosh")
 WHOLE = re.compile(r"q_m?\d+_1|\d+")
@@ -261,9 +262,17 @@ class ModeProgram:
         """Whether the flow has functions of time or states whose slope has no bound, as roots have at zero."""
         return any(_steep(call) for call in ast.walk(ast.parse(f"def flow({self._flow_source}")))
 
+    @cached_property
+    def curved(self) -> tuple[bool, ...]:
+        """Whether the reset of each edge has a function or a quotient, also by names of `let`: no polynomial does."""
+        return tuple(CURVED.search(self._source(f"reset_{k}")) is not None for k in range(len(self.edges)))
+
     @property
     def _flow_source(self) -> str:
-        return self.routines.source.partition("def flow(")[2].partition("    def ")[0]
+        return self._source("flow")
+
+    def _source(self, name: str) -> str:
+        return self.routines.source.partition(f"def {name}(")[2].partition("    def ")[0]
 
 
 def _steep(call: ast.AST) -> bool:

@@ -121,6 +121,11 @@ NOT_TO_RELY_ON = {
         "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 1, to: n, reset: {y: floor(y)}}]}, n: {flow: {x: 1, y: 1}}",
         "x: 0, y: 1", 2, "the reset of m->n at t = 1 jumps",
     ),
+    "a reset that jumps in a let": (
+        "m: {let: {level: floor(3*y)/2}, flow: {x: 1, y: 1}, transitions: [{when: x >= 1, to: n, reset: {y: level}}]}, "
+        "n: {flow: {x: 1, y: 1}}",
+        "x: 0, y: 1", 2, "the reset of m->n at t = 1 jumps",
+    ),
     "a reset on the cut of atan2": (
         "m: {flow: {x: 1, y: 1}, transitions: [{when: x >= 1, to: n, reset: {y: 'atan2(y, -1)'}}]}, "
         "n: {flow: {x: 1, y: 1}}",

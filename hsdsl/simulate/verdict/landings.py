@@ -6,7 +6,6 @@ moved by the error along the guard land on it too. Where they do not, an error d
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from math import isfinite
 
@@ -23,7 +22,6 @@ from hsdsl.simulate.verdict.screen import RESET_UNDECIDED
 from hsdsl.simulate.verdict.tangent import leaves_along
 
 UNITS = 64  # of round-off, and less, are no jump
-CURVED = re.compile(r"\w\(|/|\*\*")  # all resets that are no polynomials have one of these
 WIDER = 8  # boxes so many times as wide: what jumps is no wider over them
 
 
@@ -127,8 +125,7 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
     late = SAFE * run.errors.time_error_at(made.time)
     if any(jump and abs(time - float(made.time)) <= late for time, jump in _samples_near(run, made.time)):
         yield Finding("input", "unknown", f"an input or function of time jumps within the error of the time of {where}")
-    edge = place.mode.edges[k]
-    if made.after is None or not any(map(CURVED.search, edge.reset_texts)):
+    if made.after is None or not place.mode.curved[k]:
         return
     error = run.safe_error(place, run.row_before(made))
     narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))
