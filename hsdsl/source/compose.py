@@ -16,9 +16,7 @@ from hsdsl.names import INVISIBLE, normalised, shown
 from hsdsl.source.nodes import Key, Mapping, Node, Scalar, Sequence, SourceRange, absent
 from hsdsl.source.split_expressions import rejoined_entries, rejoined_items, spaced_entries
 from hsdsl.source.text import Text
-from hsdsl.source.yaml_errors import colon_missing, explain, quote, strange_blank
-
-DEEPEST = 64
+from hsdsl.source.yaml_errors import DEEPEST, TOO_DEEP, colon_missing, explain, quote, strange_blank
 
 _Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -179,8 +177,7 @@ class _Composer:
             hint = f"keep data in CSV files, or allow more with --limit values={self.limits.values * 10}"
             self._stop(self._place(event).diagnostic("HS015", message, hint))
         if self.depth + height > DEEPEST:
-            message = f"mappings and lists are nested more than {DEEPEST} deep here"
-            self._stop(self._place(event).diagnostic("HS014", message))
+            self._stop(self._place(event).diagnostic("HS014", TOO_DEEP))
 
     def _place(self, event: Any, last: Any = None) -> SourceRange:
         start, end = event.start_mark, (last or event).end_mark

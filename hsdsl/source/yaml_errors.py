@@ -45,6 +45,8 @@ _OF_YAML = ":{}[],#-\"' "  # signs and blanks that give a file its shape
 _UNCOLONED = re.compile(r"\s*(?:- +)?([^\W\d]\w*)(?: +(?=\[)| *(?={))(.*)")
 _KEY_BEFORE = re.compile(r"[{,]\s*([^\W\d]\w*) *$")
 _TEXTS = ("title", "source", "about")
+DEEPEST = 64
+TOO_DEEP = f"mappings and lists are nested more than {DEEPEST} deep here"
 _COLON = "a key is followed by a colon and a space"
 
 
@@ -53,6 +55,8 @@ def explain(text: Text, error: yaml.MarkedYAMLError) -> Diagnostic:
     problem = error.problem or ""
     line, column = _mark(error.problem_mark or error.context_mark)
     opened = _mark(error.context_mark) if error.context_mark else (line, column)
+    if "nesting depth" in problem:  # of libyaml, which reads ahead
+        return text.fault("HS014", TOO_DEEP, line, column)
     for suspect in dict.fromkeys((line, opened[0], _above(text, line))):
         if wrong := strange_blank(text, suspect) or _lookalike(text, suspect):
             return wrong
