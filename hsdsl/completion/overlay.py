@@ -103,9 +103,8 @@ def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp
 
 def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
     """The push on a guard along the flow that the others leave, and the size of its terms."""
-    places = dict(zip(found.near.states, flow, strict=True))
-
-    rates = {x: places.get(x, rate) for x, rate in found.near.rates(found.last).items() if x != TIME}
+    places: dict[sp.Symbol, sp.Expr] = dict(zip(found.near.states, flow, strict=True))
+    rates = {x: places.get(x, f) for x, f in found.near.rates(found.last).items() if x != TIME}
     left = {x: rate.xreplace({flag: sp.S.Zero}) for x, rate in rates.items()}
     return lie_derivative(found.last, left), _size(found, left)
 
