@@ -103,9 +103,9 @@ def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp
 
 def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
     """The push on a guard along the flow that the others leave, and the size of its terms."""
-    places: dict[sp.Symbol, sp.Expr] = dict(zip(found.near.states, flow, strict=True))
-    rates = {x: places.get(x, f) for x, f in found.near.rates(found.last).items() if x != TIME}
-    left = {x: rate.xreplace({flag: sp.S.Zero}) for x, rate in rates.items()}
+    places = dict(zip(found.near.states, flow, strict=True))
+    left = {x: rate for x, rate in found.near.rates(found.last).items() if x != TIME}
+    left |= {x: places[x].xreplace({flag: sp.S.Zero}) for x in left if x in places}
     return lie_derivative(found.last, left), _size(found, left)
 
 
