@@ -17,8 +17,10 @@ from sympy.core.relational import Relational
 from hsdsl.completion.branches import branched
 from hsdsl.completion.counts import counts_of
 from hsdsl.completion.nearby import (
+    NO_SLOPES,
     Nearby,
     Point,
+    Slopes,
     cancelled,
     fixed_point,
     is_zero,
@@ -83,15 +85,15 @@ class Contact:
         return replace(self.base, flow=tuple(flow), flow_texts=tuple(texts), edges=(*edges, *self.further))
 
 
-def contact(mode: Mode, k: int, numbers: Sequence[str] = ()) -> Contact | None:
+def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES) -> Contact | None:
     """The motion along the guard of edge k of a mode; None where there is none, or where it is not unique.
 
-    ``numbers`` are states that are modes of parts.
+    ``numbers`` are states that are modes of parts, ``moving`` has the slopes of inputs.
     """
     edge = mode.edges[k]
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived or edge.of_event:
         return None
-    near = Nearby(mode, edge, mode_of_part(edge, numbers))
+    near = Nearby(mode, edge, mode_of_part(edge, numbers), moving=moving)
     if any(mode.states[i] in numbers for i in near.changed):
         return None
     near = branched(near) if near.changed and near.is_small() else near

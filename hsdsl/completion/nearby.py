@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, reduce
 from operator import mul, sub
@@ -14,9 +14,9 @@ import sympy as sp
 
 from hsdsl.arithmetic import Number, multiprecision
 from hsdsl.expression.derivatives import derivative, lie_derivative
-from hsdsl.expression.scope import symbol
+from hsdsl.expression.scope import slope_symbol, symbol
 from hsdsl.functions import below
-from hsdsl.system import TIME, Edge, Mode
+from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
 NUMBERS = multiprecision(60)  # of random points: units of states, guards and time may be far apart
 NAN = NUMBERS.functions["nan"]
@@ -26,6 +26,8 @@ MOST_ROUNDS = 200  # of Newton's method: where units are far apart it halves the
 MOST_NODES = 2_000  # of what a guard, its reset and their flows are written with: beyond, no motion is derived
 LONG = 400  # nodes, from which on a term is not simplified
 Point = dict[sp.Symbol, Number]
+Slopes = Mapping[sp.Symbol, sp.Symbol]
+NO_SLOPES: Slopes = {}
 Sized = tuple[Number, Number]  # a number, and the size of the terms that it is computed from
 Row = Sequence[Sized]
 
@@ -34,6 +36,11 @@ Row = Sequence[Sized]
 def symbols(states: tuple[str, ...]) -> tuple[sp.Symbol, ...]:
     """The symbols of states."""
     return tuple(map(symbol, states))
+
+
+def slopes_of_inputs(system: HybridSystem) -> Slopes:
+    """The slopes of the sampled inputs that move between their samples."""
+    return {symbol(given.name): slope_symbol(given.name) for given in system.inputs if given.hold == "linear"}
 
 
 class Nearby:
@@ -51,11 +58,12 @@ class Nearby:
         here: dict[sp.Symbol, sp.Integer],
         counts: Sequence[int] = (),
         impact: Point | None = None,
+        moving: Slopes = NO_SLOPES,
     ) -> None:
-        self._here, self.mode, self.impact = here, mode, impact
+        self._here, self.mode, self.impact, self._moving = here, mode, impact, moving
         self.states, self.edge = symbols(mode.states), edge
         self.guard = edge.surface.residual.xreplace(here)
-        self._flow = mode.vector_field
+        self._flow = {**mode.vector_field, **moving}
         pairs = zip(self.states, edge.reset, strict=True)
         self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x and i not in counts]
         self.own = tuple(self.states[i] for i in self.changed)
@@ -63,18 +71,18 @@ class Nearby:
 
     def without(self, counts: Sequence[int]) -> Nearby:
         """The same with a reset that leaves some states as they are."""
-        return Nearby(self.mode, self.edge, self._here, counts, self.impact)
+        return Nearby(self.mode, self.edge, self._here, counts, self.impact, self._moving)
 
     def by(self, edge: Edge, impact: Point) -> Nearby:
         """The same of an edge with another reset, which is that of impacts as at a point."""
-        return Nearby(self.mode, edge, self._here, (), impact)
+        return Nearby(self.mode, edge, self._here, (), impact, self._moving)
 
     def flow(self, x: sp.Symbol) -> Any:
-        """The rate of time or of a state."""
+        """The rate of time, of a state or of an input."""
         return sp.S.One if x == TIME else self._flow[x].xreplace(self._here)
 
     def among(self, value: sp.Basic) -> list[Any]:
-        """The time, and the states in the order of their names, that a value depends on."""
+        """The time, states and inputs that move, in the order of their names, that a value depends on."""
         return sorted((x for x in value.free_symbols if x == TIME or x in self._flow), key=lambda x: x.name)
 
     def rates(self, value: sp.Expr) -> dict[Any, Any]:

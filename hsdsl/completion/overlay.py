@@ -14,6 +14,7 @@ import sympy as sp
 
 from hsdsl.completion.contact import Contact, contact
 from hsdsl.completion.coupled_contacts import Pairs, connected_sets, coupled_flow, neighbours
+from hsdsl.completion.nearby import NO_SLOPES, Slopes, slopes_of_inputs
 from hsdsl.expression.derivatives import lie_derivative
 from hsdsl.expression.scope import symbol
 from hsdsl.functions import absolute, below
@@ -43,13 +44,13 @@ class Overlay:
 
 def overlays(system: HybridSystem) -> list[Overlay | None]:
     """The motions along guards of each mode of a system."""
-    numbers = numbered(system.parts)
-    return [overlay(mode, numbers) for mode in system.modes]
+    numbers, moving = numbered(system.parts), slopes_of_inputs(system)
+    return [overlay(mode, numbers, moving) for mode in system.modes]
 
 
-def overlay(mode: Mode, numbers: Sequence[str] = ()) -> Overlay | None:
-    """The motions along guards of a mode, None without any; ``numbers`` are states that are modes of parts."""
-    contacts = [found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers))]
+def overlay(mode: Mode, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES) -> Overlay | None:
+    """The motions along guards of a mode, None without any; for ``numbers`` and ``moving`` see `contact`."""
+    contacts = [found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers, moving))]
     if not contacts:
         return None
     flags = tuple(symbol(f"contact {i}") for i in range(len(contacts)))
@@ -103,8 +104,8 @@ def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp
 def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
     """The push on a guard along the flow that the others leave, and the size of its terms."""
     places = dict(zip(found.near.states, flow, strict=True))
-
-    left = {x: places[x].xreplace({flag: sp.S.Zero}) for x in found.near.among(found.last) if x != TIME}
+    left = {x: rate for x, rate in found.near.rates(found.last).items() if x != TIME}
+    left |= {x: places[x].xreplace({flag: sp.S.Zero}) for x in left if x in places}
     return lie_derivative(found.last, left), _size(found, left)
 
 

@@ -16,10 +16,10 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from hsdsl.completion.contact import zero_surface
-from hsdsl.completion.nearby import cancelled
+from hsdsl.completion.nearby import cancelled, slopes_of_inputs
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.derivatives import lie_derivative
-from hsdsl.expression.scope import slope_symbol, symbol
+from hsdsl.expression.scope import symbol
 from hsdsl.functions import atan2, below, floor, sign
 from hsdsl.system import TIME, Edge, HybridSystem, Mode, Surface
 
@@ -104,7 +104,7 @@ def _sliding(system: HybridSystem, name: str, a: Mode, out: Edge, b: Mode, back:
     states = [symbol(state) for state in a.states]
     flows = a.flow, tuple(b.vector_field[x] for x in states)
     r, until = out.surface.residual, system.experiment.until
-    moving = {symbol(given.name): slope_symbol(given.name) for given in system.inputs if given.hold == "linear"}
+    moving = slopes_of_inputs(system)
     outwards, inwards = (cancelled(lie_derivative(r, {**mode.vector_field, **moving})) for mode in (a, b))
     slopes = [sp.diff(r, x) for x in states]
     curved = any(slope.free_symbols & {TIME, *states, *moving} for slope in (*slopes, sp.diff(r, TIME)))

@@ -11,12 +11,12 @@ import sympy as sp
 
 from hsdsl.completion.contact import Contact, contact
 from hsdsl.completion.insertions import Insertions, flow_style
-from hsdsl.completion.nearby import LONG, cancelled
+from hsdsl.completion.nearby import LONG, cancelled, slopes_of_inputs
 from hsdsl.completion.printer import inequality, text_of, wall
 from hsdsl.completion.sliding import Sliding, slidings, with_entries
 from hsdsl.defaults import DEFAULTS, least_relaxation
 from hsdsl.errors import UsageError
-from hsdsl.expression.scope import slope_symbol, symbol
+from hsdsl.expression.scope import symbol
 from hsdsl.source import Mapping, Node, Text, child
 from hsdsl.system import TIME, Edge, HybridSystem, Mode
 
@@ -29,18 +29,12 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     A transition to the same mode enters the motion along its guard where the flight that follows it would last less
     than the parameter ``contact_time``, at first the default relaxation. None where nothing can be completed.
     """
-    surfaces = slidings(system)
-    for sliding in surfaces:
-        for given in system.inputs:
-            if any(slope_symbol(given.name) in f.free_symbols for f in (*sliding.mode.flow, *_residuals(sliding.mode))):
-                raise UsageError(
-                    f"the surface between {' and '.join(sliding.mode.slides or ())} moves with the sampled input "
-                    f"{given.name}, whose slope no expression has",
-                    "write the input as an expression of time, or run the model with --completion auto",
-                )
+    surfaces, moving = slidings(system), slopes_of_inputs(system)
     further = [_leaving_on_surface(sliding) for sliding in surfaces]
     modes = {mode.name: mode for mode in (*with_entries(system, surfaces), *further)}
-    contacts = [found for mode in modes.values() for k in range(len(mode.edges)) if (found := contact(mode, k))]
+    contacts = [
+        found for mode in modes.values() for k in range(len(mode.edges)) if (found := contact(mode, k, moving=moving))
+    ]
     if not contacts and not surfaces:
         return None
     writer = _Writer(text, root, system, modes.values())
@@ -49,6 +43,12 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
         entry, mode = writer.contact(found)
         entries.append(entry)
         further.append(mode)
+    for given, slope in moving.items():
+        if any(slope in e.free_symbols for mode in further for e in (*mode.flow, *(s.residual for s in mode.surfaces))):
+            raise UsageError(
+                f"motion on a guard moves with the sampled input {given}, whose slope no expression has",
+                "write the input as an expression of time, or run the model itself with --completion auto",
+            )
     written = {mode.name for mode in system.modes}
     for entry in entries:
         if entry.source in written:
@@ -57,10 +57,6 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
         own = tuple(entry for entry in entries if entry.source == mode.name)
         writer.add_mode(_without_constant_guards(replace(mode, edges=(*mode.edges, *own)), system))
     return writer.insertions.result()
-
-
-def _residuals(mode: Mode) -> list[sp.Expr]:
-    return [edge.surface.residual for edge in mode.edges]
 
 
 def _leaving_on_surface(found: Sliding) -> Mode:

@@ -12,7 +12,7 @@ for Taylor coefficients.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Protocol, TypeVar
 
@@ -21,6 +21,7 @@ import sympy as sp
 from hsdsl import limits
 from hsdsl import program as lowered
 from hsdsl.completion import Overlay, overlays
+from hsdsl.completion.nearby import slopes_of_inputs
 from hsdsl.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.expression.scope import slope_symbol
 from hsdsl.expression.stack import deep_stack
@@ -68,11 +69,11 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
     names = number(system, switches.symbols)
     experiment = system.experiment
     indices = {mode.name: i for i, mode in enumerate(system.modes)}
-    modes, contacts = _modes(system, names, indices, both)
-    slidings = [mode for mode in system.modes if mode.slides]
-    sloped = {
-        x for mode in slidings for e in (*mode.flow, *(s.residual for s in mode.surfaces)) for x in e.free_symbols
-    }
+    found = overlays(system)
+    modes, contacts = _modes(system, found, names, indices, both)
+    completed = [mode for mode in system.modes if mode.slides] + [each.mode for each in found if each]
+    followed = [e for mode in completed for e in (*mode.flow, *(s.residual for s in mode.surfaces))]
+    sloped = set[sp.Basic]().union(*(e.free_symbols for e in followed)) if slopes_of_inputs(system) else set[sp.Basic]()
     return lowered.Program(
         path=system.path,
         digest=system.digest,
@@ -98,10 +99,9 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
     )
 
 
-def _modes(system: HybridSystem, names: Names, indices: dict[str, int], both: Both):
+def _modes(system: HybridSystem, found: Sequence[Overlay | None], names: Names, indices: dict[str, int], both: Both):
     """The modes, and those with motion along their guards."""
     modes = [LoweredMode(mode, names) for mode in system.modes]
-    found = overlays(system)
     every = [*modes, *(lowered_overlay(each, names) for each in found if each)]
     routines, others = both(lambda: [each.routines() for each in every], lambda: [each.others() for each in every])
     programs = [each.program(indices, *pair) for each, *pair in zip(every, routines, others, strict=True)]

@@ -635,3 +635,28 @@ experiment: {{until: 5}}
     assert min(run.values[:, run.states.index("y")]) > -1e-9
     before_rest = speed < 3
     assert (run.stop.time < 0.59) == before_rest and (before_rest or run.stop.time == pytest.approx(3 / 4, abs=1e-3))
+
+
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "radau"])
+def test_motion_along_guards_follows_the_slopes_of_sampled_inputs(method: str) -> None:
+    """A floor has the sampled speed f: what rests on it has f at all times, not only at samples."""
+    text = """
+hsdsl: 1
+inputs: {f: {times: [0, 1, 2, 3], values: [0, 0.6, -0.4, 0.4], hold: linear}}
+modes:
+  a:
+    flow: {q: f, h: v, v: -9, k: w, w: -9, s: 3}
+    transitions:
+      - {name: floor, when: h <= q, to: a, reset: {v: f - 0.4*(v - f)}}
+      - {name: bodies, when: k <= h, to: a, reset: {v: (v + w)/2, w: (v + w)/2}}
+      - {name: stop, when: s >= f + 1, to: a, reset: {s: f + 1}}
+initial: {mode: a, q: 0, h: 0, v: 0, k: 0, w: 0, s: 1}
+experiment: {until: 2.5}
+"""
+    run = assert_engines_agree(hsdsl.loads(text), method=method)
+    assert run.stop.reason == "until" and run.verdict.theorem == "left"
+    height = 0.3 + 0.1 + (-0.4 + 0) / 2 / 2
+    right = {"q": height, "h": height, "v": 0, "k": height, "w": 0, "s": 1}
+    assert run.final.state == pytest.approx(right, abs=1e-9)
+    with pytest.raises(hsdsl.UsageError, match="the sampled input f, whose slope"):
+        hsdsl.loads(text).completed()
