@@ -30,14 +30,14 @@ def neighbours(contacts: Sequence[Contact]) -> list[set[int]]:
             by_state.setdefault(x, []).append(i)
     near: list[set[int]] = [set() for _ in contacts]
     for k, found in enumerate(contacts):
-        for j in {i for x in _seen(found) for i in by_state.get(x, ()) if i != k}:
+        for j in {i for x in depends_on(found) for i in by_state.get(x, ()) if i != k}:
             if contacts[j].projection != found.projection:  # both stops of one mass: together as each of them
                 near[k].add(j)
                 near[j].add(k)
     return near
 
 
-def _seen(found: Contact) -> set[sp.Symbol]:
+def depends_on(found: Contact) -> set[sp.Symbol]:
     """What a motion along a guard depends on."""
     shares = set[sp.Symbol]().union(*found.projection.values())
     rate = found.rate.free_symbols if found.order == 2 else set()

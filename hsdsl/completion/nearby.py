@@ -167,7 +167,7 @@ def solved(equations: Sequence[sp.Expr], free: Sequence[Any], start: Point) -> P
         for name, change in zip(free, step, strict=True):
             at[name] -= change
         if all(abs(change) <= ROUNDED * abs(start[name]) for name, change in zip(free, step, strict=True)):
-            return at
+            return at if all(is_zero(e, at) for e in equations) else None  # else they contradict each other
     return None
 
 

@@ -1,17 +1,18 @@
-# pyright: basic
+# pyright: basic, reportOperatorIssue=false
 """The text of a model with the modes of its completions: the file as it is, with further modes and transitions."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import sympy as sp
 
 from hsdsl.completion.contact import Contact, contact
+from hsdsl.completion.coupled_contacts import MOST_SETS, depends_on, neighbours
 from hsdsl.completion.insertions import Insertions, flow_style
-from hsdsl.completion.nearby import LONG, cancelled, slopes_of_inputs
+from hsdsl.completion.nearby import LONG, Slopes, cancelled, slopes_of_inputs
 from hsdsl.completion.printer import inequality, text_of, wall
 from hsdsl.completion.sliding import Sliding, slidings, with_entries
 from hsdsl.defaults import DEFAULTS, least_relaxation
@@ -32,17 +33,14 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     surfaces, moving = slidings(system), slopes_of_inputs(system)
     further = [_leaving_on_surface(sliding) for sliding in surfaces]
     modes = {mode.name: mode for mode in (*with_entries(system, surfaces), *further)}
-    contacts = [
-        found for mode in modes.values() for k in range(len(mode.edges)) if (found := contact(mode, k, moving=moving))
-    ]
-    if not contacts and not surfaces:
-        return None
     writer = _Writer(text, root, system, modes.values())
     entries = [entry for sliding in surfaces for entry in sliding.entries]
-    for found in contacts:
-        entry, mode = writer.contact(found)
-        entries.append(entry)
-        further.append(mode)
+    for mode in modes.values():
+        into, motions = writer.motions(mode, moving)
+        entries += into
+        further += motions
+    if not further:
+        return None
     for given, slope in moving.items():
         if any(slope in e.free_symbols for mode in further for e in (*mode.flow, *(s.residual for s in mode.surfaces))):
             raise UsageError(
@@ -57,6 +55,36 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
         own = tuple(entry for entry in entries if entry.source == mode.name)
         writer.add_mode(_without_constant_guards(replace(mode, edges=(*mode.edges, *own)), system))
     return writer.insertions.result()
+
+
+def _held_together(mode: Mode, contacts: Sequence[Contact]) -> list[frozenset[int]]:
+    """The sets of guards of a mode that may hold together, by their edges; the empty one is the first.
+
+    Raises UsageError: guards that hold together press on each other, or they are too many.
+    """
+    near, found = neighbours(contacts), [frozenset[int]()]
+    for k, one in enumerate(contacts):
+        apart = {other.edge for other in contacts[:k] if {*one.near.own} & {*other.near.own}}
+        for j in (j for j in near[k] if j < k and not _exclusive(one, contacts[j])):
+            names = " and ".join(mode.edges[each.edge].name for each in (contacts[j], one))
+            raise UsageError(
+                f"mode {mode.name}: the guards of {names} may hold together and press on each other, and a text has "
+                "no rule for that",
+                "run the model itself, or export it: both follow such motion",
+            )
+        apart |= {contacts[j].edge for j in near[k]}
+        found += [few | {one.edge} for few in found if not few & apart]
+        if len(found) > MOST_SETS:
+            message = f"mode {mode.name}: more than {MOST_SETS} sets of guards may hold together, each a mode of a text"
+            raise UsageError(message, "run the model itself, or export it: both follow such motion")
+    return found
+
+
+def _exclusive(one: Contact, other: Contact) -> bool:
+    """Whether two guards are nowhere zero together: their functions add up to, or differ by, what no state moves."""
+    free = {TIME, *map(symbol, one.base.states)}
+    ends = (sp.expand(one.near.guard + way * other.near.guard) for way in (1, -1))
+    return any(end != 0 and not end.free_symbols & free for end in ends)
 
 
 def _leaving_on_surface(found: Sliding) -> Mode:
@@ -87,12 +115,31 @@ class _Writer:
         self._names = {mode.name for mode in modes} | {p.name for p in system.parameters}
         self._time: str | None = None
 
-    def contact(self, found: Contact) -> tuple[Edge, Mode]:
-        """The transition into a motion along a guard, and its mode."""
-        mode, k = found.base, found.edge
-        edge = mode.edges[k]
-        label = f"contact_{mode.name}" + ("" if "->" in edge.name else f"_{edge.name}")
-        name = self._free(re.sub(r"\W", "_", label))
+    def motions(self, base: Mode, moving: Slopes) -> tuple[list[Edge], list[Mode]]:
+        """The modes of motions along guards of a mode, one for each set that may hold together, and what leads there.
+
+        Raises UsageError: guards that hold together press on each other, or they are too many.
+        """
+        contacts = [found for k in range(len(base.edges)) if (found := contact(base, k, moving=moving))]
+        names = {few: self._name(base, few) for few in _held_together(base, contacts)}
+        entries = [
+            self._entry(found, name, names[few | {found.edge}])
+            for few, name in names.items()
+            for found in contacts
+            if found.edge not in few and few | {found.edge} in names
+        ]
+        return entries, [self._motion(base, contacts, few, names) for few in names if few]
+
+    def _name(self, base: Mode, few: frozenset[int]) -> str:
+        """The name of the mode of a set of guards."""
+        if not few:
+            return base.name
+        label = "_".join([base.name, *(base.edges[k].name for k in sorted(few) if "->" not in base.edges[k].name)])
+        return self._free(re.sub(r"\W", "_", f"contact_{label}"))
+
+    def _entry(self, found: Contact, source: str, target: str) -> Edge:
+        """The transition by which a guard begins to hold."""
+        mode, edge = found.base, found.base.edges[found.edge]
         reset = list(zip(map(symbol, mode.states), edge.reset, strict=True))
 
         def after(value: sp.Expr) -> sp.Expr:
@@ -104,16 +151,32 @@ class _Writer:
             soon = sp.Le(cancelled(-2 * after(found.rate)), symbol(self._contact_time()) * found.push)
         condition = soon if edge.condition is None else sp.And(edge.condition, soon)
         landing = edge.reset if found.order == 1 else tuple(cancelled(after(value)) for value in found.landing)
-        entry = replace(edge, name=f"{mode.name}->{name}", target=name, condition=condition, reset=landing)
-        entry = replace(entry, priority=edge.priority + 1)
-        edges = list(found.mode.edges)
-        for j in (k, *range(len(mode.edges), len(edges))):
-            edges[j] = replace(edges[j], name=f"{name}->{mode.name}", reset=_onto_guard(mode, found))
-        for j, end in enumerate(found.ends, len(mode.edges)):
-            time = symbol(self._contact_time())
-            depth = time * found.push if found.order == 1 else time**2 * found.push / 2
-            edges[j] = replace(edges[j], condition=end, reset=_onto_guard(mode, found, depth))
-        return entry, replace(found.mode, name=name, edges=tuple(edges))
+        to = {"name": f"{source}->{target}", "source": source, "target": target, "priority": edge.priority + 1}
+        return replace(edge, condition=condition, reset=landing, **to)
+
+    def _motion(
+        self, base: Mode, contacts: Sequence[Contact], few: frozenset[int], names: dict[frozenset[int], str]
+    ) -> Mode:
+        """The mode of the motion along a set of guards; what changes nothing that it depends on leads back to it."""
+        name, held = names[few], [found for found in contacts if found.edge in few]
+        seen = set[sp.Symbol]().union(*map(depends_on, held))
+        edges = list(base.edges)
+        for j, edge in enumerate(edges):
+            changed = {symbol(state.name) for state in edge.changes}
+            lasts = edge.target == base.name and edge.target_states == base.states and not changed & seen
+            edges[j] = replace(edge, source=name, target=name if lasts else edge.target)
+        flow, texts = list(base.flow), list(base.flow_texts)
+        for found in held:
+            to = names[few - {found.edge}]
+            left = {"name": f"{name}->{to}", "source": name, "target": to}
+            edges[found.edge] = replace(found.release, reset=_onto_guard(base, found), **left)
+            for further, end in zip(found.further, found.ends, strict=True):
+                time = symbol(self._contact_time())
+                depth = time * found.push if found.order == 1 else time**2 * found.push / 2
+                edges.append(replace(further, condition=end, reset=_onto_guard(base, found, depth), **left))
+            for i, row in found.rows.items():
+                flow[i], texts[i] = row, text_of(row)
+        return replace(base, name=name, flow=tuple(flow), flow_texts=tuple(texts), edges=tuple(edges))
 
     def _free(self, name: str) -> str:
         while name in self._names:

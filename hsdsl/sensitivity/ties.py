@@ -21,6 +21,7 @@ from hsdsl.kernel import ModeKernel
 from hsdsl.sensitivity.landing import data_at
 from hsdsl.sensitivity.state_names import derivative_name, own, shift_name
 from hsdsl.simulate.stops import show
+from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.commutation import settle
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
@@ -78,7 +79,8 @@ def _others(run: RunView, made: Transition, moving: Sequence[bool]) -> tuple[str
     if not made.alternatives:
         return ()
     place, own = run.before(made)
-    nearby, least = [*_nearby(run, place, moving)], run.arithmetic.sqrt(run.arithmetic.unit)
+    tied = [run.edge_at(place, edge) for edge in made.alternatives]
+    nearby, least = [*_nearby(run, place, moving, (own, *tied))], run.arithmetic.sqrt(run.arithmetic.unit)
 
     def same(k: int) -> bool:
         try:
@@ -88,15 +90,25 @@ def _others(run: RunView, made: Transition, moving: Sequence[bool]) -> tuple[str
         products = [(a * d, b * c) for (a, b), (c, d) in pairwise(values)]
         return all(abs(a - b) <= least * max(abs(a), abs(b)) for a, b in products)
 
-    return tuple(edge for edge in made.alternatives if not same(run.edge_at(place, edge)))
+    return tuple(edge for edge, k in zip(made.alternatives, tied, strict=True) if not same(k))
 
 
-def _nearby(run: RunView, place: Place, moving: Sequence[bool]) -> Iterator[tuple[ModeKernel, list[Number]]]:
-    """Points all around a place, with the parameters that move: two surfaces in one proportion there are one guard."""
+def _nearby(
+    run: RunView, place: Place, moving: Sequence[bool], guards: Sequence[int]
+) -> Iterator[tuple[ModeKernel, list[Number]]]:
+    """Points all around a place, with the parameters that move: two surfaces in one proportion there are one guard.
+
+    A state that has been round-off so far, as the pitch of a symmetric body, moves the guards by as much as they are.
+    """
+    roundoff = max(map(place.roundoff_bound, guards))
+    gradients = [place.kernel.gradients[k](place.t, *place.x) for k in guards]
+    slopes = [max(abs(gradient[i]) for gradient in gradients) for i in range(1 + len(place.x))]
     values = [place.t, *place.x, *run.problem.timeline.at(place.t).data[: len(run.problem.program.parameters)]]
     sizes = [abs(value) or 1.0 for value in values]
     for i, x in enumerate(place.mode.states, 1):
         sizes[i] = max(abs(values[i]), run.sizes.get(x, 0.0)) or 1.0
+        if 0 < slopes[i] * sizes[i] <= roundoff:
+            sizes[i] = roundoff / (ROUNDOFF_UNITS * run.arithmetic.unit * slopes[i])
     moves = np.ones(len(values))
     moves[1 + len(place.x) :] = 0
     moves[1 + len(place.x) : 1 + len(place.x) + len(moving)] = moving

@@ -346,6 +346,13 @@ COMPLETED = {
   a: {flow: {x: 0.7654321, y: 0.912345}, transitions: [{when: y - 0.34567*sin(1.2345*x) >= 0, to: b}]}
   b: {flow: {x: 0.6543217, y: -0.512349}, transitions: [{when: y - 0.34567*sin(1.2345*x) <= 0, to: a}]}""",
                                   "x: 0, y: -1", 3),
+    # rest one after the other; each is thrown up while the other one rests
+    "two balls on tables that shake": ordinary("""
+  a: {flow: {x: u, h: v, u: 0.1, v: -1, k: w, w: -1.2}, transitions: [
+    {name: one, when: h <= 0.3*sin(2*t), to: a, reset: {v: -v/4 + 5/4*0.6*cos(2*t)}},
+    {name: two, when: k <= 0.2*sin(3*t), to: a, reset: {w: -w/5 + 6/5*0.6*cos(3*t)}},
+    {name: back, when: x >= 0.4, to: a, reset: {x: -0.4}}]}""",
+                                              "x: 0, h: 0.02, u: 0.5, v: 0, k: 0.01, w: 0", 6),
     "slides on a belt whose speed changes": ordinary("""
   a: {flow: {x: v, v: -x + 0.4}, transitions: [{when: v - 0.1*cos(t) >= 0, to: b}]}
   b: {flow: {x: v, v: -x - 0.4}, transitions: [{when: v - 0.1*cos(t) <= 0, to: a}]}""", "x: 0, v: 0", 5),
@@ -415,6 +422,34 @@ def test_the_time_of_contact_is_a_share_of_short_runs() -> None:
     written = hsdsl.loads(text).completed()
     assert written is not None and "contact_time: 8e-15" in written
     assert abs(hsdsl.loads(written).simulate(completion="none").final["h"]) < 1e-9
+
+
+def test_resets_that_leave_the_guard_keep_nothing_on_it() -> None:
+    """A clock that counts, a level that is filled up, a place that is another one modulo 2."""
+    text = ordinary(
+        """
+  a: {flow: {s: 3, x: -x, y: u, u: -y}, transitions: [
+    {when: s >= 2, to: a, reset: {s: 0, x: x + 1}}, {when: x <= 0.3, to: a, reset: {x: 2}},
+    {when: y >= 1, to: a, reset: {y: y - 2}}]}""",
+        "s: 0, x: 1, y: 0, u: 2",
+        3,
+    )
+    assert hsdsl.loads(text).completed() is None
+
+
+@pytest.mark.parametrize("flow", ["y - 1/2 <= x", "2*y <= 2*x + 1"])
+def test_bodies_that_press_on_each_other_have_no_text(flow: str) -> None:
+    """A box on a box on the floor; a floor and a ceiling are never met together."""
+    text = ordinary(
+        f"""
+  a: {{flow: {{x: v, v: -1, y: w, w: -1}}, transitions: [
+    {{name: floor, when: x <= 0, to: a, reset: {{v: -v/2}}}},
+    {{name: boxes, when: {flow}, to: a, reset: {{v: (v + w)/2, w: (v + w)/2}}}}]}}""",
+        "x: 0, v: 0, y: 1, w: 0",
+        3,
+    )
+    with pytest.raises(hsdsl.UsageError, match="the guards of floor and boxes may hold together and press"):
+        hsdsl.loads(text).completed()
 
 
 def test_long_transitions_are_written_a_line_for_each_key() -> None:
