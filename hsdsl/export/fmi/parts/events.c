@@ -246,7 +246,8 @@ static int rests(fmu *unit, int k, const double *p, double t, const double *befo
   if (rate_of(mode, k, p, t, x, &rate) || push_of(mode, k, p, t, x, &push)) return 0;
   if (!(push > 0) || !(rate <= 0) || !(rate * rate < 2 * push * now->margin[k])) return 0;
   memcpy(q, before, sizeof q);
-  if (fixed_point(mode, k, p, t, q)) return 0;
+  if (fixed_point(mode, k, p, t, q) || mode->values(p, t, q, r)) return 0;
+  if (!(fabs(r[k]) <= now->margin[k])) return 0; /* it leads away from the guard */
   if (mode->edge[k].contact < 0 || !problem_settings.contacts) return -1;
   now->resting = k;
   if (hs_the_model.mode[mode->held].values(fmu_bind(unit), t, q, r) || !(r[k] < 0)) return now->resting = -1, 0;
