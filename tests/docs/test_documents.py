@@ -247,7 +247,7 @@ def test_tutorial_and_readme_have_examples_that_run():
     assert set(RUNNABLE) >= {"README.md", "docs/tutorial.md"}
 
 
-OF_THE_PACKAGE = ("look", "check_scene", "check", "view")  # methods that other modules call
+OF_THE_PACKAGE = ("look", "check_scene", "check", "view", "sizes")  # methods that other modules call
 
 
 def test_the_reference_of_python_has_every_public_name_with_its_arguments():
