@@ -32,11 +32,11 @@ def checks_arguments(function: Callable[P, R], name: str = "", elsewhere: Elsewh
 
     @wraps(function)
     def checked(*args: P.args, **kwargs: P.kwargs) -> R:
-        for key in kwargs:
-            if key not in own:
-                hint = (elsewhere(args[0], key) if args else None) or did_you_mean(key, others)
-                hint = hint or f"its arguments are {', '.join(others)}"
-                raise UsageError(f"{name} has no argument '{key}'", hint)
+        if not own.issuperset(kwargs):
+            key = next(key for key in kwargs if key not in own)
+            hint = (elsewhere(args[0], key) if args else None) or did_you_mean(key, others)
+            hint = hint or f"its arguments are {', '.join(others)}"
+            raise UsageError(f"{name} has no argument '{key}'", hint)
         return function(*args, **kwargs)
 
     return checked

@@ -134,12 +134,12 @@ class Scene:
 def sampled(execution: Execution, grid: Array, states: Sequence[str]) -> tuple[Array, Callable[[], Array]]:
     """Return values of shape (samples, states), NaN beyond the end, and what gives the modes, empty there."""
     known = [name for name in states if name in execution.states]
-    whole = execution.stop.time >= grid[-1]
+    whole = execution.stop.time >= grid.item(-1)
     count = len(grid) if whole else int(np.searchsorted(grid, float(execution.time_span[1]), side="right"))
     inside = slice(0, count)
     at = execution.sample(grid[inside], columns=known)
     values = at.state_columns
-    if values.dtype != float or len(known) < len(states) or not whole:
+    if not whole or len(known) < len(states) or values.dtype.kind != "f":
         values = np.full((len(grid), len(states)), np.nan)
         for i, name in enumerate(known):
             values[inside, states.index(name)] = at.state_columns[:, i]

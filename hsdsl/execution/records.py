@@ -26,9 +26,7 @@ class Deferred:
         Fields in ``later`` must have no default; nothing is checked. ``known`` is what many have in common.
         """
         made = object.__new__(cls)
-        values = made.__dict__
-        values.update(known)
-        values.update(now, _later=later)
+        made.__dict__.update({**known, **now} if known else now, _later=later)
         return made
 
     def _elsewhere(self, name: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,8 +27,6 @@ class Evaluated(Protocol):
         The number of the first time that is outside the run; -1 where none is, and only then the rest is there.
     times : array, shape (n,)
         Those outside the run by no more than the tie tolerance moved to its ends.
-    rows : array of int, shape (n,)
-        Where the piece begins that each time is in.
     states, outputs : array, shape (n, number of them)
     """
 
@@ -37,14 +35,12 @@ class Evaluated(Protocol):
     @property
     def times(self) -> Array: ...
     @property
-    def rows(self) -> Array: ...
-    @property
     def states(self) -> Array: ...
     @property
     def outputs(self) -> Array: ...
 
 
-Sampler = Callable[[Array, bool, Sequence[str], bool], Evaluated]
+Sampler = Callable[[Array, bool, Sequence[str], int], Evaluated]
 
 
 class ArcTable:
@@ -132,19 +128,51 @@ def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] 
     if columns is not None:
         states, names = split(columns, states, outputs)
     instants = _as_floats(times)
-    found = execution.sampler(instants, side == "left", states, bool(names))
+    found = execution.sampler(instants, side == "left", states, len(outputs) if names else 0)
     if found.outside >= 0:
         raise _outside(execution, instants[found.outside])
-    later: dict[str, Callable[[Samples], Array]] = {
-        "mode": lambda _: execution.arc_table.mode[_arcs(execution, found.rows)],
-        "jump": lambda _: execution.arc_table.jump[_arcs(execution, found.rows)],
-        "kind": lambda _: execution.arc_table.kind[_arcs(execution, found.rows)],
-        "present": lambda _: execution.arc_table.present(states)[_arcs(execution, found.rows)],
-        "output_columns": lambda _: (
-            found.outputs if names == outputs else found.outputs[:, [outputs.index(name) for name in names]]
-        ),
-    }
-    return Samples.deferred(later, states=states, outputs=names, time=found.times, state_columns=found.states)
+    source = _Source(execution, found, side)
+    return Samples.deferred(_LATER, states=states, outputs=names, state_columns=found.states, _source=source)
+
+
+class _Source(NamedTuple):
+    """What columns of samples are made of on first use."""
+
+    execution: Execution
+    found: Evaluated
+    side: Side
+
+    @staticmethod
+    def of(samples: Samples) -> _Source:
+        return samples.__dict__["_source"]
+
+    @property
+    def arcs(self) -> Array:
+        """Which arc each time is in."""
+        return _arcs(self.execution, find(self.execution, self.found.times, self.side)[0])
+
+    def outputs(self, names: Sequence[str]) -> Array:
+        """Columns of some outputs."""
+        known, values = self.execution.output_names, self.found.outputs
+        return values if names == known else values[:, [known.index(name) for name in names]]
+
+
+def _by_arc(samples: Samples, of_arcs: Array) -> Array:
+    return of_arcs[_Source.of(samples).arcs]
+
+
+def _table(samples: Samples) -> ArcTable:
+    return _Source.of(samples).execution.arc_table
+
+
+_LATER: dict[str, Callable[[Samples], Array]] = {
+    "time": lambda samples: _Source.of(samples).found.times,
+    "mode": lambda samples: _by_arc(samples, _table(samples).mode),
+    "jump": lambda samples: _by_arc(samples, _table(samples).jump),
+    "kind": lambda samples: _by_arc(samples, _table(samples).kind),
+    "present": lambda samples: _by_arc(samples, _table(samples).present(samples.states)),
+    "output_columns": lambda samples: _Source.of(samples).outputs(samples.outputs),
+}
 
 
 @dataclass(frozen=True, eq=False)

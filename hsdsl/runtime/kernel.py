@@ -23,7 +23,8 @@ def runtime() -> ctypes.CDLL:
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
     library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
-    library.hs_sample.argtypes, library.hs_sample.restype = (ctypes.c_void_p,), ctypes.c_int64
+    sampling = *(ctypes.c_void_p,) * 5, ctypes.c_int64, *(ctypes.c_int32,) * 3, ctypes.c_void_p
+    library.hs_sample_record.argtypes, library.hs_sample_record.restype = sampling, ctypes.c_int64
     library.hs_screen_run.argtypes, library.hs_screen_run.restype = (ctypes.c_void_p,) * 3, ctypes.c_int64
     library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
     return library

@@ -12,9 +12,6 @@ from hsdsl.execution import Array, Evaluated
 from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel
 
-NUMBER = 8  # bytes
-SHARED = ("rows", "arcs", "width", "degree", "times", "values", "recorded", "pieces", "arc")  # with ``hs_record``
-
 
 class Placed(Protocol):
     """Columns that C can be shown."""
@@ -33,7 +30,8 @@ class Sampled:
 
     def __init__(self, library: ctypes.CDLL, compiled: CompiledModel, timeline: Any) -> None:
         self.table = structures.Sampling(model=structures.address(ctypes.pointer(compiled.table)), timeline=timeline)
-        self.run = library.hs_sample
+        self.scratch = 2 * compiled.table.width
+        self.run, self.where = library.hs_sample_record, ctypes.addressof(self.table)
         self._kept = compiled, timeline
         self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
 
@@ -49,7 +47,7 @@ class Sampled:
 
 
 class Filled:
-    """Memory that C has filled at n times: times, rows, k states, m outputs, and room between them."""
+    """Memory that C has filled at n times: times, k states, m outputs."""
 
     def __init__(self, memory: Array, outside: int, n: int, k: int, m: int) -> None:
         self._memory, self.outside, self._n, self._k, self._m = memory, outside, n, k, m
@@ -60,19 +58,14 @@ class Filled:
         return self._memory[: self._n]
 
     @property
-    def rows(self) -> Array:
-        """Shape (n,), of int."""
-        return self._memory[self._n : 2 * self._n].view(np.int64)
-
-    @property
     def states(self) -> Array:
         """Shape (n, k)."""
-        return self._memory[2 * self._n : (2 + self._k) * self._n].reshape(self._k, self._n).T
+        return self._memory[self._n : (1 + self._k) * self._n].reshape(self._k, self._n).T
 
     @property
     def outputs(self) -> Array:
         """Shape (n, m)."""
-        start = (2 + self._k) * self._n
+        start = (1 + self._k) * self._n
         return self._memory[start : start + self._n * self._m].reshape(self._n, self._m)
 
 
@@ -94,20 +87,9 @@ class Sampler:
         self, sampled: Sampled, columns: Placed, kinds: tuple[tuple[str, ...], ...], layout: Array | None
     ) -> None:
         self._sampled, self._columns, self._kinds, self._layout = sampled, columns, kinds, layout
-        self._own: Any = None
 
-    def _table(self) -> Any:
-        """What is the same for any times."""
-        table = structures.Sampling.from_buffer_copy(self._sampled.table)
-        record = structures.Record.from_address(self._columns.record)
-        for name in SHARED:
-            setattr(table, name, getattr(record, name))
-        self._outputs = record.outputs
-        table.layout = None if self._layout is None else self._layout.ctypes.data
-        return table
-
-    def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: bool) -> Evaluated:
-        """Evaluate the states named, and the outputs where ``outputs`` is true.
+    def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: int) -> Evaluated:
+        """Evaluate the states named, and the outputs: all that the model has, or 0.
 
         Parameters
         ----------
@@ -115,16 +97,21 @@ class Sampler:
         left : bool
             At a jump take the value before the first transition.
         states : sequence of str
-        outputs : bool
+        outputs : int
         """
-        n, k = len(times), len(states)
-        own = self._own = self._own or self._table()
-        m = self._outputs if outputs else 0
-        ends = 0, n, 2 * n, (2 + k) * n, (2 + k + m) * n  # time, row, states, results, scratch
-        memory = np.empty(ends[-1] + 2 * own.width)
+        n, k, shared, layout = len(times), len(states), self._sampled, self._layout
+        room = n * (1 + k + outputs)
+        memory = np.empty(room + shared.scratch)
         memory[:n] = times
-        table, start = structures.Sampling.from_buffer_copy(own), structures.start_of(memory)
-        table.samples, table.columns, table.outputs, table.left = n, k, m, left
-        table.dimension, table.column = self._sampled.columns(self._kinds, states)
-        table.time, table.row, table.states, table.results, table.scratch = [start + NUMBER * end for end in ends]
-        return Filled(memory, self._sampled.run(ctypes.byref(table)), n, k, m)
+        outside = shared.run(
+            shared.where,
+            self._columns.record,
+            None if layout is None else layout.ctypes.data,
+            *shared.columns(self._kinds, states),
+            n,
+            k,
+            outputs,
+            left,
+            structures.start_of(memory),
+        )
+        return Filled(memory, outside, n, k, outputs)

@@ -128,15 +128,15 @@ class ThreadWorkspace:
         self.workspace = plan.workspaces.new(self.table.task)
         plan.lay(self.workspace)
         model, chunk, room = plan.compiled.table, self.table.task.chunk, samples
-        self._memory = np.zeros(room * (2 + len(names)) + 2 * model.width)
+        self._memory = np.zeros(room * (1 + len(names)) + 2 * model.width)
         self._arcs = np.zeros(chunk.arc_room, np.int32)
         sampling, start = self.table.sampling, self._memory.ctypes.data
         ctypes.memmove(ctypes.byref(sampling), ctypes.byref(plan.sampled.table), ctypes.sizeof(sampling))
         sampling.width, sampling.degree = model.width, self.workspace.degree
         sampling.columns, sampling.outputs = len(names), model.outputs
         sampling.dimension, sampling.column = plan.sampled.columns(layouts.kinds, names)
-        sampling.time, sampling.row, sampling.states = start, start + 8 * room, start + 16 * room
-        sampling.scratch = start + 8 * room * (2 + len(names))
+        sampling.time, sampling.states = start, start + 8 * room
+        sampling.scratch = start + 8 * room * (1 + len(names))
         self.table.layouts = self._arcs.ctypes.data
         self.table.layout_of = None if layouts.one else layouts.of_mode.ctypes.data
         self._log: Logged = (

@@ -108,13 +108,12 @@ def rises(c: Coefficients, level: Number, start: Number, tiny: Number) -> Number
     return None
 
 
-def last_root(c: Coefficients, start: Number, end: Number, tiny: Number) -> Number | None:
+def last_root(c: Coefficients, start: Number, end: Number, tiny: Number, b: list[Number]) -> Number | None:
     """Find the last point in [start, end] where the polynomial rises through 0, knowing that it is positive at ``end``.
 
-    None where it is positive all the way.
+    None where it is positive all the way; ``b`` are its Bernstein coefficients on [0, 1].
     """
     one = end * 0 + 1
-    b = bernstein(c)
     if end < 1:
         b = split(b, end)[0]
     if start > 0:

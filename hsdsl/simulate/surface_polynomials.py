@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from hsdsl.arithmetic import Arithmetic, Number
 from hsdsl.integrators.stepper import Polynomial, State
 from hsdsl.simulate.interpolation import along_steps, interpolation
-from hsdsl.simulate.root_isolation import ROUNDING, Coefficients, last_root, rises, total, value
+from hsdsl.simulate.root_isolation import ROUNDING, Coefficients, bernstein, last_root, rises, total, value
 from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.surfaces import at
 
@@ -91,8 +91,10 @@ def rises_along(pieces: Sequence[Piece], level: Number, beyond: bool, risen: boo
 def _root(c: Coefficients, start: Number, end: Number, unit: Number) -> Number:
     """The last root before ``end``; a series that begins with zero has it taken out, so that tiny roots stay exact."""
     if start == 0 and c[0] == 0 and len(c) > 1:
-        return last_root(c[1:], start, end, unit) or start
-    root = last_root(c, start, end, unit)
+        degree = len(c) - 1
+        of_rest = [b * degree / k for k, b in enumerate(bernstein(c)) if k]
+        return last_root(c[1:], start, end, unit, of_rest) or start
+    root = last_root(c, start, end, unit, bernstein(c))
     return start if root is None else root
 
 

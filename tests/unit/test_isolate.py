@@ -57,7 +57,7 @@ def test_every_rise_is_found(thousandths: list[int]) -> None:
     ends = [*roots, Fraction(1)]
     assume(all(abs(value(exact, (a + b) / 2)) > 2 * noise for a, b in pairwise(ends)))  # else it is lost in round-off
     while (above := rises(c, noise, start, TINY)) is not None:
-        root = last_root(c, start, above, TINY)
+        root = last_root(c, start, above, TINY, bernstein(c))
         found.append(start if root is None else root)
         below = rises(down, 0.0, above, TINY)
         if below is None:
@@ -75,7 +75,7 @@ def test_two_roots_close_together(arithmetic: object) -> None:
     c = [number(a) for a in from_roots([Fraction(3, 10), Fraction(3, 10) + Fraction(1, 10**6)], -1)]
     above = rises(c, number(Fraction(0)), number(Fraction(0)), number(Fraction(1, 2**50)))
     assert above is not None
-    root = last_root(c, number(Fraction(0)), above, number(Fraction(1, 2**50)))
+    root = last_root(c, number(Fraction(0)), above, number(Fraction(1, 2**50)), bernstein(c))
     assert abs(root - number(Fraction(3, 10))) <= 1e-9
 
 
@@ -85,16 +85,16 @@ def test_a_touch_from_below_is_no_rise() -> None:
 
 
 def test_above_all_along_has_no_root() -> None:
-    assert last_root([0.5, 1.0], 0.0, 1.0, TINY) is None
+    assert last_root([0.5, 1.0], 0.0, 1.0, TINY, [0.5, 1.5]) is None
     assert rises([0.5, 1.0], 0.0, 0.0, TINY) == 0.0
 
 
 def test_a_root_at_the_start_belongs_to_the_start() -> None:
-    assert last_root([0.0, 1.0], 0.0, 1.0, TINY) == 0.0
+    assert last_root([0.0, 1.0], 0.0, 1.0, TINY, [0.0, 1.0]) == 0.0
 
 
 def test_small_roots_are_found_to_the_last_bits_of_themselves() -> None:
     c = [-1e-9 * 0.5, 0.5, 1.0]
-    root = last_root(c, 0.0, 1.0, TINY)
+    root = last_root(c, 0.0, 1.0, TINY, bernstein(c))
     assert root == pytest.approx(1e-9 / (1 + 2e-9) * 1.0, rel=1e-8)
     assert abs(value(c, root)) <= 1e-24

@@ -197,7 +197,7 @@ static int stays_below(hs_run *run, const hs_real *c, int n, hs_real level);
 HS_INLINE hs_real value_of(const hs_real *c, int n, hs_real s);
 HS_INLINE hs_real value_at_end(const hs_real *c, int n);
 static int rises(hs_run *run, const hs_real *c, int n, hs_real sign, hs_real level, hs_real start, hs_real *point);
-static int last_root(hs_run *run, const hs_real *c, int n, hs_real start, hs_real end, hs_real *root);
+static int last_root(hs_run *run, const hs_real *c, int n, int reduced, hs_real start, hs_real end, hs_real *root);
 
 /* surface_polynomials.c */
 static hs_real *coefficients_of(const hs_curves *curves, int part, int k);

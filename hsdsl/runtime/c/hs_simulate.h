@@ -238,7 +238,6 @@ typedef struct {
   const int32_t *dimension; /* of each layout */
   const int32_t *column;    /* (layouts, columns): which of the arc's states it is, -1 for none */
   double *time;             /* (samples), in any order; moved to the run's ends where outside to round-off */
-  int64_t *row;             /* (samples): where the piece begins */
   double *states;           /* (columns, samples) */
   double *results;          /* (samples, outputs) */
   double *scratch;          /* 2 width */
@@ -246,6 +245,11 @@ typedef struct {
 
 /* The number of the first time that is outside the run by more than the tie tolerance, or -1. */
 HS_EXPORT int64_t hs_sample(const hs_sampling *sampling);
+
+/* The same of a packed run: `memory` has the times, and room behind them for states, results and scratch. */
+HS_EXPORT int64_t hs_sample_record(const hs_sampling *shared, const hs_record *record, const int32_t *layout,
+                                   const int32_t *dimension, const int32_t *column, int64_t samples, int32_t columns,
+                                   int32_t outputs, int32_t left, double *memory);
 
 /* Many instances of one model: `task` must come first; of each run only the results below are kept. */
 typedef struct hs_ensemble {

@@ -17,7 +17,7 @@ static void fill_binomials(hs_real *row, int most) {
    more stay each time. Two such passes are made in one. */
 HS_INLINE void fill_bernstein(const hs_run *run, const hs_real *c, int n, hs_real *b) {
   const hs_real *choose = binomials(run, n);
-  for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
+  HS_SIMD for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
   for (int k = 1; k <= n; k += 2) {
     hs_real before = b[k], once = before + b[k - 1];
     b[k] = once;
@@ -76,12 +76,11 @@ HS_INLINE hs_real value_at_end(const hs_real *c, int n) {
 
 /* Changes of sign, zeros left out. */
 static int changes(const hs_real *b, int n) {
-  int count = 0, before = -1;
+  int count = 0, before = 0;
   for (int i = 0; i <= n; i++) {
-    if (b[i] == 0) continue;
-    const int sign = b[i] > 0;
-    count += before >= 0 && sign != before;
-    before = sign;
+    const int sign = (b[i] > 0) - (b[i] < 0);
+    count += sign * before < 0;
+    before = sign ? sign : before;
   }
   return count;
 }
@@ -142,7 +141,7 @@ static void towards(const hs_real *c, int n, hs_real *end, hs_real *other, hs_re
 
 /* Solve for the one root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket). */
 static hs_real refined(const hs_real *c, int n, hs_real a, hs_real b) {
-  hs_real fa = a == 0 ? c[0] : value_of(c, n, a), fb = value_of(c, n, b);
+  hs_real fa = a == 0 ? c[0] : value_of(c, n, a), fb = b == 1 ? value_at_end(c, n) : value_of(c, n, b);
   hs_real noise = 0.0;
   for (int k = 0; k <= n; k++) noise = noise + fabs(c[k]);
   noise = ROUNDING * HS_UNIT * noise;
@@ -171,11 +170,15 @@ static hs_real refined(const hs_real *c, int n, hs_real a, hs_real b) {
 }
 
 /* Find the last point in [start, end] where the polynomial rises through 0, knowing that it is positive at `end`: 1;
-   0 where it is positive all the way. */
-static int last_root(hs_run *run, const hs_real *c, int n, hs_real start, hs_real end, hs_real *root) {
+   0 where it is positive all the way. `reduced` by its factor s, its Bernstein coefficients have the same signs. */
+static int last_root(hs_run *run, const hs_real *c, int n, int reduced, hs_real start, hs_real end, hs_real *root) {
   hs_cut *const cuts = run->cuts;
+  const hs_real *const own = bernstein_of(run, c, n) + reduced, degree = n;
   int open = 1;
-  copy(cuts[0].b, bernstein_of(run, c, n), n + 1);
+  c += reduced, n -= reduced;
+  if (start == 0 && end == 1 && own[0] <= 0 && 0 < own[n] && changes(own, n) <= 1)
+    return *root = refined(c, n, start, end), 1;
+  for (int k = 0; k <= n; k++) cuts[0].b[k] = reduced ? own[k] * degree / (k + 1) : own[k];
   if (end < 1) {
     split(cuts[0].b, n, end, run->left);
     copy(cuts[0].b, run->left, n + 1);

@@ -24,17 +24,22 @@ typedef struct {
 
 /* Evaluate the columns at `count` times of one piece, at most a block; to `out` and further columns behind it. */
 HS_INLINE void evaluate_block(const hs_sampling *s, const hs_place *at, const double *time, int count, double *out) {
-  const int w = s->width, top = at->degree - 1;
+  const int w = s->width;
   const double length = at->end - at->begin;
   double u[BLOCK], y[BLOCK];
-  for (int q = 0; q < count; q++) u[q] = (time[q] - at->begin) / length;
+  int known = 0; /* whether u is */
   for (int k = 0; k < s->columns; k++, out += s->samples) {
     const int place = at->column[k];
-    if (place < 0) {
-      for (int q = 0; q < count; q++) out[q] = NAN;
+    const double *const c = place < 0 ? 0 : at->c + place, x = place < 0 ? NAN : at->x[place];
+    int top = place < 0 ? -1 : at->degree - 1;
+    while (top >= 0 && c[top * w] == 0) top--; /* many states are polynomials of low degree */
+    if (top < 0) {
+      for (int q = 0; q < count; q++) out[q] = x + 0.0;
       continue;
     }
-    const double *const c = at->c + place, x = at->x[place];
+    if (!known)
+      for (int q = 0; q < count; q++) u[q] = (time[q] - at->begin) / length;
+    known = 1;
     for (int q = 0; q < count; q++) y[q] = c[top * w];
     for (int m = top - 1; m >= 0; m--)
       for (int q = 0; q < count; q++) y[q] = c[m * w] + u[q] * y[q];
@@ -108,7 +113,6 @@ HS_INLINE void go_to(const hs_sampling *s, int64_t row, hs_place *at) {
 
 /* What was recorded at a row. */
 static void at_row(const hs_sampling *s, const hs_place *at, int64_t row, int64_t i) {
-  s->row[i] = row;
   for (int k = 0; k < s->columns; k++)
     s->states[k * s->samples + i] = at->column[k] < 0 ? NAN : s->values[row * s->width + at->column[k]];
   for (int k = 0; k < s->outputs; k++) s->results[i * s->outputs + k] = s->recorded[row * s->outputs + k];
@@ -130,26 +134,28 @@ static void outputs_between(const hs_sampling *s, const hs_place *at, int64_t i)
     for (int k = 0; k < s->outputs; k++) out[k] = NAN;
 }
 
-/* The number of the first time outside the run, or -1; those outside it to round-off are moved to its ends. */
-static int64_t outside(const hs_sampling *s) {
+/* Whether a time is outside the run; to round-off it is not, and is moved to the run's end. */
+static int outside(const hs_sampling *s, double *t) {
   const double start = s->times[0], end = s->times[s->rows - 1];
   const double slack = HS_TIE * hs_max(fabs(start), fabs(end));
-  for (int64_t i = 0; i < s->samples; i++) {
-    const double t = s->time[i];
-    if (!(t >= start - slack && t <= end + slack)) return i;
-    if (!(t >= start)) s->time[i] = start;
-    if (!(t <= end)) s->time[i] = end;
-  }
-  return -1;
+  if (!(*t >= start - slack && *t <= end + slack)) return 1;
+  *t = hs_min(hs_max(*t, start), end);
+  return 0;
+}
+
+/* The number of the first time from `i` on that is not between a place's row and the next. */
+HS_UNROLLED static int64_t behind_piece(const hs_sampling *s, const hs_place *at, int64_t i) {
+  while (i < s->samples && at->begin < s->time[i] && s->time[i] < at->end) i++;
+  return i;
 }
 
 int64_t hs_sample(const hs_sampling *s) {
-  const int64_t first = outside(s);
   hs_place at;
-  if (first >= 0 || !s->samples) return first;
+  if (!s->samples) return -1;
   at.arc = 0;
   go_to(s, 0, &at);
   for (int64_t i = 0; i < s->samples;) {
+    if (outside(s, &s->time[i])) return i;
     const double t = s->time[i];
     if (!(at.begin <= t && t < at.end)) go_to(s, row_at(s, t, at.row), &at);
     if (t == at.begin) {
@@ -160,9 +166,22 @@ int64_t hs_sample(const hs_sampling *s) {
       continue;
     }
     const int64_t start = i;
-    for (; i < s->samples && at.begin < s->time[i] && s->time[i] < at.end; i++) s->row[i] = at.row;
+    i = behind_piece(s, &at, i);
     evaluate_piece(s, &at, start, i);
     for (int64_t k = start; s->outputs && k < i; k++) outputs_between(s, &at, k);
   }
   return -1;
+}
+
+int64_t hs_sample_record(const hs_sampling *shared, const hs_record *record, const int32_t *layout,
+                         const int32_t *dimension, const int32_t *column, int64_t samples, int32_t columns,
+                         int32_t outputs, int32_t left, double *memory) {
+  hs_sampling s = *shared;
+  s.rows = record->rows, s.arcs = record->arcs, s.width = record->width, s.degree = record->degree;
+  s.times = record->times, s.values = record->values, s.recorded = record->recorded, s.pieces = record->pieces;
+  s.arc = record->arc, s.layout = layout, s.dimension = dimension, s.column = column;
+  s.samples = samples, s.columns = columns, s.outputs = outputs, s.left = left;
+  s.time = memory, s.states = s.time + samples, s.results = s.states + columns * samples;
+  s.scratch = s.results + outputs * samples;
+  return hs_sample(&s);
 }

@@ -25,7 +25,7 @@ static hs_walk begin_walk(int k, hs_real level, int beyond, int risen) {
 static hs_real root_of(hs_run *run, const hs_real *c, int n, hs_real start, hs_real end) {
   const int reduced = start == 0 && c[0] == 0 && n > 0;
   hs_real root;
-  return last_root(run, c + reduced, n - reduced, start, end, &root) ? root : start;
+  return last_root(run, c, n, reduced, start, end, &root) ? root : start;
 }
 
 static hs_real slope_of(const hs_real *c, int n, hs_real s) {

@@ -27,7 +27,7 @@ static struct {
   double *workspace, deadline;
   int32_t *layouts;
   double *time, *states, *results, *arc_of;
-  int64_t *row, points, room;
+  int64_t points, room;
 } run;
 
 /* Where everything is, as numbers; see `read` in worker.js. */

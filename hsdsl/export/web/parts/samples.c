@@ -11,7 +11,7 @@ static page_refusal choose_times(double samples) {
   const double part = c->times[c->rows - 1] / samples;
   int64_t n = 0;
   if (room > run.room) {
-    if (PAGE_GROW(run.time, room) || PAGE_GROW(run.arc_of, room) || PAGE_GROW(run.row, room) ||
+    if (PAGE_GROW(run.time, room) || PAGE_GROW(run.arc_of, room) ||
         PAGE_GROW(run.states, room * PAGE_STATES + 1) || PAGE_GROW(run.results, room * PROBLEM_OUTPUTS + 1))
       return PAGE_NO_MEMORY;
     run.room = room;
@@ -49,7 +49,7 @@ static void evaluate(void) {
   const hs_sampling sampling = {&hs_the_model, &run.timeline, c->rows, c->arcs, run.points, PROBLEM_WIDTH,
                                 PROBLEM_DEGREE, PROBLEM_OUTPUTS, PAGE_STATES, 0, c->times, c->values, c->outputs,
                                 c->pieces + PROBLEM_DEGREE * PROBLEM_WIDTH, c->arc, run.layouts, page_dimensions,
-                                page_columns, run.time, run.row, run.states, run.results, scratch};
+                                page_columns, run.time, run.states, run.results, scratch};
   hs_sample(&sampling);
   for (int64_t i = 0; i < run.points; i++) {
     const int64_t a = (int64_t)run.arc_of[i];
