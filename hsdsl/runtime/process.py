@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import tempfile
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +19,8 @@ from typing import IO
 from hsdsl import interrupts
 
 PATIENCE = 5.0  # seconds without a question
+SHORTEST_LOOK = 0.1
+TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100  # of a second of processor time
 MOST_PRINTED = 1 << 16  # bytes that are kept of what a command prints
 _running: dict[subprocess.Popen[bytes], Path] = {}
 
@@ -41,8 +43,8 @@ def workshop() -> Generator[Path]:
 def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, responds: Callable[[], bool]) -> list[Done]:
     """Run commands at the same time, whose temporary files go to ``folder``; they read nothing.
 
-    After :data:`PATIENCE` they go on only if ``responds``. All that they started is ended with them where they are
-    ended.
+    After :data:`PATIENCE` they go on only if ``responds``. On Linux ``seconds`` that other programs had the processor do
+    not count. All that they started is ended with them where they are ended.
 
     Raises OSError: one cannot be started.
     """
@@ -93,15 +95,36 @@ def _wait(
     process: subprocess.Popen[bytes], listener: Thread, seconds: float, responds: Callable[[], bool]
 ) -> int | None:
     """Wait for the end of what a command says, which comes at its own end and needs no looking again and again."""
-    first = min(seconds, PATIENCE)
-    for patience in (first, seconds - first):
+    for patience in _patiences(process.pid, seconds, responds):
         end = monotonic() + patience
         listener.join(patience)
         with suppress(subprocess.TimeoutExpired):
             return process.wait(max(0.0, end - monotonic()))
-        if seconds <= first or not responds():
-            break
     return None
+
+
+def _patiences(group: int, seconds: float, responds: Callable[[], bool]) -> Iterator[float]:
+    """Give how long to wait for a command each time."""
+    first = min(seconds, PATIENCE)
+    yield first
+    if first < seconds:
+        if not responds():
+            return
+        yield seconds - first
+    while (more := kept_waiting(group, seconds)) > 0:
+        yield max(more, SHORTEST_LOOK)
+
+
+def kept_waiting(group: int, seconds: float) -> float:
+    """How many of so many seconds the processes of a group that still run have not had the processor; 0 if unknown."""
+    used, runs = 0.0, False
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # it has ended
+            state, _, its_group, *others = path.read_text().rpartition(")")[2].split()
+            if int(its_group) == group:
+                used += sum(map(int, others[8:12])) / TICKS  # its own and that of children that have ended
+                runs = runs or state == "R"
+    return max(0.0, seconds - used) if runs else 0.0
 
 
 def _listen(stream: IO[bytes], printed: list[bytes]) -> None:

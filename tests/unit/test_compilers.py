@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -206,3 +207,15 @@ def test_nothing_is_left_where_the_process_ends_first(use, tmp_path: Path) -> No
     pids = (tmp_path / "pids").read_text().split() if (tmp_path / "pids").exists() else []
     assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]
     assert not [path for path in tmp_path.iterdir() if path.name.startswith("hsdsl-")]
+
+
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="nobody else says how long a process had a processor")
+@pytest.mark.parametrize("does", ["while True: pass", "import time; time.sleep(1e6)"])
+def test_time_of_other_programs_does_not_count(does: str) -> None:
+    """Of a program that runs only what it had of the processor counts, of one that waits all time."""
+    runs = does.startswith("while")
+    with subprocess.Popen([sys.executable, "-c", does], process_group=0) as program:
+        looks = (process.kept_waiting(program.pid, 1e6) for _ in range(100_000))
+        found = any(0 < left < 1e6 if runs else left == 0 for left in looks)
+        program.kill()
+    assert found
