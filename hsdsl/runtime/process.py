@@ -43,8 +43,8 @@ def workshop() -> Generator[Path]:
 def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, responds: Callable[[], bool]) -> list[Done]:
     """Run commands at the same time, whose temporary files go to ``folder``; they read nothing.
 
-    After :data:`PATIENCE` they go on only if ``responds``. On Linux ``seconds`` that other programs had the processor do
-    not count. All that they started is ended with them where they are ended.
+    After :data:`PATIENCE` they go on only if ``responds``. On Linux seconds in which other programs had the processor
+    do not count. All that they started is ended with them where they are ended.
 
     Raises OSError: one cannot be started.
     """
