@@ -22,7 +22,10 @@ def complete(
     out: Annotated[Path | None, option("FILE", "Write it there (.yaml) rather than to standard output.")] = None,
     answer: Answer,
 ) -> None:
-    """Write a model with a mode for each motion along a guard, and for each surface that two modes press on."""
+    """Write a model with a mode for each motion along a guard, and for each surface that two modes press on.
+
+    A model that has neither is refused (exit code 2).
+    """
     with answer.reporting():
         from hsdsl.model import load
         from hsdsl.store.atomic import replacing

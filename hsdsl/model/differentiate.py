@@ -24,7 +24,7 @@ from hsdsl.parts import Part, present
 from hsdsl.program import Program
 from hsdsl.sensitivity.result import Sensitivity, Setting, Slopes
 from hsdsl.sensitivity.state_names import ERROR, SPAN, UNIT
-from hsdsl.sensitivity.targets import Target, targets
+from hsdsl.sensitivity.targets import Target, listed, targets
 from hsdsl.simulate.review import BecomesStiff
 from hsdsl.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.simulate.verdict.agreement import SAFE
@@ -52,7 +52,7 @@ class Differentiator:
 
         In ties an edge in ``firsts`` goes first.
         """
-        wrt = tuple(map(str, [wrt] if isinstance(wrt, str) else wrt))  # names of a file know their places
+        wrt = listed(wrt)
         firsts = tuple(map(str, firsts))
         key = call_key(*wrt, None, *firsts, None, *arguments, None, *arguments.values())
         ready = self._prepared.find(key)

@@ -10,6 +10,8 @@ from hsdsl.names import INITIAL
 from hsdsl.parts import meant_alone, numbered
 from hsdsl.program import Program
 
+EXAMPLE = "for example c or initial.v"
+
 
 @dataclass(frozen=True)
 class Target:
@@ -20,17 +22,28 @@ class Target:
     initial: bool
 
 
+def listed(wrt: str | Sequence[str]) -> tuple[str, ...]:
+    """One name or several, as plain text: names of a file know their places.
+
+    Raises UsageError: neither.
+    """
+    try:
+        return (wrt,) if isinstance(wrt, str) else tuple(map(str, wrt))
+    except TypeError:
+        raise UsageError(f"expected names to differentiate by, got {wrt!r}", EXAMPLE) from None
+
+
 def targets(wrt: str | Sequence[str], program: Program, states: Sequence[str]) -> tuple[Target, ...]:
     """Read names such as ``c`` and ``initial.v``, in a text with commas or one by one; ``states`` are the initial ones.
 
     Raises UsageError: a name that is neither, or none at all.
     """
-    given = [name.strip() for text in ([wrt] if isinstance(wrt, str) else wrt) for name in text.split(",")]
+    given = [name.strip() for text in listed(wrt) for name in text.split(",")]
     hidden = numbered(program.parts)
     states = [name for name in states if name not in hidden]
     labels = list(dict.fromkeys(name for name in given if name))
     if not labels:
-        raise UsageError("expected names to differentiate by, got none", "for example c or initial.v")
+        raise UsageError("expected names to differentiate by, got none", EXAMPLE)
     return tuple(_target(label, program, states) for label in labels)
 
 

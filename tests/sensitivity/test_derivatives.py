@@ -515,13 +515,14 @@ def test_moving_jumps_are_refused() -> None:
         ("v", {}, "no parameter or initial state 'v'", "'initial.v'"),
         ("initial.mode", {}, "no parameter or initial state 'initial.mode'", "no number"),
         ("", {}, "got none", "for example"),
+        (3, {}, "got 3", "for example"),
         ("c", {"step": 1e-3}, "no argument 'step'", ""),
         ("c", {"scheme": "relaxed"}, "no argument 'scheme'", ""),
         ("c", {"method": "midpoint"}, "got 'midpoint' with fixed steps", "dop853"),
         ("c", {"tolerence": 1e-3}, "no argument 'tolerence'", "tolerance"),
     ],
 )
-def test_bad_input(wrt: str, call: dict[str, Any], sentence: str, hint: str) -> None:
+def test_bad_input(wrt: Any, call: dict[str, Any], sentence: str, hint: str) -> None:
     with pytest.raises(UsageError) as caught:
         hsdsl.load(OSCILLATOR).sensitivity(wrt, **call)
     assert sentence in str(caught.value)

@@ -27,7 +27,7 @@ HS_INLINE void evaluate_block(const hs_sampling *s, const hs_place *at, const do
   const int w = s->width;
   const double length = at->end - at->begin;
   double u[BLOCK], y[BLOCK];
-  int known = 0; /* whether u is */
+  for (int q = 0; q < count; q++) u[q] = (time[q] - at->begin) / length;
   for (int k = 0; k < s->columns; k++, out += s->samples) {
     const int place = at->column[k];
     const double *const c = place < 0 ? 0 : at->c + place, x = place < 0 ? NAN : at->x[place];
@@ -37,9 +37,6 @@ HS_INLINE void evaluate_block(const hs_sampling *s, const hs_place *at, const do
       for (int q = 0; q < count; q++) out[q] = x + 0.0;
       continue;
     }
-    if (!known)
-      for (int q = 0; q < count; q++) u[q] = (time[q] - at->begin) / length;
-    known = 1;
     for (int q = 0; q < count; q++) y[q] = c[top * w];
     for (int m = top - 1; m >= 0; m--)
       for (int q = 0; q < count; q++) y[q] = c[m * w] + u[q] * y[q];
