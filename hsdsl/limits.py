@@ -33,7 +33,7 @@ class Limits:
     memory : int
         Bytes of the rows that a run keeps, and of samples.
     compile : float
-        Seconds for the C compiler to make one library; on Linux those that other programs take do not count.
+        Seconds for the C compiler to make one library; on Linux of processor time while it runs.
     folders : tuple of Path
         Where data files may lie besides the model's own folder.
     """

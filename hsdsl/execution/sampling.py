@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 
@@ -135,18 +136,18 @@ def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] 
     return Samples.deferred(_LATER, states=states, outputs=names, state_columns=found.states, _source=source)
 
 
-class _Source(NamedTuple):
+class _Source:
     """What columns of samples are made of on first use."""
 
-    execution: Execution
-    found: Evaluated
-    side: Side
+    def __init__(self, execution: Execution, found: Evaluated, side: Side) -> None:
+        self.execution, self.found = execution, found
+        self.side: Side = side
 
     @staticmethod
     def of(samples: Samples) -> _Source:
         return samples.__dict__["_source"]
 
-    @property
+    @cached_property
     def arcs(self) -> Array:
         """Which arc each time is in."""
         return _arcs(self.execution, find(self.execution, self.found.times, self.side)[0])
@@ -166,7 +167,7 @@ def _table(samples: Samples) -> ArcTable:
 
 
 _LATER: dict[str, Callable[[Samples], Array]] = {
-    "time": lambda samples: _Source.of(samples).found.times,
+    "time": lambda samples: _Source.of(samples).found.times.copy(),  # which its owner may change
     "mode": lambda samples: _by_arc(samples, _table(samples).mode),
     "jump": lambda samples: _by_arc(samples, _table(samples).jump),
     "kind": lambda samples: _by_arc(samples, _table(samples).kind),

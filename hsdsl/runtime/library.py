@@ -28,7 +28,7 @@ GIVEN_UP = "given-up"  # entries for models that took too long to compile: the s
 
 
 LOOP = '#include "library.c"\n', "hs_simulate"  # its text and symbol
-EFFORT: Effort = "-O1"  # of models: -O2 compiles 1.5 times as long, for code that is a hundredth faster
+EFFORT: Effort = "-O1"  # of models and exports: -O2 compiles 1.5 times as long, for code that is a hundredth faster
 OF_LOOP: Effort = "-O2"  # which is compiled when the package is installed: its runs are 5 to 7 % faster
 _OPTIONS = " ".join((EFFORT, OF_LOOP, *FLAGS))
 

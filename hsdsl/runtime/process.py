@@ -19,7 +19,8 @@ from typing import IO
 from hsdsl import interrupts
 
 PATIENCE = 5.0  # seconds without a question
-SHORTEST_LOOK = 0.1
+LOOK = 0.5  # seconds in which a command that runs has the processor at least once
+MOST_TIMES_LONGER = 20
 TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100  # of a second of processor time
 MOST_PRINTED = 1 << 16  # bytes that are kept of what a command prints
 _running: dict[subprocess.Popen[bytes], Path] = {}
@@ -53,9 +54,7 @@ def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, respond
     try:
         for command in commands:
             begun.append(_begin(command, folder))
-        codes = [
-            _wait(each.process, each.listener, max(0.0, seconds - (monotonic() - began)), responds) for each in begun
-        ]
+        codes = [_wait(each, _patiences(each.process.pid, began, seconds, responds)) for each in begun]
     finally:
         for each in begun:
             _end(each.process)
@@ -91,40 +90,41 @@ def _begin(command: Sequence[str], folder: Path) -> _Begun:
     return _Begun(process, listener, printed)
 
 
-def _wait(
-    process: subprocess.Popen[bytes], listener: Thread, seconds: float, responds: Callable[[], bool]
-) -> int | None:
+def _wait(begun: _Begun, patiences: Iterator[float]) -> int | None:
     """Wait for the end of what a command says, which comes at its own end and needs no looking again and again."""
-    for patience in _patiences(process.pid, seconds, responds):
+    for patience in patiences:
         end = monotonic() + patience
-        listener.join(patience)
+        begun.listener.join(patience)
         with suppress(subprocess.TimeoutExpired):
-            return process.wait(max(0.0, end - monotonic()))
+            return begun.process.wait(max(0.0, end - monotonic()))
     return None
 
 
-def _patiences(group: int, seconds: float, responds: Callable[[], bool]) -> Iterator[float]:
-    """Give how long to wait for a command each time."""
-    first = min(seconds, PATIENCE)
-    yield first
-    if first < seconds:
-        if not responds():
+def _patiences(group: int, began: float, seconds: float, responds: Callable[[], bool]) -> Iterator[float]:
+    """Give how long to wait for a command each time; where its time is over, as long as it still runs for less."""
+    yield max(0.0, began + min(seconds, PATIENCE) - monotonic())
+    if seconds > PATIENCE and not responds():
+        return
+    yield max(0.0, began + seconds - monotonic())
+    used = processor_time(group)
+    for _ in range(MOST_TIMES_LONGER):
+        if used >= seconds:
             return
-        yield seconds - first
-    while (more := kept_waiting(group, seconds)) > 0:
-        yield max(more, SHORTEST_LOOK)
+        yield LOOK
+        before, used = used, processor_time(group)
+        if used <= before:  # it waits for something else, or nobody knows
+            return
+        yield max(0.0, seconds - used)
 
 
-def kept_waiting(group: int, seconds: float) -> float:
-    """How many of so many seconds the processes of a group that still run have not had the processor; 0 if unknown."""
-    used, runs = 0.0, False
+def processor_time(group: int) -> float:
+    """Processor seconds of the processes of a group, and of their children that have ended; 0 where not on Linux."""
+    used = 0
     for path in Path("/proc").glob("[0-9]*/stat"):
         with suppress(OSError):  # it has ended
-            state, _, its_group, *others = path.read_text().rpartition(")")[2].split()
-            if int(its_group) == group:
-                used += sum(map(int, others[8:12])) / TICKS  # its own and that of children that have ended
-                runs = runs or state == "R"
-    return max(0.0, seconds - used) if runs else 0.0
+            _, _, its_group, *others = path.read_bytes().rpartition(b")")[2].split()
+            used += sum(map(int, others[8:12])) if int(its_group) == group else 0
+    return used / TICKS
 
 
 def _listen(stream: IO[bytes], printed: list[bytes]) -> None:

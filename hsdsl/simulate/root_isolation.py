@@ -111,7 +111,7 @@ def rises(c: Coefficients, level: Number, start: Number, tiny: Number) -> Number
 def last_root(c: Coefficients, start: Number, end: Number, tiny: Number, b: list[Number]) -> Number | None:
     """Find the last point in [start, end] where the polynomial rises through 0, knowing that it is positive at ``end``.
 
-    None where it is positive all the way; ``b`` are its Bernstein coefficients on [0, 1].
+    None where it is positive all the way; ``b`` are the Bernstein coefficients of ``c`` on [0, 1].
     """
     one = end * 0 + 1
     if end < 1:

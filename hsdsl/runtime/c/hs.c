@@ -201,7 +201,7 @@ static hs_run open_run(hs_task *task) {
   run.control.order = task->method->order;
   run.control.failed_at = NAN;
   run.control.implicit = is_implicit(task->method);
-  run.steps_to_poll = run.poll_steps = 128;
+  run.steps_to_poll = run.poll_steps = 32;
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
   for (int i = 0; i < run.model->states; i++) run.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;

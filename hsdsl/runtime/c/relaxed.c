@@ -83,13 +83,14 @@ static void poll(hs_run *run) {
   if (run->task->poll(run->task)) run->interrupted = 1;
 }
 #else
-/* Ask the caller now and then whether to go on, of a short run never; a clock costs more than many steps, so how many
-   lie between is learnt. */
+/* Ask the caller now and then whether to go on, of a run of a few steps never; a clock costs more than many steps, so
+   how many lie between is learnt. */
 static void poll(hs_run *run) {
   const clock_t now = clock();
-  if (!run->polled) run->polled = now;
+  const int first = !run->polled;
+  if (first) run->polled = now;
   const int early = now - run->polled < POLL_EVERY;
-  if (early) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
+  if (early && !first) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
   if (now - run->polled > 4 * POLL_EVERY) run->poll_steps = run->poll_steps / 8 + 1;
   run->steps_to_poll = run->poll_steps;
   if (early) return;

@@ -78,7 +78,7 @@ HS_INLINE hs_real value_at_end(const hs_real *c, int n) {
 static int changes(const hs_real *b, int n) {
   int count = 0, before = 0;
   for (int i = 0; i <= n; i++) {
-    const int sign = (b[i] > 0) - (b[i] < 0);
+    const int sign = (b[i] > 0) - !(b[i] >= 0);
     count += sign * before < 0;
     before = sign ? sign : before;
   }
@@ -169,11 +169,12 @@ static hs_real refined(const hs_real *c, int n, hs_real a, hs_real b) {
   return a;
 }
 
-/* Find the last point in [start, end] where the polynomial rises through 0, knowing that it is positive at `end`: 1;
-   0 where it is positive all the way. `reduced` by its factor s, its Bernstein coefficients have the same signs. */
+/* Find the last point in [start, end] where a polynomial rises through 0, knowing that it is positive at `end`: 1; 0
+   where it is positive all the way. The polynomial is c, of degree n; where `reduced`, c over its factor s, whose
+   Bernstein coefficients are n / k times those of c behind the first, b_k. They have the signs of these. */
 static int last_root(hs_run *run, const hs_real *c, int n, int reduced, hs_real start, hs_real end, hs_real *root) {
   hs_cut *const cuts = run->cuts;
-  const hs_real *const own = bernstein_of(run, c, n) + reduced, degree = n;
+  const hs_real *const own = bernstein_of(run, c, n) + reduced, degree = n; /* of c */
   int open = 1;
   c += reduced, n -= reduced;
   if (start == 0 && end == 1 && own[0] <= 0 && 0 < own[n] && changes(own, n) <= 1)
