@@ -90,7 +90,7 @@ def report(rows: list[tuple[Attempt, Judgement, Timed]]) -> None:
     """Print the least times at which a target is met."""
     print(f"{'error':>7} {'ours/us':>9} {'by hand':>9} {'ratio':>7}  relaxation, rest and tolerances of these")
     for target in TARGETS:
-        (ours, by), (hand, by_hand) = (
+        (time, setting), (time_by_hand, setting_by_hand) = (
             min(
                 (timed.spread[0] * 1e6, f"{attempt.tool.scheme} {attempt.value:.1e}")
                 for attempt, judgement, timed in rows
@@ -98,7 +98,7 @@ def report(rows: list[tuple[Attempt, Judgement, Timed]]) -> None:
             )
             for hand in (False, True)
         )
-        print(f"{target:7.0e} {ours:9.1f} {hand:9.1f} {ours / hand:7.2f}  {by}; {by_hand}")
+        print(f"{target:7.0e} {time:9.1f} {time_by_hand:9.1f} {time / time_by_hand:7.2f}  {setting}; {setting_by_hand}")
 
 
 if __name__ == "__main__":

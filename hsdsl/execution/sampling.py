@@ -147,6 +147,11 @@ class _Source:
     def of(samples: Samples) -> _Source:
         return samples.__dict__["_source"]
 
+    @property
+    def table(self) -> ArcTable:
+        """The arcs as columns."""
+        return self.execution.arc_table
+
     @cached_property
     def arcs(self) -> Array:
         """Which arc each time is in."""
@@ -158,20 +163,12 @@ class _Source:
         return values if names == known else values[:, [known.index(name) for name in names]]
 
 
-def _by_arc(samples: Samples, of_arcs: Array) -> Array:
-    return of_arcs[_Source.of(samples).arcs]
-
-
-def _table(samples: Samples) -> ArcTable:
-    return _Source.of(samples).execution.arc_table
-
-
 _LATER: dict[str, Callable[[Samples], Array]] = {
     "time": lambda samples: _Source.of(samples).found.times.copy(),  # which its owner may change
-    "mode": lambda samples: _by_arc(samples, _table(samples).mode),
-    "jump": lambda samples: _by_arc(samples, _table(samples).jump),
-    "kind": lambda samples: _by_arc(samples, _table(samples).kind),
-    "present": lambda samples: _by_arc(samples, _table(samples).present(samples.states)),
+    "mode": lambda samples: (of := _Source.of(samples)).table.mode[of.arcs],
+    "jump": lambda samples: (of := _Source.of(samples)).table.jump[of.arcs],
+    "kind": lambda samples: (of := _Source.of(samples)).table.kind[of.arcs],
+    "present": lambda samples: (of := _Source.of(samples)).table.present(samples.states)[of.arcs],
     "output_columns": lambda samples: _Source.of(samples).outputs(samples.outputs),
 }
 

@@ -31,7 +31,7 @@ class Sampled:
     def __init__(self, library: ctypes.CDLL, compiled: CompiledModel, timeline: Any) -> None:
         self.table = structures.Sampling(model=structures.address(ctypes.pointer(compiled.table)), timeline=timeline)
         self.scratch = 2 * compiled.table.width
-        self.run, self.where = library.hs_sample_record, ctypes.addressof(self.table)
+        self.evaluate, self.address = library.hs_sample_record, ctypes.addressof(self.table)
         self._kept = compiled, timeline
         self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
 
@@ -98,13 +98,14 @@ class Sampler:
             At a jump take the value before the first transition.
         states : sequence of str
         outputs : int
+            How many outputs.
         """
         n, k, shared, layout = len(times), len(states), self._sampled, self._layout
         room = n * (1 + k + outputs)
         memory = np.empty(room + shared.scratch)
         memory[:n] = times
-        outside = shared.run(
-            shared.where,
+        outside = shared.evaluate(
+            shared.address,
             self._columns.record,
             None if layout is None else layout.ctypes.data,
             *shared.columns(self._kinds, states),
