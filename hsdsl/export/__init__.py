@@ -39,7 +39,7 @@ TARGETS = {
 
 
 DOCUMENTS = ("latex", "mermaid")  # targets that do not run
-OF_PARTS = ("c", "fmi2", "fmi3", "latex", "mermaid", "web")  # targets that keep systems of parts
+OF_PARTS = ("c", "fmi2", "fmi3", "latex", "mermaid", "rust", "web")  # targets that keep systems of parts
 
 
 def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:

@@ -9,10 +9,10 @@ from hsdsl.export.source import Source
 from hsdsl.integrators import AUTO, INTEGRATORS, ButcherTableau
 
 
-def explicit(source: Source, target: str, scheme: str | None = None) -> tuple[Source, ButcherTableau]:
+def explicit(source: Source, target: str) -> tuple[Source, ButcherTableau]:
     """The source with an explicit method, and its table: where `auto` is Taylor's method, `AUTO` in its place.
 
-    ``scheme`` is the target's own. Raises UsageError: the target cannot keep the scheme or the method.
+    Raises UsageError: the target cannot keep the scheme or the method.
     """
     settings = source.problem.settings
     method = settings.method
@@ -26,5 +26,4 @@ def explicit(source: Source, target: str, scheme: str | None = None) -> tuple[So
     if method.kind != "table" and settings.method_chosen is None:
         raise UsageError(f"{target} has the methods {known}, not {method.name}", f"--method {AUTO}")
     table = method if method.kind == "table" else INTEGRATORS[AUTO]
-    settings = replace(settings, method=table, scheme=scheme or settings.scheme)
-    return replace(source, problem=source.problem.with_settings(settings)), table
+    return replace(source, problem=source.problem.with_settings(replace(settings, method=table))), table

@@ -18,14 +18,12 @@ def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:
     return found
 
 
-def mode_definitions(mode: ModeProgram, terms: bool = False) -> dict[str, ast.FunctionDef]:
-    """The routines of a mode, ``terms`` on request; gradients, resets, spreads have all states."""
+def mode_definitions(mode: ModeProgram) -> dict[str, ast.FunctionDef]:
+    """The routines of a mode; gradients, resets, spreads have all states."""
     found, n = definitions(mode.routines), len(mode.states)
-    if terms and mode.terms:
-        found |= definitions(mode.terms)
     states, sizes = [f"x{i}" for i in range(n)], [f"s{i}" for i in range(n)]
     for name, definition in found.items():
-        names = ["t", *states, *(sizes if name.startswith(("spread", "terms")) else [])]
+        names = ["t", *states, *(sizes if name.startswith("spread") else [])]
         definition.args = ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
     for k, places in enumerate(mode.slopes):
         _fill(found[f"gradient_{k}"], places, [_name("q_0_1")] * (n + 1))

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
-from shutil import which
 from typing import Any
 
 import pytest
 from export.octave import OCTAVE, evaluated, exported
-
-from hsdsl.export import files_of, source_of, write
 
 NAN = float("nan")
 
@@ -109,33 +104,5 @@ fprintf('\\n');
 """
 
 
-def by_rust(model: Any, folder: Path, **arguments: Any) -> Outcome:
-    """A crate for Rust."""
-    write(files_of(source_of(model, arguments), "rust"), folder, force=True)
-    *lines, last = cargo(folder, "run", "-q", "--example", "transitions").splitlines()
-    made = list[Made]()
-    for line in lines:
-        _, time, resumed, rest = line.split(" ", 3)
-        edge, _, after = rest.rpartition(" [")
-        made.append(Made(edge, float(time), float(resumed), numbers(after)))
-    reason, time, rest = last.split(" ", 2)
-    stop = "".join(f"_{c.lower()}" if c.isupper() else c for c in reason)[1:]
-    return Outcome(made, stop, float(time), numbers(rest.rpartition(" [")[2]))
-
-
-def numbers(text: str) -> list[float]:
-    """The numbers of a vector that Rust prints, without its first bracket."""
-    return [float(word) for word in text.rstrip("]").split(", ") if word]
-
-
-def cargo(crate: Path, *words: str) -> str:
-    """What cargo prints; crates are built once, and not debugged."""
-    environment = {**os.environ, "CARGO_NET_OFFLINE": "true", "RUSTFLAGS": "-D warnings"}
-    environment |= {"CARGO_INCREMENTAL": "0", "CARGO_PROFILE_DEV_DEBUG": "0"}
-    made = subprocess.run(["cargo", *words], cwd=crate, env=environment, capture_output=True, text=True)
-    assert made.returncode == 0, made.stderr
-    return made.stdout
-
-
-OF_TOOLS = {"matlab": OCTAVE, "rust": which("cargo")}
-BY: dict[str, Callable[..., Outcome]] = {"jax": by_jax, "matlab": by_octave, "rust": by_rust}
+OF_TOOLS = {"matlab": OCTAVE}
+BY: dict[str, Callable[..., Outcome]] = {"jax": by_jax, "matlab": by_octave}

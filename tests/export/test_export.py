@@ -106,10 +106,9 @@ def test_initial_values_of_exports_follow_those_that_are_given(initial):
         assert known == {name: float(run.sample([0])[name][0]) for name in ("x", "y", "z")}
 
 
-@pytest.mark.parametrize("target", ["jax", "rust"])
-def test_initial_values_keep_their_expressions_in_any_order(target):
+def test_initial_values_keep_their_expressions_in_any_order():
     """The file has z, x, y, and the mode x, y, z; what the call gives stays a number."""
-    files = files_of(source_of(hsdsl.loads(USING), {"initial": {"y": 5}}), target)
+    files = files_of(source_of(hsdsl.loads(USING), {"initial": {"y": 5}}), "jax")
     assert any(b"[found[1], 5.0, found[0]]" in content for content in files.values())
 
 

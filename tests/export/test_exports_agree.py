@@ -25,11 +25,9 @@ FIXED = {"method": "rk4", "step": "1/64", **MOST}
 SETTINGS: dict[str, dict[str, Any]] = {
     "located": {"scheme": "located", **FIXED},
     "relaxed": {"scheme": "relaxed", **FIXED, "step": 0.017, "relaxation": 3e-4},
-    "adaptive": {"scheme": "relaxed", "method": "dopri5", **MOST},
 }
-# within what times agree, relative to the run; a crate's digits are the engine's
-WITHIN = {"jax": {"located": 1e-9, "relaxed": 1e-9}, "matlab": {"located": 1e-9, "relaxed": 1e-9},
-          "rust": {"relaxed": 0.0, "adaptive": 0.0}}  # fmt: skip
+# within what times agree, relative to the run
+WITHIN = {"jax": {"located": 1e-9, "relaxed": 1e-9}, "matlab": {"located": 1e-9, "relaxed": 1e-9}}
 APART: dict[str, dict[str, dict[str, str]]] = yaml.safe_load((HERE / "apart.yaml").read_text(encoding="utf-8"))
 
 

@@ -461,7 +461,7 @@ def test_what_parts_do_not_have_yet_is_said(what, tmp_path):
         "stream": lambda: model.stream(tmp_path / "rows.csv"),
         "point": lambda: model.distance("a=on b=on a.T=20 b.T=20", "a=on b=on a.T=20 b.T=20"),
         "complete": model.completed,
-        "export": lambda: files_of(source_of(model, {}), "rust"),
+        "export": lambda: files_of(source_of(model, {}), "jax"),
     }
     with pytest.raises(hsdsl.UsageError, match=r"systems? of parts"):
         calls[what]()

@@ -1,21 +1,21 @@
-"""A model as a crate for Rust without its standard library: routines generated, the relaxed loop by hand.
+"""A model as a crate for Rust without its standard library: the program in C that `export.c` writes, and a safe API.
 
 A test in the crate compares it with the transitions that hsdsl makes with the same settings.
 """
 
 from __future__ import annotations
 
+import hashlib
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from hsdsl.backends.c.source import width
-from hsdsl.export.explicit import explicit
+from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.identifiers import identifiers
 from hsdsl.export.parameters import structural
-from hsdsl.export.rust.language import array, literal, string
-from hsdsl.export.rust.model import model_text
+from hsdsl.export.rust.model import literal, model_text, string
 from hsdsl.export.source import Source
-from hsdsl.integrators import ButcherTableau
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel, runtime
 from hsdsl.simulate import prepare
@@ -26,30 +26,19 @@ MOST = 100  # transitions; of longer runs these are enough
 def expected_text(source: Source) -> str:
     """The text of ``tests/expected/mod.rs``."""
     problem, settings = source.problem, source.problem.settings
-    program = problem.program
     most = min(MOST, settings.max_transitions)
-    limited = problem.with_settings(replace(settings, max_transitions=most))
-    run = prepare(limited, _compiled(source)).simulate()
-    modes = program.mode_names
-    rows: list[str] = []
-    for made in run.transitions:
-        mode = modes.index(made.source)
-        after = [0.0] * width(program)
-        for i, value in enumerate((made.after or {}).values()):
-            after[i] = float(value)
-        resumed = float("nan") if made.resumed is None else float(made.resumed)
-        entry = "true" if made.entry else "false"
-        states = array(map(literal, after))
-        edge = string(made.edge)  # an event is several edges of its name
-        rows.append(f"    ({literal(float(made.time))}, {literal(resumed)}, {mode}, {edge}, {entry}, {states}),\n")
-    reason = "".join(word.title() for word in run.stop.reason.split("_"))
-    comments = "".join(f"// {line}\n" for line in source.heading)
+    run = prepare(problem.with_settings(replace(settings, max_transitions=most)), _compiled(source)).simulate()
+    rows = "".join(
+        f"    ({literal(float(made.time))}, {literal(float('nan' if made.resumed is None else made.resumed))}, "
+        f"{string(made.edge)}, {'true' if made.entry else 'false'}),\n"
+        for made in run.transitions
+    )
     return (
-        f"{comments}use hybrid::model::W;\n\n/// Time, when flow went on, mode, edge, on entry, state behind it.\n"
-        "pub type Expected = (f64, f64, usize, &'static str, bool, [f64; W]);\n\n"
-        f"pub const MOST: usize = {most};\npub const REASON: &str = {string(reason)};\n"
+        f"{_comment('//', source)}\n/// Time, when flow went on, edge, on entry.\n"
+        "pub type Expected = (f64, f64, &'static str, bool);\n\n"
+        f"pub const MOST: u64 = {most};\npub const REASON: &str = {string(run.stop.reason)};\n"
         f"pub const END: f64 = {literal(float(run.stop.time))};\n"
-        f"pub static TRANSITIONS: &[Expected] = &[\n{''.join(rows)}];\n"
+        f"pub static TRANSITIONS: &[Expected] = &[\n{rows}];\n"
     )
 
 
@@ -76,39 +65,79 @@ RESERVED = frozenset(
 def files(source: Source) -> dict[str, bytes]:
     """All files of the crate.
 
-    Raises UsageError: a method that it cannot keep.
+    Raises UsageError: the C runtime has no such scheme.
     """
-    source, table = explicit(source, "rust", "relaxed")
     name = identifiers([source.name.lower()], RESERVED)[source.name.lower()]
-    parts = sorted(path for path in CRATE.rglob("*.rs"))
-    texts = {path.relative_to(CRATE).as_posix(): path.read_text(encoding="utf-8") for path in parts}
+    parts = {path.relative_to(CRATE).as_posix(): path.read_text(encoding="utf-8") for path in CRATE.rglob("*.*")}
+    c = {f"c/{path}": content.decode() for path, content in c_sources(source, tunable=True).items()}
+    own = f"{name}_{_digest(c)}"
+    names = {"@PREFIX@": own, "@EXACT@": ",\n    ".join(f'"{flag}"' for flag in EXACT_FLAGS)}
+    texts = {path: _filled(text, names) for path, text in parts.items() if path.endswith((".rs", ".c"))} | c
+    texts["c/prefix.h"] = _prefixes(texts, own)
     texts["Cargo.toml"] = _manifest(source, name)
-    texts["README.md"] = _readme(source, table)
-    texts["src/model.rs"] = model_text(source, table)
+    texts["README.md"] = _readme(source)
+    texts["src/model.rs"] = model_text(source)
     texts["tests/expected/mod.rs"] = expected_text(source)
     return {name: texts[name].encode() for name in sorted(texts)}
 
 
+def _filled(text: str, names: Mapping[str, str]) -> str:
+    for name, value in names.items():
+        text = text.replace(name, value)
+    return text
+
+
+def _digest(texts: Mapping[str, str]) -> str:
+    return hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:16]
+
+
+def _prefixes(texts: Mapping[str, str], own: str) -> str:
+    """Other names for all that is not static, so that one program can have several models, of several versions."""
+    runtime = {path: text for path, text in texts.items() if path.startswith("c/runtime/")}
+    loop = _functions("HS_EXPORT [^;{]*?", (text for path, text in runtime.items() if path.endswith(".h")))
+    instance = _functions("", [texts["c/instance.h"]])
+    shim = _functions("", [texts["c/shim.c"]], "hybrid")
+    problem = {"hs_the_model", "hybrid_words", *re.findall(r"\bproblem_\w+", texts["c/problem.h"])}
+    named = {**dict.fromkeys(loop, f"hs_{_digest(runtime)}"), **dict.fromkeys(instance | shim | problem, own)}
+    return "".join(f"#define {name} {prefix}_{name}\n" for name, prefix in sorted(named.items()))
+
+
+def _functions(before: str, texts: Iterable[str], family: str = "hs") -> set[str]:
+    """The functions that begin lines of C, ``before`` between the type and the name."""
+    pattern = re.compile(rf"^(?!static|typedef){before or '[a-z][^;(#=]*?'}[ *]({family}_\w+)\(", re.MULTILINE)
+    return {name for text in texts for name in pattern.findall(text)}
+
+
+def _comment(mark: str, source: Source) -> str:
+    return "".join(f"{mark} {line}\n" for line in source.heading)
+
+
 def _manifest(source: Source, name: str) -> str:
-    comments = "".join(f"# {line}\n" for line in source.heading)
     return (
-        f'{comments}\n[package]\nname = "{name}"\nversion = "0.1.0"\nedition = "2018"\nrust-version = "1.56"\n'
-        'publish = false\n\n[lib]\nname = "hybrid"\n\n[workspace]\n'
+        f'{_comment("#", source)}\n[package]\nname = "{name}"\nversion = "0.1.0"\nedition = "2018"\n'
+        'rust-version = "1.56"\npublish = false\n\n[lib]\nname = "hybrid"\n\n'
+        '[features]\ndefault = ["std"]\nstd = []\n\n[workspace]\n'
     )
 
 
-def _readme(source: Source, table: ButcherTableau) -> str:
+def _readme(source: Source) -> str:
     settings = source.problem.settings
+    assert settings.method is not None
     heading = "".join(f"    {line}\n" for line in source.heading)
     decide = structural(source.problem)
     fixed = ", ".join(name for name in source.problem.program.parameters if name in decide)
-    kept = f"Fixed, since times of inputs depend on them:\n\n    {fixed}\n\n" if fixed else ""
+    kept = f"\nFixed, since times of inputs depend on them:\n\n    {fixed}\n" if fixed else ""
     return (
         f"A hybrid system in Rust\n=======================\n\n{heading}\n"
-        f"It runs the scheme relaxed with {table.name}, {source.size}, relaxation {settings.relaxation}.\n\n"
+        f"It runs the scheme {settings.scheme} with {settings.method.name}, {source.size}.\n\n"
         "    cargo test                        compare with the transitions of hsdsl\n"
-        "    cargo run --example transitions   print the transitions\n\n"
+        "    cargo run --example transitions   print the run as JSON\n\n"
         "`hybrid::simulate` runs from parameters, settings, a mode and a state; a `Sink` takes rows and transitions.\n"
-        "The crate is `no_std`, allocates nothing, and calls functions such as `sin` of the C library.\n"
+        "The loop is that of hsdsl, in C, below `c`. `build.rs` needs a compiler with the options of gcc, which `CC`\n"
+        "names (else `cc`), and `ar` (or what `AR` names); for another target `CC_x86_64_unknown_linux_gnu` and the\n"
+        "like come first. There are no other dependencies.\n\n"
+        "The crate is `no_std`, and memory is given by the caller. The feature `std`, on by default, allocates where\n"
+        "a chain of transitions enters more than 64 modes at an instant. Without it such a run ends with\n"
+        "`Interrupted`.\n"
         f"{kept}"
     )

@@ -122,7 +122,7 @@ int hs_tune(hs_instance *instance) {
   if (problem_derive(instance->parameters)) return 1;
   for (int i = 0; i < PROBLEM_PARAMETERS; i++) {
     if (!hs_finite(instance->parameters[i])) return 1;
-    for (int64_t k = 0; k < instance->timeline.segments; k++)
+    for (int64_t k = 0; k < PROBLEM_SEGMENTS; k++)
       instance->data[k * PROBLEM_DATA + i] = instance->parameters[i];
   }
   return 0;
@@ -162,6 +162,17 @@ int hs_advance(hs_instance *instance, hs_time until, int changed, int after_jump
 const hs_real *hs_state(const hs_instance *instance, int *dimension) {
   *dimension = instance->pause.dimension;
   return instance->pause_numbers;
+}
+
+const hs_real *hs_landing(const hs_instance *instance, const hs_transition_written *written, hs_real *x) {
+  const hs_transition *made = written->made;
+  const hs_edge *edge = &hs_the_model.mode[made->mode].edge[made->edge];
+  const hs_timeline *timeline = &instance->timeline;
+  int64_t k = timeline->segments - 1;
+  if (written->after) return written->after;
+  while (k > 0 && made->time < timeline->start[k]) k--;
+  const hs_real *p = timeline->data + k * PROBLEM_DATA, *before = written->before;
+  return hs_changed(edge, edge->reset, p, made->time, before, before, x) ? before : x;
 }
 
 /* Why no step leads on: where a state changes faster than time can tell, it grows beyond all numbers. */

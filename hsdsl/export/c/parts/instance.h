@@ -100,6 +100,9 @@ int hs_advance(hs_instance *instance, hs_time until, int changed, int after_jump
    flow was entered with. */
 const hs_real *hs_state(const hs_instance *instance, int *dimension);
 
+/* Where a transition leads, also one whose run ended before it was made; to `x` where it was not written. */
+const hs_real *hs_landing(const hs_instance *instance, const hs_transition_written *written, hs_real *x);
+
 /* A word for why the run ended. */
 const char *hs_stop_word(const hs_stop *stop);
 

@@ -1,6 +1,7 @@
 /* Run the exported model and print its transitions as JSON, every digit of every number. */
 
 #include <stdio.h>
+#include <string.h>
 
 #include "hs_math.h"
 #include "instance.h"
@@ -64,7 +65,8 @@ static void print_states(const char *key, const char *const *name, const hs_real
   int printed = 0;
   printf(", \"%s\": {", key);
   for (int s = 0; s < count; s++)
-    if (has_state(s, x)) print_item(!printed++, name[s], x[s]);
+    if (has_state(s, x) && !strchr(name[s], '@')) /* in names of what events remember, and in no others */
+      print_item(!printed++, name[s], x[s]);
   printf("}");
 }
 
@@ -72,18 +74,6 @@ static void print_outputs(const hs_real *outputs) {
   printf(", \"outputs\": {");
   for (int i = 0; i < PROBLEM_OUTPUTS; i++) print_item(!i, problem_output[i], outputs[i]);
   printf("}");
-}
-
-/* Where a transition leads, also one whose run ends before it is made. */
-static const hs_real *landing(const hs_transition_written *written, hs_real *x) {
-  const hs_transition *made = written->made;
-  const hs_edge *edge = &hs_the_model.mode[made->mode].edge[made->edge];
-  const hs_timeline *timeline = &instance.timeline;
-  int64_t k = timeline->segments - 1;
-  if (written->after || !PROBLEM_PARTS) return written->after;
-  while (k > 0 && made->time < timeline->start[k]) k--;
-  hs_changed(edge, edge->reset, timeline->data + k * PROBLEM_DATA, made->time, written->before, written->before, x);
-  return x;
 }
 
 static int print_transition(void *context, const hs_transition_written *written) {
@@ -101,7 +91,7 @@ static int print_transition(void *context, const hs_transition_written *written)
   printf(", \"from\": \"");
   print_mode(made->mode, written->before);
   printf("\", \"to\": \"");
-  print_mode(edge->target, landing(written, x));
+  print_mode(edge->target, hs_landing(&instance, written, x));
   putchar('"');
   print_states("before", problem_state[made->mode], written->before, mode->dimension);
   if (written->after) {

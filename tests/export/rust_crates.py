@@ -1,0 +1,80 @@
+"""Crates for Rust, built and run. The loop in C is compiled once for all of them: it is the same in every crate."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from shutil import which
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import pytest
+from export.c_builds import exported
+
+from hsdsl.model import Model
+from hsdsl.report import as_json
+
+CARGO = which("cargo")
+needs_cargo = [pytest.mark.tools, pytest.mark.skipif(CARGO is None, reason="there is no cargo")]
+
+
+def needs_tools(test: Any) -> Any:
+    """A test that runs cargo."""
+    for mark in needs_cargo:
+        test = mark(test)
+    return test
+
+
+# a compiler that looks an object up by the text that is compiled
+COMPILER = """\
+import hashlib, os, pathlib, shutil, subprocess, sys
+words, kept = sys.argv[1:], pathlib.Path(__file__).parent
+call = lambda words: subprocess.run(["cc", *words], capture_output=True, check=True).stdout
+if "c/runtime/hs.c" not in words:
+    sys.exit(subprocess.run(["cc", *words]).returncode)
+at = words.index("-o")
+rest = words[:at] + words[at + 2 :]
+text = call([word for word in rest if word != "-c"] + ["-E", "-P"])
+found = kept / hashlib.sha256(repr(rest).encode() + text).hexdigest()
+if not found.exists():
+    call([*words[: at + 1], f"{found}.{os.getpid()}", *words[at + 2 :]])
+    os.replace(f"{found}.{os.getpid()}", found)
+shutil.copy(found, words[at + 1])
+"""
+
+
+@cache
+def _objects() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="hsdsl-objects-")
+
+
+@cache
+def compiler() -> str:
+    """The words of a compiler that compiles the loop once."""
+    script = Path(_objects().name) / "cc.py"
+    script.write_text(COMPILER)
+    return f"{sys.executable} {script}"
+
+
+def cargo(crate: Path, *words: str) -> str:
+    """What cargo prints; crates are built once, and not debugged."""
+    environment = {**os.environ, "CARGO_NET_OFFLINE": "true", "RUSTFLAGS": "-D warnings", "CC": compiler()}
+    environment |= {"CARGO_INCREMENTAL": "0", "CARGO_PROFILE_DEV_DEBUG": "0", "CFLAGS": "-Wall -Wextra -Werror"}
+    made = subprocess.run(["cargo", *words], cwd=crate, env=environment, capture_output=True, text=True)
+    assert made.returncode == 0, made.stderr
+    return made.stdout
+
+
+def assert_prints(folder: Path, model: Model, **arguments: Any) -> Any:
+    """A run and what its crate prints, which must be equal: transitions, the end, and the last state."""
+    run = as_json(model.simulate(**arguments, engine="c"))
+    crate = exported(model, folder, "rust", **arguments)
+    found = json.loads(cargo(crate, "run", "-q", "--example", "transitions"))
+    assert found["transitions"] == run["transitions"]
+    assert found["stop"] == {key: run["stop"][key] for key in ("reason", "time")}
+    assert found["final"] == {key: run["final"][key] for key in ("mode", "state", "outputs")}
+    return found
