@@ -23,11 +23,11 @@ _INCLUDE = re.compile(r'^#include "(.+)"', re.MULTILINE)
 EXACT_FLAGS = tuple(flag for flag in FLAGS if flag.startswith(("-ffp-", "-fno-math-", "-fno-builtin-")))
 
 
-def c_sources(source: Source, tunable: bool = False) -> dict[str, bytes]:
+def c_sources(source: Source, tunable: bool = False, *further: str) -> dict[str, bytes]:
     """The files by their paths: ``model.c`` and ``problem.[ch]`` generated, ``instance.[ch]`` and ``runtime/``.
 
-    With ``tunable`` parameters and initial values can be changed, and take memory for that.
-
+    With ``tunable`` parameters and initial values can be changed, and take memory for that. ``further`` are other
+    files of `parts`.
 
     Raises UsageError: the runtime has no such scheme.
     """
@@ -39,7 +39,7 @@ def c_sources(source: Source, tunable: bool = False) -> dict[str, bytes]:
         "problem.h": header(source, tunable),
         "problem.c": numbers(source),
     }
-    parts = {path.name: path.read_text() for path in sorted(PARTS.glob("instance.[ch]"))}
+    parts = {name: (PARTS / name).read_text() for name in ("instance.c", "instance.h", *further)}
     runtime = {f"runtime/{name}": text for name, text in sorted(_included(["hs.c"], {**files, **parts}).items())}
     return {name: text.encode() for name, text in {**files, **parts, **runtime}.items()}
 

@@ -69,7 +69,7 @@ def files(source: Source) -> dict[str, bytes]:
     """
     name = identifiers([source.name.lower()], RESERVED)[source.name.lower()]
     parts = {path.relative_to(CRATE).as_posix(): path.read_text(encoding="utf-8") for path in CRATE.rglob("*.*")}
-    c = {f"c/{path}": content.decode() for path, content in c_sources(source, tunable=True).items()}
+    c = {f"c/{path}": content.decode() for path, content in c_sources(source, True, "given.h").items()}
     own = f"{name}_{_digest(c)}"
     names = {"@PREFIX@": own, "@EXACT@": ",\n    ".join(f'"{flag}"' for flag in EXACT_FLAGS)}
     texts = {path: _filled(text, names) for path, text in parts.items() if path.endswith((".rs", ".c"))} | c

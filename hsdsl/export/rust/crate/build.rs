@@ -18,7 +18,7 @@ fn main() {
     compiler.extend(["-O2", "-fPIC", "-DHS_NO_CLOCK", "-Ic", "-Ic/runtime", "-include", "c/prefix.h"].map(String::from));
     compiler.extend(EXACT.iter().map(|flag| flag.to_string()));
     if env::var_os("CARGO_FEATURE_STD").is_some() {
-        compiler.push("-DHYBRID_STD".to_string());
+        compiler.push("-DHS_GROWS".to_string());
     }
     compiler.extend(tool("CFLAGS", ""));
     let objects: Vec<PathBuf> = SOURCES.iter().map(|name| out.join(name.replace('/', "_")).with_extension("o")).collect();
