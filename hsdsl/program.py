@@ -209,7 +209,7 @@ class ModeProgram:
     ``jacobian`` gives the derivatives of the flow by the states; only implicit methods need it.
 
     ``terms`` has one routine, ``terms``, called like a spread, for the size of the terms that each derivative of a flow
-    that jumps is computed from; None where the flow does not jump.
+    is computed from; None where the last digits of states and time tell it: where no terms hide, and none jump.
 
     ``affine`` says whether every surface is an affine function of time and the states: its gradient is the same
     everywhere.

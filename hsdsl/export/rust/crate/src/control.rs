@@ -10,6 +10,7 @@ const ALMOST: f64 = 1.0 - 1.0 / 1073741824.0;
 const LEAST: f64 = 0.2;
 const MOST: f64 = 5.0;
 const SHARE: f64 = 32.0;
+const NOISE_UNITS: f64 = 64.0;
 const BLUR_UNITS: f64 = 4.0;
 const PARALLEL: f64 = 1e-6;
 const MOST_REJECTIONS: u32 = 2000;
@@ -106,6 +107,7 @@ impl<S> Run<'_, S> {
     fn resolved(&self, h: f64, scales: &State) -> Option<State> {
         let n = self.dimension;
         let (mut slope, mut moved, mut lifted) = ([0.0; W], *scales, [false; W]);
+        let share = max(SHARE, max(self.settings.tolerance, 0.0) / (NOISE_UNITS * UNIT));
         if self.flow(self.t, &self.x, &mut slope) {
             return None;
         }
@@ -114,7 +116,7 @@ impl<S> Run<'_, S> {
             let mut further = false;
             for s in 0..n {
                 let length = h * least[s];
-                if !(finite(length) && length > SHARE * scales[s]) {
+                if !(finite(length) && length > share * scales[s]) {
                     continue;
                 }
                 moved[s] = max(moved[s], length);
@@ -126,7 +128,7 @@ impl<S> Run<'_, S> {
             }
         }
         for s in 0..n {
-            moved[s] = max(scales[s], moved[s] / SHARE);
+            moved[s] = max(scales[s], moved[s] / share);
         }
         Some(moved)
     }
