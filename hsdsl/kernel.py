@@ -90,7 +90,7 @@ class Kernel(Protocol):
         ...
 
     def terms(self, mode: int, data: Sequence[Number]) -> Routine | None:
-        """Return the sizes of the terms of a mode's flow, by time, states and their sizes; None if it does not jump."""
+        """Return the sizes of the terms of a mode's flow, by time, states and their sizes; None if last digits tell."""
         ...
 
     def expressions(self, mode: int, data: Sequence[Number]) -> Sequence[tuple[str, Routine]]:

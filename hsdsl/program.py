@@ -12,10 +12,11 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Literal
+from typing import Any, Literal
 
 from hsdsl.parts import Part
 from hsdsl.sparsity import Elimination, Variation, elimination, variation
@@ -94,6 +95,12 @@ class SampledInput:
     times: tuple[Fraction, ...] | None
     values: tuple[Fraction, ...] | None
     sloped: bool = False
+
+
+def in_order(hold: Hold, times: Sequence[Any], k: int) -> bool:
+    """Whether sample k may follow those before it: later, or at the same time as one of an input with ramps, a jump."""
+    again = hold == "linear" and times[k] == times[k - 1] and not (k > 1 and times[k - 2] == times[k])
+    return times[k - 1] < times[k] or again
 
 
 @dataclass(frozen=True)
@@ -202,7 +209,7 @@ class ModeProgram:
     ``jacobian`` gives the derivatives of the flow by the states; only implicit methods need it.
 
     ``terms`` has one routine, ``terms``, called like a spread, for the size of the terms that each derivative of a flow
-    that jumps is computed from; None where the flow does not jump.
+    is computed from; None where the last digits of states and time tell it: where no terms hide, and none jump.
 
     ``affine`` says whether every surface is an affine function of time and the states: its gradient is the same
     everywhere.

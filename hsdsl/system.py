@@ -15,6 +15,7 @@ from collections.abc import Callable, Container, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Literal
 
 import sympy as sp
@@ -74,6 +75,13 @@ class SampledInput:
     def __post_init__(self) -> None:
         if len(self.times) != len(self.values) or not self.times:
             raise ValueError(f"input {self.name}: as many times as values, at least one")
+
+    @property
+    def jump_times(self) -> tuple[Fraction | sp.Expr, ...]:
+        """The times at which it jumps: of an input with ramps, where it has two samples at one time."""
+        if self.hold == "zero":
+            return self.times
+        return tuple(a for a, b in pairwise(self.times) if a == b)
 
 
 @dataclass(frozen=True)

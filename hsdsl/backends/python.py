@@ -125,7 +125,7 @@ class PythonKernel:
         return spread_out(routine, program.jacobian.places, len(program.states) ** 2, self.arithmetic.zero)
 
     def terms(self, mode: int, data: Sequence[Number]) -> Routine | None:
-        """Return the sizes of the terms of a mode's flow; None if it does not jump."""
+        """Return the sizes of the terms of a mode's flow; None if last digits tell them."""
         routines = self._program.flows[mode].terms
         return None if routines is None else self._compiled(mode, routines, data)
 

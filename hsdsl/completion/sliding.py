@@ -159,10 +159,10 @@ def _thrown(system: HybridSystem, r: sp.Expr, leave_a: Edge, leave_b: Edge, leas
 
     They go before those that put it on the surface.
     """
-    given = {symbol(each.name): each.hold for each in system.inputs}
+    given = {symbol(each.name): bool(each.jump_times) for each in system.inputs}
     known = {TIME, *given, *system.parameter_symbols}
     switched = (e for e in r.atoms(*JUMPING) if e.free_symbols <= known and e.free_symbols & {TIME, *given})
-    if not any(given.get(x) == "zero" for x in r.free_symbols) and not any(switched):
+    if not any(given.get(x) for x in r.free_symbols) and not any(switched):
         return []
     found: list[Edge] = []
     for edge, beyond in ((leave_a, -r - least), (leave_b, r - least)):

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
 from fractions import Fraction
-from itertools import pairwise
+from math import nan
 from typing import Any
 
 from hsdsl.elaborate.symbols import Meanings, SymbolTable
@@ -17,11 +18,14 @@ from hsdsl.errors import Diagnostic, Span
 from hsdsl.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.files import DataRefused
 from hsdsl.names import closest, counted, did_you_mean, is_identifier, shown
+from hsdsl.program import Hold, in_order
 from hsdsl.schema import InputFile, InputSamples
 from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import SampledInput
 
-_STEP = "for a step leave out the first of the two: with `hold: zero`, the default, values step at their times"
+_STEP = "for a step leave out the first of the two; with `hold: linear` both count, as a jump between two ramps"
+_THIRD = "at a jump give two: the value before it and the one behind it"
+_EARLIER = "give each time once, the earliest first"
 _MOST_FAULTS = 10  # of one file: a wrong column would bury everything else
 _NUMBER = re.compile(r"[+-]?(?:[0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})(?:[eE][+-]?[0-9]{1,3})?")
 
@@ -75,12 +79,18 @@ def _inline(symbols: SymbolTable, name: Key, entry: InputSamples, scope: Scope) 
         return None
     if times is None or values is None:
         return None
-    for (before, after), scalar in zip(pairwise(times), entry.times[1:], strict=True):
-        if before.constant and after.constant and not before.number < after.number:
+    known = [time.number if time.constant else nan for time in times]
+    for k, scalar in enumerate(entry.times):
+        if k > 0 and times[k].constant and times[k - 1].constant and not in_order(entry.hold, known, k):
             message = f"the times of the input '{name}' do not increase here"
-            hint = _STEP if before.number == after.number else "give each time once, the earliest first"
-            symbols.report(scalar.place, "HS310", message, hint)
+            symbols.report(scalar.place, "HS310", message, _order_hint(entry.hold, known, k))
     return tuple(map(_exact, times)), tuple(map(_exact, values))
+
+
+def _order_hint(hold: Hold, times: Sequence[Any], k: int) -> str:
+    """What to write where sample k does not follow those before it."""
+    same = _STEP if hold == "zero" else _THIRD
+    return same if times[k] == times[k - 1] else _EARLIER
 
 
 def _exact(value: Value) -> Any:
@@ -102,7 +112,7 @@ def read_samples(symbols: SymbolTable, name: Key, entry: InputFile) -> Samples |
     except UnicodeDecodeError:
         symbols.report(file.place, "HS312", f"the file '{shown(file.value)}' is not UTF-8 text")
         return None
-    table = _Table(str(symbols.files.folder / file.value), lines)
+    table = _Table(str(symbols.files.folder / file.value), lines, entry.hold)
     table.read(name if column is None else column.value.strip(), file.value if column is None else None)
     for diagnostic in table.faults:
         symbols.resolver.findings.add(diagnostic)
@@ -134,8 +144,9 @@ def _header(line: str) -> list[str]:
 class _Table:
     """The samples of a comma-separated table, and its faults."""
 
-    def __init__(self, path: str, lines: list[str]) -> None:
+    def __init__(self, path: str, lines: list[str], hold: Hold) -> None:
         self.path, self.lines = path, lines
+        self.hold: Hold = hold
         self.times: list[Fraction] = []
         self.values: list[Fraction] = []
         self.faults: list[Diagnostic] = []
@@ -168,8 +179,9 @@ class _Table:
         time, value = self.cell(number, cells, at), self.cell(number, cells, own)
         if time is None or value is None:
             return
-        if self.times and time <= self.times[-1]:
-            hint = _STEP if time == self.times[-1] else None
+        times = [*self.times[-2:], time]
+        if self.times and not in_order(self.hold, times, len(times) - 1):
+            hint = _order_hint(self.hold, times, len(times) - 1)
             self.fault(number, _start(cells, at), len(cells[at]), "the times do not increase here", hint)
             return
         self.times.append(time)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 class Derivatives:
     """What implicit steps know of a mode's flow besides its values.
 
-    ``scales`` are those of the states, which grow along the run; ``terms`` is that of a flow that jumps;
+    ``scales`` are those of the states, which grow along the run; ``terms`` is that of a mode;
     ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode; ``varied`` says which states are
     derivatives of others, whose errors may be larger where they do not last for the time ``soon``.
     """

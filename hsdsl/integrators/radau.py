@@ -142,7 +142,8 @@ class Steps:
         """The scales of the states over the step last tried; ``closer``, with a look at the terms of the flow."""
         if closer and self._tried is not None:
             with suppress(*DOMAIN_ERRORS):
-                self._scales = resolved(*self._tried, self._largest, self._rows, self._arithmetic, self._of.terms)
+                tried, rows, terms = self._tried, self._rows, self._of.terms
+                self._scales = resolved(*tried, self._largest, rows, self._arithmetic, self._tolerance, terms)
                 lifted = any(a > s for a, s in zip(self._scales, self._largest, strict=True))
                 self._floors = list(self._scales) if lifted else []
         return self._scales

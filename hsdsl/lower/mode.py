@@ -18,7 +18,7 @@ from hsdsl.lower.ordering import ordering
 from hsdsl.lower.routines import Definition, print_routines
 from hsdsl.lower.straight import Gradient
 from hsdsl.lower.tape import make_tape
-from hsdsl.lower.terms import Terms
+from hsdsl.lower.terms import Terms, may_hide
 from hsdsl.system import TIME, Edge, Mode
 
 _NAN = symbol("nan")
@@ -86,7 +86,8 @@ class LoweredMode:
             derived=mode.derived,
             **others,
         )
-        return replace(program, terms=self._terms()) if program.jumps else program
+        bounded = program.jumps or may_hide(self.flow, self.arguments)
+        return replace(program, terms=self._terms()) if bounded else program
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
         """Whether a surface is affine in time and the states, also where the modes of parts choose what it is."""

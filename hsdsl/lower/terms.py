@@ -8,13 +8,49 @@ the branch that it is on.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import sympy as sp
 
 from hsdsl.functions import absolute, below, floor, maximum, minimum, rebuilt, sign
 from hsdsl.lower.sharing import Statement, shared
 from hsdsl.lower.straight import Cut
+
+_CONSTANT, _SEEN, _HIDDEN = range(3)
+
+
+def may_hide(expressions: Iterable[sp.Expr], moving: Collection[sp.Symbol]) -> bool:
+    """Whether terms of a sum may cancel, unseen by what the last digits of states and time change in it.
+
+    These change a product of states by as much as its last digits are. They do not change a constant, and hardly the
+    cosine of a small angle. One such term of a sum is no harm: what cancels it is as large, and seen.
+    """
+    kinds: dict[sp.Basic, int] = {}
+
+    def kind(expr: sp.Basic) -> int:
+        if expr not in kinds:
+            parts = [kind(part) for part in expr.args]
+            kinds[expr] = _kind(expr, parts) if any(parts) else _SEEN if expr in moving else _CONSTANT
+        return kinds[expr]
+
+    def _kind(expr: sp.Basic, parts: list[int]) -> int:
+        if expr.is_Add and len(parts) - parts.count(_SEEN) > 1:
+            raise _Hides
+        if expr.is_Mul:
+            return _SEEN if _SEEN in parts else _HIDDEN
+        alone = isinstance(expr, (absolute, sp.sin, sp.sinh)) or (expr.is_Pow and expr.exp.is_Number)
+        return _SEEN if parts[0] == _SEEN and (alone or (expr.is_Add and set(parts) == {_SEEN})) else _HIDDEN
+
+    try:
+        for expr in expressions:
+            kind(expr)
+    except _Hides:
+        return True
+    return False
+
+
+class _Hides(Exception):
+    """A sum has two terms whose last digits are not seen."""
 
 
 class Terms:

@@ -76,7 +76,10 @@ class ParameterEntry(Document):
 
 
 Parameter = Annotated[AsExpression | Annotated[ParameterEntry, Tag("<mapping>")], Discriminator(_mapping_or_not)]
-_HOLD = "Between samples: `zero` keeps the last sample's value, `linear` joins them by straight lines."
+_HOLD = (
+    "Between samples: `zero` keeps the last sample's value, `linear` joins them by straight lines. "
+    "With `linear` two samples at one time are a jump."
+)
 
 
 class InputSamples(Document):

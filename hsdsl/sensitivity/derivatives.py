@@ -54,7 +54,8 @@ class Derivatives:
     def _differentiate(self, given: SampledInput) -> None:
         """Add the derivatives of an input: by time along its pieces, and by each target where its samples move."""
         times, values = ([sp.sympify(v) for v in column] for column in (given.times, given.values))
-        rises = [(b - a) / (t - s) for a, b, s, t in zip(values, values[1:], times, times[1:], strict=False)]
+        pairs = zip(values, values[1:], times, times[1:], strict=False)
+        rises = [sp.S.Zero if s == t else (b - a) / (t - s) for a, b, s, t in pairs]  # 0 of a jump, which has no piece
         if given.hold == "linear":
             name = derivative_name(given.name, "t")
             self._rises[given.name] = self._pieces(name, times, [sp.S.Zero, *rises, sp.S.Zero])
@@ -74,7 +75,7 @@ class Derivatives:
     def _moving_line(self, name: str, times, rises, shifts, lifts) -> sp.Expr:
         """The derivative, by a target, of straight lines between samples whose times move: lines that jump."""
         bends = [
-            ((b - a) - rise * (d - c)) / (t - s)
+            sp.S.Zero if s == t else ((b - a) - rise * (d - c)) / (t - s)
             for a, b, c, d, s, t, rise in zip(
                 lifts, lifts[1:], shifts, shifts[1:], times, times[1:], rises, strict=False
             )
@@ -85,7 +86,9 @@ class Derivatives:
 
     def _pieces(self, name: str, times, values) -> sp.Expr:
         """A number that stays the same between times: one value before the first, one from each of them on."""
-        return self._add(name, "zero", [times[0] - 1, *times], values)
+        times = [times[0] - 1, *times]
+        last = [k for k, (a, b) in enumerate(zip(times, [*times[1:], None], strict=True)) if a != b]
+        return self._add(name, "zero", [times[k] for k in last], [values[k] for k in last])
 
     def _add(self, name: str, hold, times, values) -> sp.Expr:
         if not any(values):
@@ -99,7 +102,7 @@ class Derivatives:
     def _check_jumps(self) -> None:
         """Refuse jumps of time whose times move with a target."""
         for given in self.system.inputs:
-            if given.hold == "zero" and any(slopes(map(sp.sympify, given.times), self.moving)):
+            if any(slopes(map(sp.sympify, given.jump_times), self.moving)):
                 raise _refusal(f"the sample times of input {given.name}")
         _, switches = with_switches(self.system)
         meaning = {name: argument for (_, argument), name in switches.arguments.items()}

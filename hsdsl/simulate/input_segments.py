@@ -1,7 +1,8 @@
 """Inputs over time: the segments between samples and between switches of time, each a boundary no step may cross.
 
 On a segment a sampled input is a line ``a + b (t - c)`` and a switch a number, so every stage of a step sees the values
-of the step's own open interval, and the stage at its right end takes the left limit. Where an input jumps at the end of
+of the step's own open interval, and the stage at its right end takes the left limit. Two samples at one time are a jump
+between two lines. Where an input jumps at the end of
 the run, a last segment of no length has the values behind the jump.
 """
 
@@ -10,12 +11,12 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import accumulate, pairwise
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, TIE, Number
 from hsdsl.errors import UsageError
 from hsdsl.kernel import Kernel
-from hsdsl.program import Program, SampledInput
+from hsdsl.program import Program, SampledInput, in_order
 
 BEHIND = 4  # ties of time behind the end of a run, where inputs have the values behind a jump at the end
 
@@ -23,8 +24,9 @@ BEHIND = 4  # ties of time behind the end of a run, where inputs have the values
 class UnorderedTimes(UsageError):
     """Sample ``k`` of an input, counted from 0, is not behind the sample before it."""
 
-    def __init__(self, message: str, name: str = "", k: int = 0) -> None:
-        super().__init__(message, "give each time once, the earliest first")
+    def __init__(self, message: str, name: str = "", k: int = 0, ramps: bool = False) -> None:
+        times = "no time more than twice" if ramps else "each time once"
+        super().__init__(message, f"give {times}, the earliest first")
         self.name, self.k = name, k
 
 
@@ -60,6 +62,7 @@ def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number]
     """
     samples = [_samples(i, given, kernel, parameters) for i, given in enumerate(program.inputs)]
     zero = kernel.arithmetic.zero
+    jumps = [_jumps(*both) for both in samples]
     cuts = sorted({zero} | {t for times, _ in samples for t in times if zero < t < until})
     ends = [*cuts[1:], until]
     if until > 0:
@@ -67,13 +70,13 @@ def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number]
     segments: list[Segment] = []
     held_before: tuple[Number, ...] = ()
     for start, end in zip(cuts, ends, strict=True):
-        lines = [
-            _line(given, times, values, start if start < until else until + TIE * until)
-            for given, (times, values) in zip(program.inputs, samples, strict=True)
-        ]
+        place = start if start < until else until + TIE * until
+        last = [bisect_right(times, place) - 1 for times, _ in samples]
+        lines = [_line(given, *both, k) for given, both, k in zip(program.inputs, samples, last, strict=True)]
         both = list(zip(program.inputs, lines, strict=True))
         held = tuple(a for given, (a, _, _) in both if given.hold == "zero")
         held += tuple(slope for given, (_, slope, _) in both if given.sloped)
+        held += tuple(made[max(0, k)] for made, k in zip(jumps, last, strict=True))
         data = (*parameters, *(number for line in lines for number in line), *(zero for _ in program.switches))
         segments.append(Segment(start, end, data, jump=bool(segments) and held != held_before))
         held_before = held
@@ -125,17 +128,22 @@ def _samples(
     if not all(map(kernel.arithmetic.isfinite, (*times, *values))):
         raise UsageError(f"input {given.name} has a sample that is not finite")
     for k, (a, b) in enumerate(pairwise(times), start=1):
-        if not a < b:
+        if not in_order(given.hold, times, k):
             message = f"the sample times of input {given.name} do not increase: {b} after {a}"
-            raise UnorderedTimes(message, given.name, k)
+            raise UnorderedTimes(message, given.name, k, given.hold == "linear")
     return times, values
 
 
+def _jumps(times: tuple[Number, ...], values: tuple[Number, ...]) -> tuple[int, ...]:
+    """For each sample how many jumps between two samples at one time there are up to it."""
+    both = zip(pairwise(times), pairwise(values), strict=True)
+    return tuple(accumulate((int(s == t and a != b) for (s, t), (a, b) in both), initial=0))
+
+
 def _line(
-    given: SampledInput, times: tuple[Number, ...], values: tuple[Number, ...], t: Number
+    given: SampledInput, times: tuple[Number, ...], values: tuple[Number, ...], k: int
 ) -> tuple[Number, Number, Number]:
-    """Return (a, b, c) of the segment from t on; constant before the first and after the last sample."""
-    k = bisect_right(times, t) - 1
+    """Return (a, b, c) of the segment behind sample k; constant before the first and after the last sample."""
     still = values[0] * 0
     if k < 0:
         return values[0], still, times[0]

@@ -30,7 +30,7 @@ def error_ratio(
             scales = method.scales(True)
         else:
             terms = run.kernel.terms(here.flow, here.segment.data)
-            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic, terms)
+            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic, control.tolerance, terms)
     except DOMAIN_ERRORS:
         return ratio
     ratio = control.ratio(h, error, z, scales, had)

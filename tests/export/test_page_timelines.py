@@ -52,8 +52,22 @@ CASES = {
         "v: {times: [1, 5 + a, 7 + a], values: [a, b, c], hold: linear}",
         "u + v + floor(t/(5 + a)) + sign(t - 5 - a) + abs(t - a - 5) + floor(a*t)",
     ),
+    "ramps that jump": (
+        "u: {times: [0, 1, 1, 2.5, 2.5, 4], values: [1, -1, b, b, c, a], hold: linear}, "
+        "v: {times: [-1, -1, a, a, 5 + a, 5 + a, 9 + a], values: [0, a, b, c, c, d, b], hold: linear}, "
+        "w: {times: [0, 2, 2, 5 + a, 5 + a], values: [1, 2, 2, 1, 0], hold: linear}",
+        "u + v + w",
+    ),
     "of inputs": (f"{SAMPLED.replace('HOLD', 'linear')}", "abs(u) + sign(u - c*t) + min(u, floor(a*t))"),
 }
+
+
+# a mode beside `on`, so that it slides along a ramp: there its kinks are jumps
+SLIDES = """modes:
+  on: {flow: {x: -1}, transitions: [{when: x <= u, to: off}]}
+  off: {flow: {x: 1}, transitions: [{when: x >= u, to: on}]}
+"""
+CASES["a ramp to slide along"] = (f"{SAMPLED.replace('HOLD', 'linear')}", SLIDES)
 
 
 def timeline_numbers(problem: Problem) -> list[float]:
@@ -67,7 +81,9 @@ def timeline_numbers(problem: Problem) -> list[float]:
 @pytest.mark.parametrize("name", CASES)
 def test_segments_are_those_of_a_run(name: str, tmp_path: Path) -> None:
     inputs, flow = CASES[name]
-    model = hsdsl.loads(f"{HEAD}inputs: {{{inputs}}}\n{MODES.replace('FLOW', flow)}\n{TAIL}")
+    modes = flow if flow is SLIDES else MODES.replace("FLOW", flow)
+    end = TAIL.replace("a}", "a, completion: auto}") if flow is SLIDES else TAIL
+    model = hsdsl.loads(f"{HEAD}inputs: {{{inputs}}}\n{modes}\n{end}")
     source = source_of(model, {})
     texts = {"main.c": MAIN.encode(), "page_numbers.h": page_numbers(source.problem).encode()}
     texts |= {part: (PARTS / part).read_bytes() for part in ("page.h", "timeline.c")}

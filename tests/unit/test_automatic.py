@@ -90,6 +90,94 @@ experiment: {until: 10}
     assert settings.method.name == "radau" and "fast is stiff" in settings.method_chosen
 
 
+# flights between transitions or samples, of so many times of the fastest decay, and the method
+FLIGHTS = {
+    "a thermostat": (
+        """
+modes:
+  heat: {flow: {T: 5*(30 - T)}, transitions: [{when: T >= 21, to: cool}]}
+  cool: {flow: {T: 5*(10 - T)}, transitions: [{when: T <= 19, to: heat}]}
+initial: {mode: heat, T: 15}
+""",
+        "taylor",
+    ),
+    "a thermostat that starts beyond its band": (
+        """
+modes:
+  heat: {flow: {T: 5*(30 - T)}, transitions: [{when: T >= 21, to: cool}]}
+  cool: {flow: {T: 5*(10 - T)}, transitions: [{when: T <= 19, to: heat}]}
+initial: {mode: heat, T: 25}
+""",
+        "taylor",
+    ),
+    "a slow thermostat with a fast sensor": (
+        """
+modes:
+  heat: {flow: {T: (30 - T)/5, s: 1e3*(T - s)}, transitions: [{when: s >= 21, to: cool}]}
+  cool: {flow: {T: (10 - T)/5, s: 1e3*(T - s)}, transitions: [{when: s <= 19, to: heat}]}
+initial: {mode: heat, T: 15, s: 15}
+""",
+        "radau",
+    ),
+    "a clock that samples before anything has decayed": (
+        """
+modes:
+  run: {flow: {x: u - x, u: 0}, transitions: [{when: since >= 8, to: run, reset: {u: 1 - x/2}}]}
+initial: {mode: run, x: 0, u: 1}
+""",
+        "taylor",
+    ),
+    "a clock that samples when all has decayed": (
+        """
+modes:
+  run: {flow: {x: 1000*(u - x), u: 0}, transitions: [{when: since >= 8, to: run, reset: {u: 1 - x/2}}]}
+initial: {mode: run, x: 0, u: 1}
+""",
+        "radau",
+    ),
+    "samples of an input before anything has decayed": (
+        """
+inputs: {u: {times: [k for], values: [v for]}}
+modes: {run: {flow: {x: u - x}}}
+initial: {mode: run, x: 0}
+""",
+        "taylor",
+    ),
+    "samples of an input when all has decayed": (
+        """
+inputs: {u: {times: [k for], values: [v for]}}
+modes: {run: {flow: {x: 100*(u - x)}}}
+initial: {mode: run, x: 0}
+""",
+        "radau",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FLIGHTS)
+def test_a_mode_is_stiff_by_what_decays_within_a_flight(name: str) -> None:
+    text, method = FLIGHTS[name]
+    times, values = [str(8 * k) for k in range(500)], [str(k % 3) for k in range(500)]
+    text = text.replace("k for", ", ".join(times)).replace("v for", ", ".join(values))
+    run = hsdsl.loads(f"hsdsl: 1{text}experiment: {{until: 4000, tolerance: 1e-6}}").simulate()
+    assert run.stop.complete and run.method == method
+
+
+def test_a_decay_that_follows_time_is_seen_under_way() -> None:
+    """A clock beside it: at the start the run has no size, and nothing counts as straight."""
+    text = """
+hsdsl: 1
+modes:
+  run: {flow: {x: sin(t/1e4) - x, n: 0}, transitions: [{when: since >= 1000, to: run, reset: {n: n + 1}}]}
+initial: {mode: run, x: 0, n: 0}
+experiment: {until: 3e5, tolerance: 1e-6}
+"""
+    run = hsdsl.loads(text).simulate()
+    assert run.method == "radau" and run.final["n"] == 300
+    lag = (np.sin(30) - np.cos(30) * 1e-4) / (1 + 1e-8)
+    assert run.final["x"] == pytest.approx(lag, abs=1e-6)
+
+
 def test_a_fixed_step_and_digits_are_not_looked_into() -> None:
     model = made(*CASES["a fast decay to a slow curve"][:3])
     assert prepared(model, step=1e-3).method.name == "dopri5"

@@ -230,7 +230,7 @@ class Dynamics:
     @cached_property
     def held(self) -> frozenset[Any]:
         """The inputs that jump at their samples."""
-        return self.inputs - self._moving
+        return frozenset(symbol(given.name) for given in self.system.inputs if given.jump_times)
 
     @cached_property
     def _moving(self) -> frozenset[Any]:

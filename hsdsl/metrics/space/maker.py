@@ -94,7 +94,7 @@ class _Maker:
         )
         result = values[0]
         for before, after, low, high in zip(times, times[1:], values, values[1:], strict=False):
-            if given.hold == "zero":
+            if given.hold == "zero" or before == after:
                 result += (high - low) * (1 + functions.sign(TIME - after)) / 2
             else:
                 ramp = functions.absolute(TIME - before) - functions.absolute(TIME - after) + after - before

@@ -112,7 +112,7 @@ typedef struct {
   hs_sparse jacobian;      /* of the flow by the states, row by row */
   const hs_elimination *elimination; /* 0 where implicit steps solve dense systems */
   int affine;              /* whether every surface's gradient is the same everywhere */
-  hs_routine *terms;       /* the sizes of the terms of a flow that jumps; 0 of another */
+  hs_routine *terms;       /* the sizes of the terms of a flow; 0 where last digits tell */
   const int *state;        /* for each state its number among those of all modes */
   int held;                /* index of the mode with motion along its guards, behind the modes; -1 for none */
   int measures;            /* states whose slopes at the end of an implicit step go into the states before the last */

@@ -4,6 +4,8 @@
 #include "functions.h"
 
 #define SHARE 32
+#define NOISE_UNITS 64
+#define ITERATED 1024
 #define BLUR_UNITS 4 /* BLUR there */
 
 #if !defined(HS_FLOAT32)
@@ -56,7 +58,7 @@ static int flow_terms(hs_run *run, hs_time t, const hs_real *x, const hs_real *s
   return 0;
 }
 
-/* The same by a bound on them, of a flow that jumps. */
+/* The same by a bound on them, of a flow whose terms jump or may hide. */
 static int bounded_terms(const hs_run *run, hs_time t, const hs_real *x, const hs_real *moved, hs_real *found) {
   const int n = run->here.dimension;
   copy(run->both, x, n);
@@ -77,6 +79,7 @@ static hs_real own_derivative(const hs_run *run, const hs_real *rows, int s) {
    by, to run->resolved. `rows` are the derivatives of the flow, or 0. Not 0 where the flow has no value nearby. */
 static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const hs_real *rows) {
   const int n = run->here.dimension;
+  const hs_real share = hs_max(SHARE, hs_max(run->control.tolerance, 0) / ((rows ? ITERATED : NOISE_UNITS) * HS_UNIT));
   hs_real *const moved = run->resolved, *const least = run->least;
   if (run->here.table->flow(run->here.p, t, x, run->unmoved)) return 1;
   for (int s = 0; s < n; s++) moved[s] = run->scales[s], run->lifted[s] = 0;
@@ -88,13 +91,13 @@ static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const h
     for (int s = 0; s < n; s++) {
       hs_real size = h * least[s];
       if (rows) size = size / (1 + h * fabs(own_derivative(run, rows, s)));
-      if (!(hs_finite(size) && size > SHARE * run->scales[s])) continue;
+      if (!(hs_finite(size) && size > share * run->scales[s])) continue;
       moved[s] = hs_max(moved[s], size);
       further |= !run->lifted[s];
       run->lifted[s] = 1;
     }
     if (!further) break;
   }
-  for (int s = 0; s < n; s++) moved[s] = hs_max(run->scales[s], moved[s] / SHARE);
+  for (int s = 0; s < n; s++) moved[s] = hs_max(run->scales[s], moved[s] / share);
   return 0;
 }

@@ -125,6 +125,27 @@ static int jumps_close(const hs_view *v, const hs_transition *made) {
   return here + 1 < timeline->segments && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late;
 }
 
+/* How high a surface rises behind a crossing at (t, x), at this rate, until it turns back at a kink of an input;
+   infinite above `enough`. Moves v->z and v->slope, and where the mode is bound. */
+static double height_behind(hs_view *v, int k, double t, const double *x, double rate, double enough) {
+  const hs_timeline *const timeline = v->s->timeline;
+  double height = 0.0;
+  for (int i = 0; i < v->n; i++) v->z[i] = x[i];
+  for (int64_t there = segment_at(timeline, t); there + 1 < timeline->segments; there++) {
+    const double end = timeline->end[there], late = end - t;
+    height = height + rate * late;
+    if (height >= enough) break;
+    bind(v, v->mode, there);
+    if (v->table->flow(v->p, t, v->z, v->slope)) return 0.0;
+    for (int i = 0; i < v->n; i++) v->z[i] = v->z[i] + late * v->slope[i];
+    bind(v, v->mode, there + 1);
+    t = end;
+    if (v->table->rates[k](v->p, t, v->z, &rate)) return 0.0;
+    if (!(rate > 0)) return height;
+  }
+  return INFINITY;
+}
+
 /* How often the error fits into what keeps a crossing, at the end of the arc. */
 static void screen_crossing(hs_view *v, int64_t j, int flown) {
   hs_screen *const s = v->s;
@@ -132,7 +153,7 @@ static void screen_crossing(hs_view *v, int64_t j, int flown) {
   const double t = made->time, *x = s->run.before + j * s->model->width;
   const int64_t step = v->segment, row = v->last - 1;
   hs_near_surface found;
-  double bend = 0.0, rate;
+  double bend = 0.0, height = INFINITY, rate;
   bind(v, v->mode, segment_at(s->timeline, t));
   s->crossed++;
   int bad = evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope) ||
@@ -150,13 +171,14 @@ static void screen_crossing(hs_view *v, int64_t j, int flown) {
       bad = v->table->rates[made->edge](v->p, middle, v->z, &rate);
       if (!bad && t > middle) bend = fabs(found.rate - rate) / (t - middle);
     }
+    if (!bad) height = height_behind(v, made->edge, t, x, found.rate, SAFE * found.error);
   }
   bind(v, v->mode, step);
   if (bad) {
     s->undecided |= BIT(HS_CROSSING);
     return;
   }
-  const double depth = bend > 0 ? found.rate * found.rate / (2 * bend) : INFINITY;
+  const double depth = hs_min(bend > 0 ? found.rate * found.rate / (2 * bend) : INFINITY, height);
   const double margin = found.error > 0 ? depth / found.error : INFINITY;
   if (!(margin >= SAFE)) s->crossing[j] |= HS_CROSSING_UNDECIDED;
   s->slowest = hs_min(s->slowest, found.rate);

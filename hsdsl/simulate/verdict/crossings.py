@@ -1,7 +1,7 @@
 """Is each transition transversal, and could an error have made its condition another?
 
 Where a surface rises at the rate a and bends by b, an error that moves it by d leaves it crossed while d is below
-a**2 / (2 abs(b)): that depth is the margin.
+a**2 / (2 abs(b)): that depth is the margin. Where it turns back at a kink of an input, its height there is one as well.
 """
 
 from __future__ import annotations
@@ -63,7 +63,25 @@ def _margin(run: RunView, place: Place, k: int, arc: Arc | None, made: Transitio
         before = run.dense_output(arc, arc.last - 1)((run.arithmetic.zero + 1) / 2)
         bend = abs(rate - before.rate(k)) / (place.t - before.t) if place.t > before.t else bend
     depth = rate * rate / (2 * bend) if bend > 0 else run.arithmetic.zero + float("inf")
+    depth = min(depth, _height(run, place, k, SAFE * shift))
     return depth / shift if shift > 0 else run.arithmetic.zero + float("inf")
+
+
+def _height(run: RunView, place: Place, k: int, enough: Number) -> Number:
+    """How high a surface rises behind a crossing until it turns back at a kink of an input; infinite above enough."""
+    timeline, height, rate = run.problem.timeline, run.arithmetic.zero, place.rate(k)
+    while timeline.goes_on(segment := timeline.at(place.t)):
+        late = segment.end - place.t
+        height = height + rate * late
+        if height >= enough:
+            break
+        slope = place.kernel.flow(place.t, *place.x)
+        x = tuple(a + late * f for a, f in zip(place.x, slope, strict=True))
+        place = run.place(place.mode.name, segment.end, x)
+        rate = place.rate(k)
+        if not rate > 0:
+            return height
+    return height + float("inf")
 
 
 def _findings(

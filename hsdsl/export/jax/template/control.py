@@ -12,7 +12,7 @@ from .surfaces import UNIT
 SAFETY, LEAST, MOST = 0.9, 0.2, 5.0
 ALMOST = 1 - 2.0**-30
 MOST_HALVINGS, CREEPING_HALVINGS, MOST_CREEPING, IDLE_UNITS, MOST_IDLE = 122, 10, 2000, 64, 64
-MOST_REJECTIONS, STRETCH, NOTHING, SHARE, BLUR_UNITS = 2000, 1e-3, 2.0**-960, 32, 4
+MOST_REJECTIONS, STRETCH, NOTHING, SHARE, NOISE_UNITS, BLUR_UNITS = 2000, 1e-3, 2.0**-960, 32, 64, 4
 MOVES = 2, -2, 6, -6
 
 
@@ -38,7 +38,7 @@ def error_ratio(model, config, lane, flow, h, error, z):
     looks = (ratio > 1) & (lane.closer | (lane.t == lane.failed_at))
 
     def look(state):
-        found = resolved(model, flow, lane.t, h, lane.x, had)
+        found = resolved(model, config, flow, lane.t, h, lane.x, had)
         return False, jnp.where(looks, ratio_to(config, lane, h, error, z, found, had), state[1])
 
     _, closer = lax.while_loop(lambda state: state[0], look, (looks, ratio))
@@ -48,18 +48,19 @@ def error_ratio(model, config, lane, flow, h, error, z):
     return lane, closer
 
 
-def resolved(model, flow, t, h, x, scales):
+def resolved(model, config, flow, t, h, x, scales):
     """Scales, none below a share of what the terms of the flow could move the state by in a step."""
     slope, moved, places = flow(t, x), scales, jnp.arange(model.W + 1)
+    share = jnp.maximum(SHARE, config.tolerance / (NOISE_UNITS * UNIT))
     for _ in range(model.W):
         change = jnp.zeros(model.W)
         for probe in range(4):
             by = jnp.array(MOVES)[(places // 4**probe + probe) % 4] * UNIT
             change = jnp.maximum(change, jnp.abs(flow(t + by[-1] * t, x + by[:-1] * moved) - slope))
         least = h * change / (BLUR_UNITS * UNIT)
-        more = jnp.isfinite(least) & (least > SHARE * scales)
+        more = jnp.isfinite(least) & (least > share * scales)
         moved = jnp.where(more, jnp.maximum(moved, least), moved)
-    return jnp.maximum(scales, moved / SHARE)
+    return jnp.maximum(scales, moved / share)
 
 
 def factor(config, ratio):

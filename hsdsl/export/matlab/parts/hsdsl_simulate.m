@@ -405,6 +405,7 @@ function scales = resolved(w, q, t, h, x, k1, d, scales)
   moved = scales;
   lifted = false(n, 1);
   moves = [2; -2; 6; -6];
+  share = max(32, w.s.tolerance / (64 * unit));
   for round = 1:n
     change = zeros(n, 1);
     for i = 0:3
@@ -412,14 +413,14 @@ function scales = resolved(w, q, t, h, x, k1, d, scales)
       change = max(change, abs(slope(w, q, t + by(end) * t, x + by(1:n) .* moved, d) - k1));
     end
     least = h * change / (4 * unit);
-    more = isfinite(least) & least > 32 * scales;
+    more = isfinite(least) & least > share * scales;
     moved(more) = max(moved(more), least(more));
     if ~any(more & ~lifted)
       break
     end
     lifted = lifted | more;
   end
-  scales = max(scales, moved / 32);
+  scales = max(scales, moved / share);
 end
 
 function [w, ok, h] = controlled(w, h, ratio)

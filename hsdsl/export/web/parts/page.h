@@ -11,9 +11,10 @@
 /* An expression of parameters; not 0 where it has no value. */
 typedef int page_constant(const double *p, double *out);
 
-/* A sampled input: its samples, or the routine that writes all times and then all values. */
+/* A sampled input: its samples, or the routine that writes all times and then all values. Where something follows its
+   slope it is `sloped`: kinks are jumps. */
 typedef struct {
-  int count, linear;
+  int count, linear, sloped;
   const double *times, *values;
   page_constant *samples;
 } page_input;

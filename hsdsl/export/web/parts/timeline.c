@@ -40,13 +40,17 @@ static page_refusal samples_of(const page_input *input, const double *p, double 
   }
   for (int i = 0; i < input->count; i++)
     if (!hs_finite((*times)[i]) || !hs_finite((*values)[i])) return PAGE_NO_SAMPLE;
-  for (int i = 1; i < input->count; i++)
-    if (!((*times)[i - 1] < (*times)[i])) return PAGE_UNSORTED;
+  for (int i = 1; i < input->count; i++) {
+    const double *const t = *times + i;
+    const int again = input->linear && t[0] == t[-1] && !(i > 1 && t[-2] == t[0]);
+    if (!(t[-1] < t[0]) && !again) return PAGE_UNSORTED;
+  }
   return PAGE_RAN;
 }
 
-/* Write (a, b, c) of the segment from t on: constant before the first and after the last sample. */
-static void line_at(const page_input *input, const double *times, const double *values, double t, double *abc) {
+/* Write (a, b, c) of the segment from t on: constant before the first and after the last sample. Return how many samples
+   are not behind t. */
+static int line_at(const page_input *input, const double *times, const double *values, double t, double *abc) {
   int low = 0, high = input->count;
   while (low < high) {
     const int middle = (low + high) / 2;
@@ -60,6 +64,14 @@ static void line_at(const page_input *input, const double *times, const double *
   abc[0] = values[k];
   abc[1] = still ? values[0] * 0 : (values[k + 1] - values[k]) / (times[k + 1] - times[k]);
   abc[2] = times[k];
+  return low;
+}
+
+/* Whether one of these samples is behind a jump between two ramps. */
+static int jumps_within(const double *times, const double *values, int from, int to) {
+  for (int k = from > 1 ? from : 1; k < to; k++)
+    if (times[k] == times[k - 1] && values[k] != values[k - 1]) return 1;
+  return 0;
 }
 
 static int same(double a, double b) { return a == b || (a != a && b != b); }
@@ -144,6 +156,7 @@ static page_refusal cut_at_switch(int i, double until, const page_segments *from
 static page_refusal cut_at_samples(const double *p, double until, page_segments *made, page_segments *cuts) {
   static double *own[PAGE_INPUT_COUNT + 1];
   const double *times[PAGE_INPUT_COUNT + 1], *values[PAGE_INPUT_COUNT + 1];
+  int passed[PAGE_INPUT_COUNT + 1];
   made->count = cuts->count = 0;
   if (!add_segment(cuts, 0, 0, 0, 0)) return PAGE_NO_MEMORY;
   for (int i = 0; i < PAGE_INPUT_COUNT; i++) {
@@ -164,8 +177,12 @@ static page_refusal cut_at_samples(const double *p, double until, page_segments 
     if (made->count > 1) made->end[made->count - 2] = start;
     for (int i = 0; i < PAGE_INPUT_COUNT; i++) {
       double *abc = row + PROBLEM_PARAMETERS + 3 * i;
-      line_at(&page_inputs[i], times[i], values[i], start < until ? start : until + tie, abc);
-      if (made->count > 1 && !page_inputs[i].linear && abc[0] != abc[-PROBLEM_DATA]) made->jump[made->count - 1] = 1;
+      const int count = line_at(&page_inputs[i], times[i], values[i], start < until ? start : until + tie, abc);
+      const int changed = page_inputs[i].sloped ? abc[1] != abc[1 - PROBLEM_DATA] : 0;
+      if (made->count > 1 && (changed || (!page_inputs[i].linear && abc[0] != abc[-PROBLEM_DATA]) ||
+                              jumps_within(times[i], values[i], passed[i], count)))
+        made->jump[made->count - 1] = 1;
+      passed[i] = count;
     }
   }
   return PAGE_RAN;
