@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl import ahead, program_cache
-from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.arithmetic import TIE, Arithmetic, Number
 from hsdsl.backends.python import PythonKernel
 from hsdsl.errors import UsageError
 from hsdsl.files import ModelFiles
@@ -24,10 +24,12 @@ from hsdsl.model.values import Values, initial_state, with_parameters
 from hsdsl.parts import numbered
 from hsdsl.program import Program
 from hsdsl.program_cache import SLIDING
+from hsdsl.roundoff import following, moved
 from hsdsl.runtime.compiler import NoCompiler
 from hsdsl.runtime.kernel import CompiledModel
 from hsdsl.simulate import Prepared, Problem, prepare
-from hsdsl.simulate.input_segments import Timeline, UnorderedTimes, make_timeline
+from hsdsl.simulate.input_segments import Timeline, UnorderedTimes, make_timeline, samples_of
+from hsdsl.simulate.moving import Start, moved_time
 
 if TYPE_CHECKING:
     from hsdsl.system import HybridSystem
@@ -232,9 +234,29 @@ class Pipeline:
         if options.automatic:
             settings = automatic.chosen(settings, self.program, values.kernel, timeline, mode, x)
         settings = following_digits(settings, options, values.kernel.arithmetic)
-        problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x)
+        start = cache(partial(self._moved, parameters, initial, arithmetic_of(precision), settings.until))
+        problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x, start)
         awaited = None if wait or self._compiled is not None else self.program
         return prepare(problem, engines.choose(engine, settings, precision, self._compile, awaited))
+
+    def _moved(
+        self, parameters: Mapping[str, Any], initial: Mapping[str, Any], arithmetic: Arithmetic, until: Number
+    ) -> Start | None:
+        """Where round-off of parameters, samples and initial values moves the start of a run with these overrides."""
+        plain = self.values(arithmetic)
+        try:
+            traced = with_parameters(
+                replace(plain, kernel=plain.kernel.over(following(arithmetic, traced=True))), parameters
+            )
+            x = tuple(map(moved, initial_state(traced, initial)[2]))
+            numbers, tie = tuple(map(moved, traced.parameters)), TIE * until
+            samples = [
+                (tuple(moved_time(t.value, moved(t), tie) for t in times), tuple(map(moved, values)))
+                for times, values in samples_of(self.program, traced.kernel, traced.parameters)
+            ]
+            return Start(x, make_timeline(self.program, plain.kernel, numbers, until, samples))
+        except UsageError:
+            return None
 
     def timeline(self, values: Values, parameters: Sequence[Number], until: Number) -> Timeline:
         """The inputs over time."""

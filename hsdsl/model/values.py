@@ -65,7 +65,9 @@ class Values:
         if isinstance(value, bool) or value is None:
             raise UsageError(f"{where}: expected a number or an expression, got {value}")
         if hasattr(value, "_mpf_"):
-            return arithmetic.zero + value if arithmetic.name == "mpmath" else float(value)
+            return (
+                arithmetic.zero + value if arithmetic.name == "mpmath" else arithmetic.constant(Fraction(float(value)))
+            )
         try:
             return arithmetic.constant(Fraction(value))
         except (TypeError, ValueError, OverflowError):

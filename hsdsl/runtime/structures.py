@@ -67,7 +67,7 @@ Timeline, Interpolation, Settings = (STRUCTURES[name] for name in ("hs_timeline"
 Visited, Task = STRUCTURES["hs_visited"], STRUCTURES["hs_task"]
 Sampling, Ensemble = STRUCTURES["hs_sampling"], STRUCTURES["hs_ensemble"]
 Operation, Formula, Formulas = (STRUCTURES[name] for name in ("hs_operation", "hs_formula", "hs_formulas"))
-Record, Screen, Correction = (STRUCTURES[f"hs_{name}"] for name in ("record", "screen", "correction"))
+Record, Screen, Correction, Moves = (STRUCTURES[f"hs_{name}"] for name in ("record", "screen", "correction", "moves"))
 ARC, TRANSITION, NOTE = (np.dtype(STRUCTURES[name]) for name in ("hs_arc", "hs_transition", "hs_note"))
 METHOD_KINDS, INTERPOLANTS, KINDS, SCHEMES, NOTICES, REASONS, FAILURES, OPERATORS, HYPOTHESES = (
     ENUMERATIONS[f"hs_{name}"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from hsdsl.arithmetic import FLOAT64, Number
 from hsdsl.execution import Array, Stop
 from hsdsl.interrupts import Noted
+from hsdsl.program import Program
 from hsdsl.runtime import methods, structures
 from hsdsl.runtime.kernel import CompiledModel, runtime
 from hsdsl.runtime.sampling import Sampled
@@ -60,6 +61,7 @@ class CompiledPlan:
         self._start = len(problem.x), self._x.ctypes.data
         self.until, self.memory = settings.until, settings.memory
         self.of_screens: dict[bool, Any] = {}  # those of its runs, by whether they are held against shadow runs
+        self._formulas = compiled.shared("formulas", partial(_tables, program)) if settings.moves else None
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 
     def lay(self, workspace: Workspace, review: Review | None = None) -> None:
@@ -69,8 +71,15 @@ class CompiledPlan:
             return
         task, workspace.plan = workspace.task, self
         task.timeline, task.settings = self.timeline, self._settings
+        workspace.move_by(self._formulas)
         task.interpolation = self._interpolation
         task.mode, (task.dimension, task.x) = self._mode, self._start
+
+
+def _tables(program: Program) -> Any:
+    from hsdsl.simulate.verdict.formula_tables import FormulaTables  # only verdicts ask for it
+
+    return FormulaTables(program)
 
 
 def _doubles(numbers: Sequence[Number] | None) -> Any:

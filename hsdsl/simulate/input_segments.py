@@ -55,12 +55,22 @@ class Timeline:
         return self.at(segment.end) is not segment
 
 
-def make_timeline(program: Program, kernel: Kernel, parameters: Sequence[Number], until: Number) -> Timeline:
+Samples = tuple[tuple[Number, ...], tuple[Number, ...]]  # times and values of one input
+
+
+def make_timeline(
+    program: Program,
+    kernel: Kernel,
+    parameters: Sequence[Number],
+    until: Number,
+    samples: Sequence[Samples] | None = None,
+) -> Timeline:
     """Cut time at every sample of every sampled input, and where a switch changes.
 
     Raises UsageError: an input's sample times do not increase, a sample is not finite, or a switch changes too often.
     """
-    samples = [_samples(i, given, kernel, parameters) for i, given in enumerate(program.inputs)]
+    if samples is None:
+        samples = samples_of(program, kernel, parameters)
     zero = kernel.arithmetic.zero
     jumps = [_jumps(*both) for both in samples]
     cuts = sorted({zero} | {t for times, _ in samples for t in times if zero < t < until})
@@ -114,9 +124,15 @@ def _switched(program: Program, kernel: Kernel, segments: list[Segment], until: 
     return segments
 
 
-def _samples(
-    index: int, given: SampledInput, kernel: Kernel, parameters: Sequence[Number]
-) -> tuple[tuple[Number, ...], tuple[Number, ...]]:
+def samples_of(program: Program, kernel: Kernel, parameters: Sequence[Number]) -> list[Samples]:
+    """The samples of each input.
+
+    Raises UsageError: the times of one do not increase, or a sample is not finite.
+    """
+    return [_samples(i, given, kernel, parameters) for i, given in enumerate(program.inputs)]
+
+
+def _samples(index: int, given: SampledInput, kernel: Kernel, parameters: Sequence[Number]) -> Samples:
     if given.times is not None and given.values is not None:
         times, values = (tuple(map(kernel.arithmetic.constant, column)) for column in (given.times, given.values))
     else:

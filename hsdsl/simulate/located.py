@@ -101,8 +101,10 @@ def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event |
             return standstill(run, here.moved(t, x)).not_finite([(t, x), (span.t1, span.z)])
         if here.surfaces.active:
             here.surfaces.leave(span.t1, span.z)
-        arc.append(span.t1, span.z, span.piece)
         t, x, before = span.t1, span.z, span
+        if run.settings.moves:
+            x = run.moved_along(here, t, x, span.h)
+        arc.append(t, x, span.piece)
     return here.moved(t, x)
 
 

@@ -117,12 +117,17 @@ class Prepared(Problem):
         """Make the same run finer."""
         rows = len(execution.times)  # fewer where a run was interrupted
         if rows not in self.finer:
-            self.finer[rows] = self.prepared_with(finer_settings(self.settings, execution, self.arithmetic))
+            settings = finer_settings(self.settings, execution, self.arithmetic)
+            self.finer[rows] = prepare(self.moved_with(settings), self._code)
         return self.finer[rows].simulate()
 
     def prepared_with(self, settings: Settings) -> Prepared:
         """Prepare the same problem with other settings."""
-        return prepare(self.with_settings(settings), self.pending if self.plan is None else self.plan.compiled)
+        return prepare(self.with_settings(settings), self._code)
+
+    @property
+    def _code(self) -> CompiledModel | Pending | None:
+        return self.pending if self.plan is None else self.plan.compiled
 
     @cached_property
     def _about(self) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import TIE, Arithmetic, Number
@@ -9,12 +10,16 @@ from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate.input_segments import Timeline
+from hsdsl.simulate.moving import Start
 from hsdsl.simulate.settings import Settings
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A program, its numbers, and where it starts: mode, the names of its states, and ``x`` at t = 0."""
+    """A program, its numbers, and where it starts: mode, the names of its states, and ``x`` at t = 0.
+
+    ``moved`` gives start and inputs as their round-off moves them; None where there is none, or nothing is known of it.
+    """
 
     program: Program
     kernel: Kernel
@@ -23,6 +28,7 @@ class Problem:
     mode: int
     states: tuple[str, ...]
     x: State
+    moved: Callable[[], Start | None]
 
     @property
     def arithmetic(self) -> Arithmetic:
@@ -31,7 +37,17 @@ class Problem:
 
     def with_settings(self, settings: Settings) -> Problem:
         """The same problem with other settings."""
-        return Problem(self.program, self.kernel, settings, self.timeline, self.mode, self.states, self.x)
+        return Problem(self.program, self.kernel, settings, self.timeline, self.mode, self.states, self.x, self.moved)
+
+    @property
+    def start(self) -> Start:
+        """Where it starts as its round-off moves that, as far as it is known."""
+        return self.moved() or Start(self.x, self.timeline)
+
+    def moved_with(self, settings: Settings) -> Problem:
+        """The same problem from where its round-off moves it."""
+        x, timeline = self.start.x, self.start.timeline
+        return Problem(self.program, self.kernel, settings, timeline, self.mode, self.states, x, lambda: None)
 
     def tie(self, t: Number) -> Number:
         """Times closer than this to t are the same instant, however long the run goes on."""

@@ -6,7 +6,8 @@ flow, which a transition or a sample of an input may have cut. A fixed step beco
 itself; a method of order 1 needs a fifth, or the difference would be no larger than the error of the finer run. It is
 no half: steps that the relaxed scheme halves would be those of the finer run, and both wrong in the same way. The
 relaxed scheme's strips shrink to a tenth: the delay of a transition is known only up to a factor. Below round-off the
-other run is coarser instead, and the difference is that much larger than the error.
+other run is coarser instead, and the difference is that much larger than the error. What both runs would round alike
+moves the finer one (`moving`).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ def longest_steps(execution: Execution) -> list[Number]:
 
 def finer_settings(settings: Settings, execution: Execution, arithmetic: Arithmetic) -> Settings:
     """Return the settings of the run to compare an execution with."""
-    finer = settings
+    finer = replace(settings, moves=True)
     if settings.scheme != "located":
         finer = replace(finer, relaxation=settings.relaxation / FINER)
     if settings.step is not None:

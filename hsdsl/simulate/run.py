@@ -16,6 +16,7 @@ from hsdsl.simulate.cascade import Cascade
 from hsdsl.simulate.control import Control
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.input_segments import Segment
+from hsdsl.simulate.moving import moved_by_flow, moved_reset
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.recorder import OpenArc, Recorder
 from hsdsl.simulate.stops import limit, reset_not_finite
@@ -99,7 +100,18 @@ class Run(Problem):
         self.control.begin_arc(program.name)
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
         surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(active or ()))
-        return ModeState(mode, mode, program, kernel, surfaces, segment, arc, t, x)
+        here = ModeState(mode, mode, program, kernel, surfaces, segment, arc, t, x)
+        if not self.settings.moves or not t < segment.end or program.states != states:
+            return here
+        h = min(self.control.within_reach(program.name, self.control.h), segment.end - t)
+        arc.values[-1] = self.moved_along(here, t, x, h)
+        return here.moved(t, arc.values[-1])
+
+    def moved_along(self, here: ModeState, t: Number, x: State, h: Number) -> State:
+        """A state on its way, moved by what round-off of the flow does in a time h."""
+        if here.flow != here.index:  # its flow follows guards
+            return x
+        return moved_by_flow(self.kernel, here.index, here.segment.data, t, x, h, here.arc.scales)
 
     def wait(self, here: ModeState, rows: list[tuple[Number, Number]], q: State) -> None:
         """Write a strip: the state waits at q while time and depth pass through ``rows``; inputs go on."""
@@ -176,6 +188,8 @@ def reset(here: ModeState, crossing: Crossing, scale: State, run: Run) -> tuple[
         after = (run.arithmetic.functions["nan"],)
     if not all(map(isfinite, after)):
         return reset_not_finite(edge, t)
+    if run.settings.moves:
+        after = moved_reset(run.kernel, here.index, k, here.segment.data, t, q) or after
     try:
         spread = here.kernel.spreads[k](t, *q, *scale)
     except DOMAIN_ERRORS:

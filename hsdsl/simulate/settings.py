@@ -42,6 +42,7 @@ class Settings:
     ``completion`` is `none` where no state moves along a guard that holds it.
     ``longest_step`` bounds the steps of an adaptive method further, ``first_steps`` the first ones of each arc of flow,
     0 where it does not: by this number, then twice, then four times as much.
+    ``moves`` is whether round-off moves the run, as one that another is held against (`hsdsl.simulate.moving`).
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 
@@ -61,6 +62,7 @@ class Settings:
     completion: str = "contact"
     longest_step: Number | None = None
     first_steps: Sequence[Number] = ()
+    moves: bool = False
 
     def __post_init__(self) -> None:
         if (self.step is None) == (self.tolerance is None):

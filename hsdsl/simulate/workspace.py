@@ -54,6 +54,14 @@ class Workspace:
             self._visited = [grown(self.task.visited, VISITED, self._width)]
         self.task.now, self.task.made = 0.0, 0
 
+    def move_by(self, formulas: Any) -> None:
+        """Let round-off move runs by these `FormulaTables`; by none where that is None."""
+        self._moves, self.task.moves = None, None
+        if formulas is not None:
+            registers = np.empty((formulas.registers, 3))
+            moves = (structures.Moves * 1)((ctypes.addressof(formulas.table), registers.ctypes.data))
+            self._moves, self.task.moves = (moves, registers), ctypes.addressof(moves)
+
     def simulate(self) -> None:
         """Run the task to its end; the interpreter is free meanwhile."""
         self._runtime.hs_simulate(self._where)

@@ -8,7 +8,7 @@
    its result is as smooth as the part is long. `unresolved` is what others may add. `error` is how much the errors of
    states change the result, where no terms cancel. */
 
-#include "roundoff.c"
+#include "moving.c"
 
 #define EXPANSION_ROUNDOFF 0x1p-48 /* of all terms together: more than rounding makes of a coefficient */
 #define RESOLVED 8       /* terms are so many times what is beyond them; what moves a state by so many errors is seen */

@@ -253,6 +253,17 @@ static int of_contacts(hs_run *run);
 static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached);
 static int close_tail(hs_run *run, int k);
 
+/* moving.c */
+#if defined(HS_MOVES)
+static void move_reset(hs_run *run);
+static void move_along(hs_run *run, hs_time t, hs_real *x, hs_real h);
+static void move_start(hs_run *run, hs_time t);
+#define HS_MOVE(run, move) \
+  if ((run)->task->moves) move
+#else
+#define HS_MOVE(run, move) (void)0
+#endif
+
 /* touching.c */
 static int touched(hs_run *run, int k, hs_crossing *crossing);
 

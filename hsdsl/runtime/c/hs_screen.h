@@ -28,12 +28,27 @@ typedef enum {
   HS_ATAN,
   HS_SIGN,
   HS_FLOOR,
+  HS_ASIN, /* of these only round-off is followed */
+  HS_ACOS,
+  HS_SINH,
+  HS_COSH,
+  HS_ASINH,
+  HS_ACOSH,
+  HS_ATANH,
+  HS_ATAN2,
+  HS_POW,
+  HS_BELOW, /* c where a is below b, else d */
   HS_UNKNOWN /* of which nothing is concluded */
 } hs_operator;
 
 typedef struct {
-  int32_t kind, a, b; /* registers */
+  int32_t kind, a, b, c, d; /* registers */
 } hs_operation;
+
+/* Its least and largest value, the nearest number to it, and what that leaves out. */
+typedef struct {
+  double low, high, value, error;
+} hs_constant;
 
 /* Operations from `first` up to `last`, and the registers of the results. */
 typedef struct {
@@ -46,7 +61,7 @@ typedef struct {
   int32_t affine; /* whether the flow is a polynomial of degree 1 in time and states */
   int32_t steep;  /* whether the flow has functions whose slope has no bound */
   int32_t jumps;  /* whether it has some that jump */
-  const double *constant; /* least and largest value of each */
+  const hs_constant *constant;
   const hs_operation *operation;
   hs_formula flow, surfaces;
   const hs_formula *rate;  /* of each surface */
@@ -54,6 +69,12 @@ typedef struct {
   const int32_t *keeps;   /* (edge, states): whether a reset to the mode itself leaves a state as it is; else 0 */
   const int32_t *curved;  /* (edge): how many results its reset has, 0 where these are polynomials of time and states */
 } hs_formulas;
+
+/* What round-off moves a run by: formulas of its modes, and registers for them. See hsdsl/simulate/moving.py. */
+typedef struct {
+  const hs_formulas *formulas;
+  double *registers;
+} hs_moves;
 
 /* Coefficients of corrections: see hsdsl/simulate/verdict/correction.py. */
 typedef struct {
@@ -84,6 +105,7 @@ typedef struct {
   hs_record run, finer;
   int32_t order;            /* the most of a shadow run's series; 0 where there is none */
   const hs_correction *correction; /* of a shadow run without series; 0 likewise */
+  const double *start, *data;     /* of a shadow run: where it starts, and what its routines are bound to */
   double until, relaxation, tolerance;
   int64_t room;             /* numbers in the workspace, in which what is found begins: */
   double *workspace;

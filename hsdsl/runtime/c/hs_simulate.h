@@ -197,6 +197,7 @@ typedef struct hs_task {
   int32_t mode, dimension; /* the start */
   const hs_real *x;
   double *workspace; /* hs_workspace() numbers */
+  const void *moves; /* hs_moves, where round-off moves the run; else 0 */
   hs_chunk chunk;
   hs_visited visited;
   int (*flush)(struct hs_task *);                      /* makes room in chunk: 0; 1: room, but stop; 2: no room */

@@ -257,6 +257,7 @@ static int follow(hs_run *run, hs_time limit) {
     if (event == WITHOUT_VALUE) return step_not_finite(run);
     if (event != GOES_ON) return event;
     if (here->standing) leave(run, run->span.t1, run->z);
+    HS_MOVE(run, move_along(run, run->span.t1, run->z, run->span.h));
     append(run, run->span.t1, run->z, &run->span.piece);
     go_to_end(run);
   }

@@ -156,7 +156,9 @@ static int flow(hs_run *run) {
     }
     if (adaptive && chatters(run, n, t1)) return stuck(run, HS_JUMP, -1);
     if (here->standing || here->emerging) leave(run, t1, run->z);
-    append(run, t1, run->z, curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0);
+    const hs_polynomial *const piece = curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0;
+    HS_MOVE(run, move_along(run, t1, run->z, h));
+    append(run, t1, run->z, piece);
     here->t = t1;
     swap(&run->x, &run->z);
     swap(&run->slope, &run->end);

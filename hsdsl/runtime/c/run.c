@@ -50,6 +50,7 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
   hand_on_scales(run, run->here.table, here.table);
   run->here = here;
   if (run->task->settings.arcs) bound_first_step(run, mode);
+  HS_MOVE(run, move_start(run, t));
   begin(run, HS_FLOW);
   append(run, t, run->x, 0);
   copy(run->entered, run->x, dimension);
@@ -96,6 +97,7 @@ static int reset(hs_run *run, hs_real *scale) {
   hs_real *const sizes = run->error;
   if (hs_changed(edge, edge->reset, run->here.p, crossing->time, crossing->state, crossing->state, run->after)) return 1;
   if (!all_finite(run->after, to)) return 1;
+  HS_MOVE(run, move_reset(run));
   copy(run->both, crossing->state, n);
   copy(run->both + n, scale, n);
   if (hs_changed(edge, edge->spread, run->here.p, crossing->time, run->both, scale, sizes) || !all_finite(sizes, to))

@@ -112,7 +112,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
     const int own = 1 + model->mode[i].dimension + model->data + s->formulas[i].constants + s->formulas[i].operations;
     registers = own > registers ? own : registers;
   }
-  hs_view v = {.s = s, .mode = -1};
+  hs_view v = {.s = s, .mode = -1, .traced_mode = -1};
   lay_out_found(s, store);
   v.error = numbers(store, model->states);
   v.size = numbers(store, model->states);
@@ -141,6 +141,7 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.cut = take(store, w, sizeof(int));
   v.range = take(store, registers, sizeof(hs_range));
   v.rounded = take(store, registers, sizeof(hs_rounded));
+  v.traced = take(store, registers, sizeof(hs_rounded));
   v.around = take(store, registers, sizeof(hs_expansion));
   v.slopes = take(store, w, sizeof(hs_expansion));
   v.nearest = take(store, model->modes, sizeof(hs_near_miss));

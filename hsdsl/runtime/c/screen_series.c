@@ -51,7 +51,7 @@ static int leave_out(hs_view *v, const hs_shadow *c) {
     e[i] = (c->h * there[i] - slope) / order;
     beyond[i] = x[i] + e[i];
   }
-  if (v->table->flow(c->p, run->times[c->row + 1], beyond, v->slope)) return 0;
+  if (v->table->flow(v->p, run->times[c->row + 1], beyond, v->slope)) return 0;
   for (int i = 0; i < v->n; i++) e[i] += c->h * (v->slope[i] - there[i]) / (order + 1);
   return 1;
 }

@@ -4,7 +4,6 @@
 #include "screen_series.c"
 
 #define MOST_CHANGES 8     /* of Newton's method */
-#define ROUNDED 0x1p-52   /* of a state that moves, in each step */
 #define CLOSED_IN 0x1p-10 /* of the tie tolerance: a crossing's time is found */
 
 /* Bound what round-off of the flow and of states that move may do in the run's step, by the flow where that ends, to
@@ -12,9 +11,7 @@
 static int bound_roundoff(hs_view *v, const hs_shadow *c) {
   const double *const start = recorded_row(&v->s->run, c->row), *const x = recorded_row(&v->s->run, c->row + 1);
   const hs_formula *const flow = &v->f->flow;
-  v->rounded[0] = rounded(v->s->run.times[c->row + 1], 0.0, 0.0);
-  for (int i = 0; i < v->n; i++) v->rounded[1 + i] = rounded(x[i], 0.0, 0.0);
-  rounded_operations(v->f, flow->first, flow->last, first_register(v), v->rounded);
+  rounded_formula(v->f, flow, v->n, v->s->model->data, v->s->run.times[c->row + 1], x, v->rounded, 0);
   for (int i = 0; i < v->n; i++) {
     const hs_rounded f = v->rounded[flow->result[i]];
     const double share = f.value != 0.0 ? ROUNDED : 0.0;
@@ -42,17 +39,32 @@ static int shadow_crosses(hs_view *v, hs_shadow *c, int k) {
   return fabs(change) <= tie;
 }
 
+/* Move what the reset of an edge makes of y by its round-off, to x; 0 where that is not known. */
+static int trace_reset(hs_view *v, hs_shadow *c, int k) {
+  const hs_formula *const formula = &v->f->reset[k];
+  const hs_edge *const edge = &c->table->edge[k];
+  const int n = c->table->dimension, data = v->s->model->data;
+  if (v->traced_mode != v->mode) bind_rounded(v->f, n, data, c->p, v->traced, 1), v->traced_mode = v->mode;
+  copy(c->x, c->y, n);
+  rounded_formula(v->f, formula, n, data, c->t, c->y, v->traced, 1);
+  for (int i = 0; i < edge->changes; i++) {
+    const hs_rounded found = v->traced[formula->result[i]];
+    c->x[edge->change[i]] = moved(found);
+    if (!hs_finite(found.value + found.error + found.off)) return 0;
+  }
+  return 1;
+}
+
 /* Make transition j where the shadow run crosses its surface, close to where it is. */
 static int shadow_jumps(hs_view *v, hs_shadow *c, int64_t j, double *errors) {
   const hs_screen *const screen = v->s;
   const hs_transition *const made = &screen->run.transition[j];
-  const hs_edge *const edge = &c->table->edge[made->edge];
   const double *const before = screen->run.before + j * screen->model->width;
   if (made->entry || !shadow_crosses(v, c, made->edge)) return 0;
   for (int i = 0; i < c->table->dimension; i++) grow(&errors[i], fabs(before[i] - c->y[i]));
   v->time_errors[j] = hs_max(j ? v->time_errors[j - 1] : tie_of(screen, 0.0),
                       fabs(made->time - c->t));
-  return !hs_changed(edge, edge->reset, c->p, c->t, c->y, c->y, c->x);
+  return trace_reset(v, c, made->edge);
 }
 
 /* Follow the run: how far each row is from the shadow run, to `shadow_errors`, and each transition, to
@@ -60,12 +72,12 @@ static int shadow_jumps(hs_view *v, hs_shadow *c, int64_t j, double *errors) {
 static int follow_run(hs_view *v) {
   const hs_screen *const s = v->s;
   const hs_record *const run = &s->run;
-  hs_shadow c = {.p = s->timeline->data, .x = v->x, .y = v->y, .moved = v->z, .roundoff = v->roundoff};
+  hs_shadow c = {.p = s->data, .x = v->x, .y = v->y, .moved = v->z, .roundoff = v->roundoff};
   c.lines = v->lines;
   int64_t followed = 0;
   c.t = run->times[0];
   c.order = FEWEST < s->order ? FEWEST : s->order;
-  copy(c.x, recorded_row(run, 0), run->width);
+  copy(c.x, s->start, s->model->mode[run->arc[0].mode].dimension);
   for (int64_t i = 0; i < run->rows * run->width; i++) s->shadow_errors[i] = 0.0;
   for (int64_t a = 0; a < run->arcs; a++) {
     const int64_t last = last_row(run, a), jump = run->arc[a].jump;

@@ -7,7 +7,6 @@
 
 #define BIT(at) (1 << (at))
 #define SAFE 10             /* margins below so many errors are named */
-#define ERROR_UNITS 64      /* units of round-off of a state's size: no error is smaller */
 #define TANGENT_UNITS 64
 #define CUTTING 0x1p-48     /* of the largest coefficient: what cutting and changing the basis may add */
 #define WIDER 8             /* a box so many times as wide: what jumps changes little more over it */
@@ -32,7 +31,7 @@ typedef struct {
   const hs_formulas *f;
   const double *p;
   int64_t segment, arc, last, fine_row, fine_arc;
-  int mode, n, crossed;
+  int mode, n, crossed, traced_mode; /* whose data `traced` is bound to */
   int degree, filled; /* of the current step, without coefficients that are zero; and of the matrix */
   double *error, *size, *roundoff_floor, *time_errors; /* of all states; of each transition */
   double *lines; /* series of the shadow run */
@@ -51,7 +50,7 @@ typedef struct {
   int *cut; /* whether a state is, where a step is cut in halves */
   int expanded, coarse; /* whether all states are expanded along the step, and whether parts are of expansions */
   hs_range *range;
-  hs_rounded *rounded;
+  hs_rounded *rounded, *traced;
   hs_expansion *around, *slopes;
   double *drift;  /* how far parts of a step have moved states unseen */
   hs_near_miss *nearest; /* of each mode */
@@ -112,14 +111,13 @@ static int first_register(const hs_view *v) { return 1 + v->n + v->s->model->dat
 static void bind_formulas(hs_view *v) {
   const int base = first_register(v), data = 1 + v->n, constants = data + v->s->model->data;
   for (int i = data; i < base; i++) {
-    const double *const c = v->f->constant + 2 * (i - constants);
-    const hs_range value = {i < constants ? v->p[i - data] : c[0], i < constants ? v->p[i - data] : c[1]};
+    const hs_constant *const c = v->f->constant + (i - constants);
+    const hs_range value = {i < constants ? v->p[i - data] : c->low, i < constants ? v->p[i - data] : c->high};
     v->range[i] = value;
     v->around[i] = constant_expansion((value.low + value.high) / 2);
-    v->rounded[i] = rounded((value.low + value.high) / 2, (value.high - value.low) / 2, 0.0);
   }
   range_operations(v->f, 0, v->f->fixed, base, v->range);
-  rounded_operations(v->f, 0, v->f->fixed, base, v->rounded);
+  bind_rounded(v->f, v->n, v->s->model->data, v->p, v->rounded, 0);
   expand_operations(v->f, 0, v->f->fixed, base, v->around);
 }
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from hsdsl.bernstein import Array
 from hsdsl.execution import Execution, Transition
+from hsdsl.simulate.moving import ERROR_UNITS
 
 SAFE = 10  # margins below so many errors are named
-ERROR_UNITS = 64  # of the size of a state: no error is smaller
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,15 @@ from hsdsl.runtime import structures
 from hsdsl.simulate.verdict.formulas import Node, Operations
 
 
+MOST_OPERANDS = 4
+
+
 class FormulaTables:
     """All modes of a program as the screen takes them; ``table`` is their ``hs_formulas``."""
 
     def __init__(self, program: Program) -> None:
         self._kept: list[Any] = []
+        self.registers = 0  # of the mode with most
         found = [self._mode(program, k, mode) for k, mode in enumerate(program.modes)]
         self.table: Any = (structures.Formulas * len(found))(*found)
 
@@ -37,9 +41,10 @@ class FormulaTables:
         formulas = [operations.formula(routines[name]) for name in names]
         place = _placed(operations, 1 + len(mode.states) + len(data))
         steps = [
-            (structures.OPERATORS.index(kind), place(a), place(b))
-            for kind, a, b in (*operations.fixed, *operations.moving)
+            (structures.OPERATORS.index(kind), *map(place, operands), *(0,) * (MOST_OPERANDS - len(operands)))
+            for kind, operands in (*operations.fixed, *operations.moving)
         ]
+        self.registers = max(self.registers, 1 + len(mode.states) + len(data) + len(operations.constants) + len(steps))
         flow, values, *others = (self._formula(len(operations.fixed), place, formula) for formula in formulas)
         resets = [results for *_, results in formulas[2 + surfaces :]]
         curved = [len(results) * any(math.isinf(node.degree) for node in results) for results in resets]

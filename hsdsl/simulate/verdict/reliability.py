@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from hsdsl.enclosures import Range, as_range
+from hsdsl.simulate.moving import ERROR_UNITS
 from hsdsl.simulate.stops import show
-from hsdsl.simulate.verdict.agreement import ERROR_UNITS, SAFE
+from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import steps_of
@@ -25,14 +26,17 @@ def reliability(run: RunView) -> Iterator[Finding]:
 
 
 def _unreliable(run: RunView) -> tuple[float, str] | None:
-    """From when on the run is unreliable, and why; None where it is not."""
+    """From when on the run is unreliable, and why; None where it is not.
+
+    Round-off of the flow excuses an error only where no transition follows from it.
+    """
     if run.errors is None or run.screen is not None:
         return None  # there is a screen only where both runs agree
     found: list[tuple[float, str]] = []
     if run.errors.parted is not None:
         found.append((run.errors.parted, "from there a finer run makes other transitions"))
     grown, columns = run.errors.unreliable, run.errors.columns
-    floor = _roundoff(run) if grown else {}
+    floor = _roundoff(run) if grown and not found else {}
     for name, time in grown.items():
         if run.errors.by_row[-1, columns[name]] > SAFE * floor.get(name, 0.0):
             found.append((time, f"the error of {name} exceeds a tenth of its size"))

@@ -133,13 +133,15 @@ class Screens:
         model, settings, method = plan.compiled, problem.settings, problem.settings.method
         formulas: FormulaTables = model.shared("formulas", lambda: FormulaTables(problem.program))
         assert method is not None
-        order = order_of(method) if by_shadow else None
+        order, start = order_of(method) if by_shadow else None, problem.start if by_shadow else None
+        self._start = [np.array(numbers, np.float64) for numbers in ((start.x, start.data) if start else ())]
         self._common = structures.Screen(
             model=ctypes.addressof(model.table),
             timeline=plan.timeline,
             formulas=ctypes.addressof(formulas.table),
             order=order or 0,
             correction=ctypes.addressof(_correction()) if by_shadow and order is None else 0,
+            **dict(zip(("start", "data"), (array.ctypes.data for array in self._start), strict=False)),
             until=settings.until,
             relaxation=settings.relaxation,
             tolerance=settings.tolerance,

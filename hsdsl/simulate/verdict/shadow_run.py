@@ -12,11 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.enclosures import Range, as_range
 from hsdsl.execution import Arc, Execution, Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import terms
-from hsdsl.kernel import ModeKernel
+from hsdsl.simulate.moving import flow_roundoff, moved_reset
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.verdict.correction import Array, corrected
 
@@ -41,9 +40,8 @@ class ShadowRun:
         self.times: list[float] = run.times.tolist()
         self.time_errors: list[float] = []
         self.t: float = float(run.times[0])
-        self.x: State = tuple(run.values[0, : len(run.arcs[0].states)].tolist())
-        self.data = self.problem.timeline.segments[0].data
-        self.enclosing: dict[int, ModeKernel] = {}
+        self.x: State = problem.start.x
+        self.data, self.moved = problem.timeline.segments[0].data, problem.start.data
 
     def follow(self, arc: Arc, made: Transition | None) -> None:
         """Follow one arc, and the transition that ends it."""
@@ -61,7 +59,12 @@ class ShadowRun:
         """Where the run's step from a row takes it; where an arc begins, its states are rounded."""
         x, end = np.asarray(self.run.values[row : row + 2, : len(self.x)], dtype=float)
         piece = np.asarray(self.run.coefficients[row][:, : len(self.x)], dtype=float)
-        slope, noise = self._enclosed(mode, self.times[row + 1], end)
+        kernel, t1 = self.problem.kernel, self.times[row + 1]
+        slope = np.array(kernel.bind(mode, self.data).flow(t1, *end.tolist()))
+        off = flow_roundoff(kernel, mode, self.data, t1, tuple(end.tolist()))
+        if off is None:
+            raise Lost
+        noise = np.array(off)
         moves = slope != 0
         noise += np.where(moves, ROUNDED * np.abs(end) / h, 0.0)
         if begins:
@@ -73,12 +76,12 @@ class ShadowRun:
             self._compare(row + 1, x, tuple((x + away + inside).tolist()))
             return tuple((end + (away + further)).tolist())
         away = self._away(mode, x, piece, h).sum(axis=0)
-        away += self._left_out(mode, self.times[row + 1], end, piece, h, slope)
+        away += self._left_out(mode, t1, end, piece, h, slope)
         return tuple((end + away + np.copysign(h * noise, away)).tolist())
 
     def _corrected(self, mode: int, x: Array, piece: Array, h: float, end: Array, moved: Array) -> tuple[Array, Array]:
         """How much further away a step takes it, inside and at the end; what is moved goes on as the flow does."""
-        flow, jacobian = self.problem.kernel.bind(mode, self.data).flow, self.problem.kernel.jacobian(mode, self.data)
+        flow, jacobian = self.problem.kernel.bind(mode, self.moved).flow, self.problem.kernel.jacobian(mode, self.moved)
         slopes = np.array(jacobian(self.t + h, *end.tolist()), dtype=float).reshape(len(end), len(end))
 
         def defect(s: float, away: Array, rate: Array) -> Array:
@@ -102,21 +105,10 @@ class ShadowRun:
             self.order = min(self.order + MORE_TERMS, self.most)
 
     def _expanded(self, mode: int) -> Array:
-        series = self.problem.kernel.taylor(mode, self.data)
+        series = self.problem.kernel.taylor(mode, self.moved)
         if series is None:
             raise Lost
         return np.array(terms(series, self.order, self.t, self.x), dtype=float).reshape(self.order + 1, len(self.x))
-
-    def _enclosed(self, mode: int, t: float, x: Array) -> tuple[Array, Array]:
-        """The run's flow at a point, and what round-off may make of it."""
-        if mode not in self.enclosing:
-            data = [Range(float(value), float(value)) for value in self.data]
-            self.enclosing[mode] = self.problem.kernel.enclosing.bind(mode, data)
-        flow = map(as_range, self.enclosing[mode].flow(*(Range(value, value) for value in (t, *x.tolist()))))
-        ends = np.array([(float(f.low), float(f.high)) for f in flow]).reshape(-1, 2)
-        if not np.isfinite(ends).all():
-            raise Lost
-        return ends.sum(axis=1) / 2, (ends[:, 1] - ends[:, 0]) / 2
 
     def _left_out(self, mode: int, t: float, x: Array, piece: Array, h: float, slope: Array) -> Array:
         """What the run's polynomial X leaves out by the end of its step, where the flow is ``slope``.
@@ -138,7 +130,8 @@ class ShadowRun:
     def _jump(self, arc: Arc, made: Transition) -> None:
         """Make a transition where it crosses the surface, along a straight line from where it is."""
         mode, y = self.problem.program.modes[self.modes[arc.mode]], self.x
-        kernel = self.problem.kernel.bind(self.modes[arc.mode], self.data)
+        index = self.modes[arc.mode]
+        kernel = self.problem.kernel.bind(index, self.moved)
         found = [k for k, edge in enumerate(mode.edges) if edge.name == made.edge]
         k = min(found, key=lambda k: abs(kernel.surfaces(made.time, *made.before.values())[k]))
         tie, change, s = float(self.problem.tie(max(self.t, self.times[-1]))), np.inf, 0.0
@@ -157,4 +150,6 @@ class ShadowRun:
         self._compare(arc.last, list(made.before.values()), y)
         self.t += s
         self.time_errors.append(abs(float(made.time) - self.t))
-        self.x = kernel.resets[k](self.t, *y)
+        self.x = moved_reset(self.problem.kernel, index, k, self.moved, self.t, y) or ()
+        if not self.x and mode.edges[k].target_states:
+            raise Lost
