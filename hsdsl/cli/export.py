@@ -12,10 +12,11 @@ from hsdsl.cli.console import print_json, say
 from hsdsl.cli.options import Answer, Experiment, Model, option
 from hsdsl.cli.texts import names_of
 from hsdsl.errors import UsageError
-from hsdsl.export import TARGETS, check_folder, check_scheme, check_target, files_of, source_of, write
+from hsdsl.export import TARGETS, Modes, check_folder, check_scheme, check_target, files_of, source_of, write
 
 TO = f"The target: {', '.join(TARGETS)}."
 OUT = "The folder for the files; left out, a target with one file of text prints it."
+MODE = "What the number of the mode is in a functional mock-up unit: local, the default, an output, or left out (none)."
 KEEP = "Only these states and outputs, with what they depend on."
 
 
@@ -27,6 +28,7 @@ def export(
     force: Annotated[bool, Option("--force", help="Write into a folder that is not empty.")] = False,
     experiment: Experiment,
     outputs: Annotated[str | None, option("A,B", KEEP)] = None,
+    mode: Annotated[Modes | None, Option(metavar="|".join(Modes.__args__), help=MODE)] = None,
     answer: Answer,
 ) -> None:
     """Export a model with its settings: code for other tools, or a document."""
@@ -40,7 +42,7 @@ def export(
         loaded = load(model)
         check_scheme(loaded, to, settings)
         source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
-        files = files_of(source, to)
+        files = files_of(source, to, mode)
         if out is None:
             name, text = only_text(files, to)
             if answer.json:

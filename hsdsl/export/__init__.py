@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from contextlib import ExitStack, suppress
 from importlib import import_module
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from hsdsl.errors import UsageError
 from hsdsl.names import did_you_mean
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hsdsl.model import Model
     from hsdsl.store.atomic import New
 
-__all__ = ["TARGETS", "check_folder", "check_scheme", "check_target", "files_of", "source_of", "write"]
+__all__ = ["TARGETS", "Modes", "check_folder", "check_scheme", "check_target", "files_of", "source_of", "write"]
 
 TARGETS = {
     "c": "a program in C99 that allocates nothing",
@@ -38,6 +38,7 @@ TARGETS = {
 }
 
 
+Modes = Literal["local", "output", "none"]  # what the number of the mode is in a functional mock-up unit
 DOCUMENTS = ("latex", "mermaid")  # targets that do not run
 OF_PARTS = ("c", "fmi2", "fmi3", "latex", "mermaid", "rust", "web")  # targets that keep systems of parts
 
@@ -49,16 +50,20 @@ def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
     return source_of(model, arguments)
 
 
-def files_of(source: Source, target: str) -> dict[str, bytes]:
+def files_of(source: Source, target: str, modes: Modes | None = None) -> dict[str, bytes]:
     """The files of a target by their relative paths, in memory.
+
+    ``modes`` says what the number of the mode is in a functional mock-up unit: local, if left out.
 
     Raises UsageError: an unknown target, or a model that the target cannot keep.
     """
     check_target(target)
+    if modes is not None and not target.startswith("fmi"):
+        raise UsageError(f"{target} has no choice of what the mode is", "--mode belongs to --to fmi2 and --to fmi3")
     if source.system.parts and target not in OF_PARTS:
         hint = f"--to {' or '.join(OF_PARTS)}, or write the modes of a small one out"
         raise UsageError(f"{target} has no systems of parts", hint)
-    return import_module(f"hsdsl.export.{target}").files(source)
+    return import_module(f"hsdsl.export.{target}").files(source, *([] if modes is None else [modes]))
 
 
 def check_target(target: str) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import sympy as sp
+
 from hsdsl.completion import overlays
 from hsdsl.expression.stack import deep_stack
 from hsdsl.lower.mode import LoweredMode, lowered_overlay
@@ -21,11 +23,13 @@ class Slopes:
     """The slopes of a mode that are not zero everywhere, of the routine ``slopes``.
 
     ``places`` has for each its row and column: rows are the flow of each state, then the outputs, columns the states,
-    then the sampled inputs.
+    then the sampled inputs. ``uses`` has for each row, and for each surface behind them, the columns that it depends
+    on; behind those of slopes are time and the parameters.
     """
 
     routines: Routines
     places: tuple[tuple[int, int], ...]
+    uses: tuple[frozenset[int], ...]
 
 
 def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
@@ -48,7 +52,18 @@ def _slopes(mode: LoweredMode) -> Slopes:
     places = [(row, order[symbol]) for row, sparse in zip(rows, slopes.sparse, strict=True) for symbol in sparse]
     values = tuple(slope for sparse in slopes.sparse for slope in sparse.values())
     definition = Definition("slopes", (TIME, *mode.states), values, slopes.statements)
-    return Slopes(print_routines((definition,), mode.names.data), tuple(places))
+    routines = print_routines((definition,), mode.names.data)
+    return Slopes(routines, tuple(places), _uses(mode, dict(zip(given, outputs, strict=True)), order))
+
+
+def _uses(mode: LoweredMode, outputs: dict[int, sp.Basic], order: dict[sp.Symbol, int]) -> tuple[frozenset[int], ...]:
+    """The columns that flows, outputs and surfaces depend on; an output that a mode does not have has none."""
+    places = order | {name: k for k, name in enumerate((TIME, *mode.names.parameters), len(order))}
+    every = (outputs.get(k, sp.S.Zero) for k in range(len(mode.mode.outputs)))
+    return tuple(
+        frozenset(places[name] for name in expr.free_symbols & places.keys())
+        for expr in (*mode.flow, *every, *mode.residuals)
+    )
 
 
 def lower_given(system: HybridSystem) -> Routines:

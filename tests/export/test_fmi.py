@@ -68,7 +68,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
         key = text, version, *initial.items()
         if key not in known:
             model = hsdsl.loads(text) if "\n" in text else hsdsl.load(MODELS / f"{text}.yaml")
-            ((name, content),) = files_of(source_of(model, {"initial": initial}), f"fmi{version}").items()
+            ((name, content),) = files_of(source_of(model, {"initial": initial}), f"fmi{version}", "output").items()
             path = tmp_path_factory.mktemp("unit") / name
             path.write_bytes(content)
             known[key] = str(path)
@@ -714,5 +714,5 @@ def test_texts_of_a_model_stay_texts_and_bytes_stay_the_same(made: Any) -> None:
     names = {variable.name: variable for variable in description.modelVariables}
     assert names["der(x)"].unit == "(m)/(s)"
     assert names["k"].description == 'stiffness < "&'
-    again = files_of(source_of(loaded(DRIVEN), {}), "fmi3")
+    again = files_of(source_of(loaded(DRIVEN), {}), "fmi3", "output")
     assert list(again.values()) == [Path(made(DRIVEN, 3)).read_bytes()]

@@ -20,15 +20,15 @@ from hsdsl.runtime.process import workshop
 
 FOLDER = Path(__file__).parent
 LOOP = "hs.c"
-COMPILED = ("model.c", "problem.c", "instance.c", LOOP, "variables.c", "fmu.c", "events.c", "fmi.c")
+COMPILED = ("model.c", "problem.c", "instance.c", LOOP, "variables.c", "fmu.c", "surfaces.c", "events.c", "fmi.c")
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 _SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
 _PROCESSORS = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64", "i686": "x86"}
 
 
 def token_of(unit: Unit, version: int) -> str:
-    """A UUID of the model, its settings and this version."""
-    digest = hashlib.sha256("\n".join((str(version), *unit.source.heading)).encode()).hexdigest()
+    """A UUID of the model, its settings, its variables and this version."""
+    digest = hashlib.sha256("\n".join((str(version), unit.modes, *unit.source.heading)).encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 
@@ -38,7 +38,7 @@ def sources_of(unit: Unit, version: int) -> dict[str, bytes]:
     flat["variables.h"] = tables.header(unit, token_of(unit, version)).encode()
     flat["variables.c"] = tables.numbers(unit).encode()
     flat["fmi_version.h"] = f'#include "fmi{version}.h"\n'.encode()
-    parts = ("fmu.h", "fmu.c", "events.h", "events.c", "fmi.h", "fmi.c", f"fmi{version}.h", f"fmi{version}.c")
+    parts = ("fmu.h", "fmu.c", "surfaces.h", "surfaces.c", "events.h", "events.c", "fmi.h", "fmi.c", f"fmi{version}.h", f"fmi{version}.c")
     return flat | {name: (FOLDER / "parts" / name).read_bytes() for name in parts}
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from hsdsl import __version__
 from hsdsl.export.fmi.archive import token_of
+from hsdsl.export.fmi.dependencies import dependencies, initial_dependencies
 from hsdsl.export.fmi.variables import Unit, Variable
 from hsdsl.export.fmi.xml import Element, element, per_time
 
@@ -16,7 +18,7 @@ _KINDS = {  # causality, variability, initial
     "parameter": ("parameter", "tunable", "exact"),
     "input": ("input", "continuous", None),
     "output": ("output", "continuous", "calculated"),
-    "mode": ("output", "discrete", "calculated"),
+    "mode": ("local", "discrete", "calculated"),
     "indicator": ("local", "continuous", "calculated"),
 }
 
@@ -47,9 +49,11 @@ def unit_of_measure(unit: Unit, variable: Variable) -> str | None:
     return per_time(variable.unit, time) if variable.kind == "derivative" else variable.unit
 
 
-def named(variable: Variable, reference: int) -> dict[str, Any]:
+def named(unit: Unit, variable: Variable, reference: int) -> dict[str, Any]:
     """The attributes of a variable that say what it is called and what it is to the caller."""
     causality, variability, initial = _KINDS[variable.kind]
+    if variable.kind == "mode":
+        causality = unit.modes
     if variable.kind == "parameter" and variable.fixed:
         variability = "fixed"
     if variable.kind == "input" and variable.discrete:
@@ -77,7 +81,30 @@ def numbers(unit: Unit, variable: Variable, offset: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def outputs(unit: Unit) -> list[int]:
+    """What the caller takes for outputs."""
+    return unit.references("state", "output", *(("mode",) if unit.modes == "output" else ()))
+
+
 def initial_unknowns(unit: Unit) -> list[int]:
-    """What is computed at the start: derivatives, outputs, modes, and parameters that depend on others."""
+    """What is computed at the start: derivatives, outputs, and parameters that depend on others."""
     calculated = [i for i, v in enumerate(unit.variables) if v.kind == "parameter" and v.start is None]
-    return sorted((*unit.references("derivative", "output", "mode"), *calculated))
+    states = unit.references("state")
+    return sorted((*(i for i in outputs(unit) if i not in states), *unit.references("derivative"), *calculated))
+
+
+def structure(
+    root: Element, unit: Unit, listed: Mapping[str, tuple[Sequence[int], str]], reference: str, first: int
+) -> None:
+    """The structure of a model: for each list of unknowns its elements, by an attribute, with what each depends on.
+
+    ``listed`` has for each element's tag the unknowns and the element around them, if there is one; references are
+    numbered from ``first`` on.
+    """
+    parent, always, initially = element(root, "ModelStructure"), dependencies(unit), initial_dependencies(unit)
+    for kind, (unknowns, tag) in listed.items():
+        known = initially if kind.startswith("Initial") else always
+        around = element(parent, kind) if unknowns and kind != tag else parent
+        for unknown in unknowns:
+            numbers = " ".join(str(i + first) for i in known[unknown])
+            element(around, tag, **{reference: str(unknown + first)}, dependencies=numbers)

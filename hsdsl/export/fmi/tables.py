@@ -28,10 +28,10 @@ typedef struct {{
   int kind, index;
 }} fmu_variable;
 
-/* An input: its place among sampled ones, the parameter that turns its expression off (-1: samples), and whether it
-   stays as given. */
+/* An input: its place among sampled ones, the parameter that turns its expression off (-1: samples), whether it stays
+   as given, and whether it changes at events alone. */
 typedef struct {{
-  int samples, given, fixed;
+  int samples, given, fixed, held;
 }} fmu_input_place;
 
 /* The slopes of a mode that are not zero everywhere, by references of unknown and known. */
@@ -43,8 +43,9 @@ typedef struct {{
 
 extern const fmu_variable fmu_variables[];
 extern const fmu_input_place fmu_input[];
-extern const double fmu_input_start[], fmu_nominal[];
+extern const double fmu_input_start[], fmu_input_nominal[], fmu_nominal[];
 extern const fmu_slope_table fmu_slopes[];
+extern const char *const fmu_moves[]; /* for each mode: of each surface whether each input moves it */
 
 /* Which parameter is beyond a bound of its own; 0 for none. */
 const char *fmu_beyond(const double *p);
@@ -89,15 +90,20 @@ def numbers(unit: Unit) -> str:
     off = switched(unit.source)
     inputs = [variable for variable in unit.variables if variable.kind == "input"]
     variables = (f"{{FMU_{variable.kind.upper()}, {variable.index}}}" for variable in unit.variables)
-    places = (f"{{{i}, {off.get(given.name, -1)}, {int(inputs[i].fixed)}}}" for i, given in enumerate(system.inputs))
+    places = (
+        f"{{{i}, {off.get(given.name, -1)}, {int(inputs[i].fixed)}, {int(inputs[i].discrete)}}}"
+        for i, given in enumerate(system.inputs)
+    )
     parts = [
         comment(unit.source.heading),
         '\n#include "variables.h"\n\n#include "hs_math.h"\n\n',
         array("const fmu_variable", "fmu_variables", variables),
-        array("const fmu_input_place", "fmu_input", list(places) or ["{0, 0, 0}"]),
+        array("const fmu_input_place", "fmu_input", list(places) or ["{0, 0, 0, 0}"]),
         array("const double", "fmu_input_start", (literal(variable.start or 0.0) for variable in inputs)),
+        array("const double", "fmu_input_nominal", (literal(variable.nominal or 1.0) for variable in inputs)),
         array("const double", "fmu_nominal", map(literal, [*unit.nominals, *_ones(unit)])),
         _slopes(unit),
+        _moves(unit),
         _given(unit),
         _bounds(unit),
     ]
@@ -124,6 +130,17 @@ def _slopes(unit: Unit) -> str:
         parts.append(array("static const unsigned", f"column_{k}", (str(column[i]) for _, i in slopes.places)))
         rows.append(f"{{mode_{k}_slopes, {len(slopes.places)}, row_{k}, column_{k}}}")
     return "".join(parts) + array("const fmu_slope_table", "fmu_slopes", rows)
+
+
+def _moves(unit: Unit) -> str:
+    parts, names = list[str](), list[str]()
+    inputs, outputs = len(unit.source.system.inputs), len(unit.source.system.outputs)
+    for k, (mode, slopes) in enumerate(zip(unit.problem.program.flows, unit.slopes, strict=True)):
+        width = len(mode.states)
+        flags = (str(int(width + i in uses)) for uses in slopes.uses[width + outputs :] for i in range(inputs))
+        parts.append(array("static const char", f"moves_{k}", flags))
+        names.append(f"moves_{k}")
+    return "".join(parts) + array("const char *const", "fmu_moves", names)
 
 
 def _given(unit: Unit) -> str:

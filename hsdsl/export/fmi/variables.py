@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -15,6 +15,7 @@ from hsdsl.arithmetic import FLOAT64
 from hsdsl.backends.text import compile_routines
 from hsdsl.elaborate.inputs import switch_name
 from hsdsl.execution import Execution
+from hsdsl.export import Modes
 from hsdsl.export.parameters import derived, structural
 from hsdsl.export.source import Source, drivable
 from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
@@ -49,9 +50,13 @@ class Variable:
 
 @dataclass(frozen=True)
 class Unit:
-    """A source whose inputs can be driven, with its variables in the order of their references."""
+    """A source whose inputs can be driven, with its variables in the order of their references.
+
+    ``modes`` says what the numbers of modes are to the caller.
+    """
 
     source: Source
+    modes: Modes = "local"
 
     @property
     def problem(self) -> Problem:
@@ -76,7 +81,8 @@ class Unit:
         outputs = (Variable("output", k, name, units.get(name)) for k, name in enumerate(system.outputs))
         surfaces = max(len(mode.surfaces) for mode in self.problem.program.flows)
         indicators = (Variable("indicator", k, f"indicator[{k}]") for k in range(surfaces))
-        return (*_inputs(self.source), *outputs, *_modes(self.source), *indicators)
+        modes = () if self.modes == "none" else _modes(self.source)
+        return (*_inputs(self.source), *outputs, *modes, *indicators)
 
     @property
     def nominals(self) -> list[float]:
@@ -93,9 +99,9 @@ class Unit:
         return lower_slopes(self.source.system)
 
 
-def unit_of(source: Source) -> Unit:
+def unit_of(source: Source, modes: Modes = "local") -> Unit:
     """The unit of a source."""
-    return Unit(drivable(source))
+    return Unit(drivable(source), modes)
 
 
 def _time() -> tuple[Variable, ...]:
@@ -219,14 +225,33 @@ def _inputs(source: Source) -> list[Variable]:
     found: list[Variable] = []
     for i, given in enumerate(source.system.inputs):
         start, slope, since = data[count + 3 * i : count + 3 * i + 3]
-        first = given_start(source, i) if given.given is not None else start + slope * (0.0 - since)
+        first = given_values(source, i, [0.0])[0] if given.given is not None else start + slope * (0.0 - since)
         held = given.given is None and given.hold == "zero"
-        found.append(Variable("input", i, given.name, given.unit, float(first), fixed=i in deciding, discrete=held))
+        size = _power(_input_size(source, i))
+        found.append(
+            Variable("input", i, given.name, given.unit, float(first), None, i in deciding, nominal=size, discrete=held)
+        )
     return found
 
 
-def given_start(source: Source, index: int) -> float:
-    """The value that the expression of an input has at t = 0."""
+def given_values(source: Source, index: int, times: Iterable[float]) -> list[float]:
+    """The values that the expression of an input has at some times."""
     routines = lower_given(source.system)
     bound = compile_routines(routines, FLOAT64, "inputs")(*source.problem.timeline.segments[0].data)
-    return bound[routines.names.index(f"given_{index}")](0.0)[0]
+    values = bound[routines.names.index(f"given_{index}")]
+    return [float(values(time)[0]) for time in times]
+
+
+def _input_size(source: Source, index: int) -> float:
+    """The largest size of an input in the run that is exported."""
+    problem, place = source.problem, len(source.problem.program.parameters) + 3 * index
+    until = float(problem.settings.until)
+    if source.system.inputs[index].given is not None:
+        values = given_values(source, index, _SHARES * until)
+    else:
+        values = list[float]()
+        for segment in problem.timeline.segments:
+            start, slope, since = segment.data[place : place + 3]
+            ends = (segment.start, min(float(segment.end), until))
+            values += [float(start + slope * (float(time) - since)) for time in ends]
+    return max((abs(value) for value in values if math.isfinite(value)), default=0.0)

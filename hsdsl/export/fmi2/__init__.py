@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+from hsdsl.export import Modes
 from hsdsl.export.fmi.archive import compiled_names, unit_file
-from hsdsl.export.fmi.description import define_experiment, initial_unknowns, named, numbers, root_of, unit_of_measure
+from hsdsl.export.fmi.description import (
+    define_experiment,
+    initial_unknowns,
+    named,
+    numbers,
+    outputs,
+    root_of,
+    structure,
+    unit_of_measure,
+)
 from hsdsl.export.fmi.variables import Unit, Variable, unit_of
-from hsdsl.export.fmi.xml import Element, define_units, element, written
+from hsdsl.export.fmi.xml import define_units, element, written
 from hsdsl.export.source import Source
 
 _CAN = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True, "providesDirectionalDerivative": True}
 
 
-def files(source: Source) -> dict[str, bytes]:
-    """One ``.fmu`` file.
+def files(source: Source, modes: Modes = "local") -> dict[str, bytes]:
+    """One ``.fmu`` file; ``modes`` says what the numbers of modes are to the caller.
 
     Raises UsageError: the C runtime has no such scheme, or there is no compiler.
     """
-    unit = unit_of(source)
+    unit = unit_of(source, modes)
     return unit_file(unit, 2, description(unit), {})
 
 
@@ -36,28 +46,19 @@ def description(unit: Unit) -> str:
     define_experiment(root, unit, ("logStatusError",))
     variables = element(root, "ModelVariables")
     for reference, variable in listed:
-        scalar = element(variables, "ScalarVariable", **named(variable, reference))
+        scalar = element(variables, "ScalarVariable", **named(unit, variable, reference))
         if variable.kind == "mode":
             element(scalar, "Integer")
         else:
             element(scalar, "Real", unit=_unit(unit, variable), **numbers(unit, variable, 1))
-    _structure(root, unit)
+    lists = {
+        "Outputs": (outputs(unit), "Unknown"),
+        "Derivatives": (unit.references("derivative"), "Unknown"),
+        "InitialUnknowns": (initial_unknowns(unit), "Unknown"),
+    }
+    structure(root, unit, lists, "index", 1)
     return written(root)
 
 
 def _unit(unit: Unit, variable: Variable) -> str | None:
     return None if variable.kind == "time" else unit_of_measure(unit, variable)
-
-
-def _structure(root: Element, unit: Unit) -> None:
-    structure = element(root, "ModelStructure")
-    lists = {
-        "Outputs": unit.references("state", "output", "mode"),
-        "Derivatives": unit.references("derivative"),
-        "InitialUnknowns": initial_unknowns(unit),
-    }
-    for tag, references in lists.items():
-        if references:
-            parent = element(structure, tag)
-            for reference in references:
-                element(parent, "Unknown", index=str(reference + 1))

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from hsdsl.export import Modes
 from hsdsl.export.fmi.archive import compiled_names, unit_file
-from hsdsl.export.fmi.description import define_experiment, initial_unknowns, named, numbers, root_of, unit_of_measure
+from hsdsl.export.fmi.description import (
+    define_experiment,
+    initial_unknowns,
+    named,
+    numbers,
+    outputs,
+    root_of,
+    structure,
+    unit_of_measure,
+)
 from hsdsl.export.fmi.variables import Unit, unit_of
-from hsdsl.export.fmi.xml import Element, define_units, element, written
+from hsdsl.export.fmi.xml import define_units, element, written
 from hsdsl.export.source import Source
 
 _CAN = {
@@ -16,12 +26,12 @@ _CAN = {
 }
 
 
-def files(source: Source) -> dict[str, bytes]:
-    """One ``.fmu`` file.
+def files(source: Source, modes: Modes = "local") -> dict[str, bytes]:
+    """One ``.fmu`` file; ``modes`` says what the numbers of modes are to the caller.
 
     Raises UsageError: the C runtime has no such scheme, or there is no compiler.
     """
-    unit = unit_of(source)
+    unit = unit_of(source, modes)
     build = {"sources/buildDescription.xml": build_description(unit).encode()}
     return unit_file(unit, 3, description(unit), build)
 
@@ -46,22 +56,16 @@ def description(unit: Unit) -> str:
     define_experiment(root, unit, ("logStatusError", "logEvents"))
     variables = element(root, "ModelVariables")
     for reference, variable in enumerate(unit.variables):
-        known = named(variable, reference)
+        known = named(unit, variable, reference)
         if variable.kind == "mode":
             element(variables, "Int32", **known)
         else:
             element(variables, "Float64", **known, unit=unit_of_measure(unit, variable), **numbers(unit, variable, 0))
-    _structure(root, unit)
+    lists = {
+        "Output": outputs(unit),
+        "ContinuousStateDerivative": unit.references("derivative"),
+        "InitialUnknown": initial_unknowns(unit),
+        "EventIndicator": unit.references("indicator"),
+    }
+    structure(root, unit, {tag: (unknowns, tag) for tag, unknowns in lists.items()}, "valueReference", 0)
     return written(root)
-
-
-def _structure(root: Element, unit: Unit) -> None:
-    structure = element(root, "ModelStructure")
-    for reference in unit.references("state", "output", "mode"):
-        element(structure, "Output", valueReference=str(reference))
-    for reference in unit.references("derivative"):
-        element(structure, "ContinuousStateDerivative", valueReference=str(reference))
-    for reference in initial_unknowns(unit):
-        element(structure, "InitialUnknown", valueReference=str(reference))
-    for reference in unit.references("indicator"):
-        element(structure, "EventIndicator", valueReference=str(reference))

@@ -17,6 +17,12 @@ void fmu_local(const fmu *unit, double *x);
 /* The segment of the inputs that a time is in; at a boundary the later one. */
 int32_t fmu_segment_at(double time);
 
+/* Enter the initial mode: what its state is beyond fires at once. */
+fmu_status fmu_begin(fmu *unit);
+
+/* Whether other values are given than before. */
+int fmu_has_changed(const fmu_data *now);
+
 /* Enter the target of an edge of a mode with these values. */
 void fmu_enter(fmu *unit, int mode, int edge, const double *after);
 

@@ -45,9 +45,9 @@ void fmu_reset(fmu *unit) {
   unit->run.sink = sink;
   unit->now.mode = problem_mode;
   unit->now.resting = -1;
-  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->now.parameters[i] = unit->run.parameters[i];
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->now.given.parameters[i] = unit->run.parameters[i];
   for (int s = 0; s < mode->dimension; s++) unit->now.state[mode->state[s]] = problem_x[s];
-  for (int i = 0; i < FMU_INPUTS; i++) unit->now.input[i] = fmu_input_start[i];
+  for (int i = 0; i < FMU_INPUTS; i++) unit->now.given.input[i] = fmu_input_start[i];
   unit->now.tuned = 1;
   unit->bound = 0;
 }
@@ -68,18 +68,19 @@ static int derive_start(fmu *unit) {
 
 /* Put parameters and the inputs that were set where routines and the run read them; not 0 where one has no value. */
 static int put_in_place(fmu *unit) {
+  fmu_given_values *const given = &unit->now.given;
   double *const data = unit->run.data;
   memcpy(data, problem_timeline.data, PROBLEM_SEGMENTS * PROBLEM_DATA * sizeof *data);
   for (int i = 0; i < FMU_INPUTS; i++)
-    if (fmu_input[i].given >= 0) unit->now.parameters[fmu_input[i].given] = unit->now.input_set[i] ? 0.0 : 1.0;
-  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->run.parameters[i] = unit->now.parameters[i];
+    if (fmu_input[i].given >= 0) given->parameters[fmu_input[i].given] = given->input_set[i] ? 0.0 : 1.0;
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->run.parameters[i] = given->parameters[i];
   if (hs_tune(&unit->run) || (!unit->now.started && derive_start(unit))) return 1;
-  for (int i = 0; i < PROBLEM_PARAMETERS; i++) unit->now.parameters[i] = unit->run.parameters[i];
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) given->parameters[i] = unit->run.parameters[i];
   for (int i = 0; i < FMU_INPUTS; i++) {
-    if (!unit->now.input_set[i]) continue;
+    if (!given->input_set[i]) continue;
     for (int64_t k = 0; k < PROBLEM_SEGMENTS; k++) {
       double *const line = data + k * PROBLEM_DATA + PROBLEM_PARAMETERS + 3 * fmu_input[i].samples;
-      line[0] = unit->now.input[i], line[1] = line[2] = 0.0;
+      line[0] = given->input[i], line[1] = line[2] = 0.0;
     }
   }
   unit->now.tuned = 0;
@@ -90,7 +91,8 @@ static int put_in_place(fmu *unit) {
 /* Bind routines to the segment of the inputs that was entered last, and to the guard that holds the state. */
 const double *fmu_bind(fmu *unit) {
   if (unit->now.tuned && put_in_place(unit)) return 0;
-  if (!unit->bound) memcpy(unit->p, unit->run.data + unit->now.segment * PROBLEM_DATA, PROBLEM_DATA * sizeof(double));
+  const double *const data = unit->run.data + unit->now.given.segment * PROBLEM_DATA;
+  if (!unit->bound) memcpy(unit->p, data, PROBLEM_DATA * sizeof(double));
   unit->bound = 1;
   const int resting = unit->now.resting;
   for (int i = 0; i < PROBLEM_CONTACTS; i++) unit->p[PROBLEM_DATA + i] = 0.0;
@@ -107,7 +109,8 @@ void fmu_local(const fmu *unit, double *x) {
 static double interpolated_input(fmu *unit, int i) {
   const double *p = fmu_bind(unit);
   if (!p) return NAN;
-  if (fmu_input[i].given >= 0) return unit->now.input_set[i] ? unit->now.input[i] : fmu_given(i, p, unit->now.time);
+  const fmu_given_values *const given = &unit->now.given;
+  if (fmu_input[i].given >= 0) return given->input_set[i] ? given->input[i] : fmu_given(i, p, unit->now.time);
   const double *line = p + PROBLEM_PARAMETERS + 3 * fmu_input[i].samples;
   return line[0] + line[1] * (unit->now.time - line[2]);
 }
@@ -140,7 +143,7 @@ fmu_status fmu_get(fmu *unit, unsigned reference, double *value) {
       return FMU_OK;
     case FMU_PARAMETER:
       if (!fmu_bind(unit)) return FMU_NO_VALUE;
-      *value = now->parameters[variable->index];
+      *value = now->given.parameters[variable->index];
       return FMU_OK;
     case FMU_INPUT: *value = interpolated_input(unit, variable->index); return FMU_OK;
     case FMU_OUTPUT: return output(unit, variable->index, value);
@@ -159,7 +162,7 @@ fmu_status fmu_get(fmu *unit, unsigned reference, double *value) {
 /* Whether a parameter may be tuned to a value: those that it decides are within their bounds too. */
 static int is_tunable(fmu *unit, int index, double value) {
   double p[PROBLEM_PARAMETERS + 1];
-  memcpy(p, unit->now.parameters, PROBLEM_PARAMETERS * sizeof *p);
+  memcpy(p, unit->now.given.parameters, PROBLEM_PARAMETERS * sizeof *p);
   p[index] = value;
   if (problem_derive(p)) return 0;
   unit->refusal = fmu_beyond(p);
@@ -181,15 +184,14 @@ fmu_status fmu_set(fmu *unit, unsigned reference, double value) {
       if (problem_derived[variable->index] || (now->started && problem_structural[variable->index])) return FMU_ERROR;
       if (problem_structural[variable->index] && value != problem_timeline.data[variable->index]) return FMU_ERROR;
       if (now->started && !is_tunable(unit, variable->index, value)) return FMU_ERROR;
-      now->changed |= now->parameters[variable->index] != value;
-      now->parameters[variable->index] = value;
+      now->given.parameters[variable->index] = value;
       now->tuned = 1;
       return FMU_OK;
     case FMU_INPUT:
       if (fmu_input[variable->index].fixed) return FMU_ERROR;
-      now->changed |= !now->input_set[variable->index] || now->input[variable->index] != value;
-      now->input[variable->index] = value;
-      now->input_set[variable->index] = now->tuned = 1;
+      if (now->given.input_set[variable->index] && now->given.input[variable->index] == value) return FMU_OK;
+      now->given.input[variable->index] = value;
+      now->given.input_set[variable->index] = now->tuned = 1;
       return FMU_OK;
     default: return FMU_ERROR;
   }
@@ -248,7 +250,7 @@ static void follow_run(fmu *unit) {
   const hs_mode *mode = &hs_the_model.mode[pause->mode];
   unit->now.mode = pause->mode;
   for (int s = 0; s < mode->dimension && s < dimension; s++) unit->now.state[mode->state[s]] = x[s];
-  unit->now.segment = fmu_segment_at(unit->now.time);
+  unit->now.given.segment = fmu_segment_at(unit->now.time);
   unit->bound = 0;
 }
 
@@ -280,15 +282,13 @@ static fmu_status started(fmu *unit) {
 
 fmu_status fmu_initialize(fmu *unit) {
   fmu_data *now = &unit->now;
-  int jumped;
-  double next;
-  if (!fmu_bind(unit) || (unit->refusal = fmu_beyond(now->parameters)) != 0) return FMU_ERROR;
-  now->segment = fmu_segment_at(now->time);
+  if (!fmu_bind(unit) || (unit->refusal = fmu_beyond(now->given.parameters)) != 0) return FMU_ERROR;
+  now->given.segment = fmu_segment_at(now->time);
   unit->bound = 0;
   now->started = 1;
-  if (unit->co_simulation) return started(unit);
-  now->changed = 1; /* what the initial state is beyond fires at once */
-  return fmu_update(unit, &jumped, &next);
+  const fmu_status status = unit->co_simulation ? started(unit) : fmu_begin(unit);
+  now->earlier = now->given;
+  return status;
 }
 
 /* Why no step of a size begins at a communication point; a point may be off by the round-off of sums. */
@@ -314,15 +314,15 @@ fmu_status fmu_step(fmu *unit, double point, double size, double *reached, int *
     return FMU_OK;
   }
   const int64_t jumps = unit->jumps_before = now->jumps;
-  const int changed = now->changed;
-  now->changed = now->shows_before = 0;
-  now->ended = hs_advance(&unit->run, until, changed, pauses(unit));
+  now->shows_before = 0;
+  now->ended = hs_advance(&unit->run, until, fmu_has_changed(now), pauses(unit));
   const double time = unit->run.pause.time;
   if (now->ended) *reached = unit->run.task.stop.time < until ? unit->run.task.stop.time : until;
   if (pauses(unit) && now->jumps > jumps && time < until) *reached = time;
   *event = now->jumps > jumps;
   now->time = *reached;
   follow_run(unit);
+  now->earlier = now->given;
   now->shows_before = time > until || (*event && pauses(unit));
   has_failed(unit);
   return FMU_OK;

@@ -8,27 +8,39 @@
 
 typedef enum { FMU_OK, FMU_NO_VALUE, FMU_ERROR } fmu_status;
 
-/* All of a unit that changes, as plain data: copied, it is the unit's state. States are those of all modes, by name; one
-   that the present mode does not have keeps its value. */
+/* What is given from outside: parameters, inputs, and the segment of the inputs that follow the file. */
 typedef struct {
-  double time, stop_time;
-  int started, ended; /* `ended`: the run is over, by a final mode or otherwise */
-  int mode, resting;  /* the edge along whose guard the state moves, or -1 */
-  int32_t segment;
-  double state[PROBLEM_STATES + 1], scale[PROBLEM_STATES + 1];
-  int state_set[PROBLEM_STATES + 1];
-  int outside[PROBLEM_SURFACES + 1]; /* whether the state was beyond an `if` that did not fire, at the last event */
-  int left_known; /* whether there are values of surfaces before inputs jump at this event, in `left` */
-  double left[PROBLEM_SURFACES + 1];
-  double margin[PROBLEM_SURFACES + 1];
   double parameters[PROBLEM_PARAMETERS + 1];
   double input[FMU_INPUTS + 1];
   int input_set[FMU_INPUTS + 1];
-  int changed, tuned; /* inputs or parameters since the last event, and parameters since they were put in place */
+  int32_t segment;
+} fmu_given_values;
+
+/* Where a state is as to a surface: inside, or beyond it without having crossed it. One that is on the surface crossed
+   it already, and is still beyond since an input moved the surface past it. */
+typedef enum { FMU_INSIDE, FMU_OUTSIDE, FMU_ON } fmu_side;
+
+/* All of a unit that changes, as plain data: copied, it is the unit's state. States are those of all modes, by name; one
+   that the present mode does not have keeps its value. */
+typedef struct {
+  double time;
+  int started, ended; /* `ended`: the run is over, by a final mode or otherwise */
+  int mode, resting;  /* the edge along whose guard the state moves, or -1 */
+  double state[PROBLEM_STATES + 1], scale[PROBLEM_STATES + 1];
+  int state_set[PROBLEM_STATES + 1];
+  fmu_side side[PROBLEM_SURFACES + 1]; /* at the last event */
+  double margin[PROBLEM_SURFACES + 1];
+  double furthest[PROBLEM_SURFACES + 1]; /* how far beyond a surface the state is that is on it */
+  double input_size[FMU_INPUTS + 1];     /* the largest so far */
+  double inside_at[PROBLEM_SURFACES + 1]; /* when a state was inside at last */
+  int left[PROBLEM_SURFACES + 1]; /* whether it has been inside, off the surface, since the last transition there */
+  int again;                      /* transitions in a row from a surface that the state did not leave */
+  fmu_given_values given, earlier; /* now, and before this event; in co-simulation before this step */
+  int tuned; /* whether what is given has changed since it was put in place */
   /* of co-simulation: what is shown in place of the state while it waits in a strip, or before an event is handled */
   int shows_before, before_mode;
   double before[PROBLEM_STATES + 1];
-  int64_t jumps, events; /* transitions made, and times at which the caller looked for them */
+  int64_t jumps; /* transitions made */
   hs_pause pause;
   double numbers[HS_PAUSE_NUMBERS(PROBLEM_WIDTH, PROBLEM_MODES, PROBLEM_STATES)];
   double data[PROBLEM_DATA + 1];
@@ -41,6 +53,9 @@ typedef struct {
   double p[PROBLEM_DATA + PROBLEM_CONTACTS + 1]; /* what routines are bound to, at `bound` */
   int bound;
   double slopes[PROBLEM_STATES + 1]; /* where the flow had a value last */
+  int left_known; /* whether there are values of surfaces before what is given changed at this event, in `left` */
+  double left[PROBLEM_SURFACES + 1];
+  int made[PROBLEM_SURFACES + 1]; /* edges of the present mode whose transitions were made at this event */
   int64_t jumps_before;
   hs_instance run;
   const char *complaint; /* why the run ended */
@@ -65,7 +80,7 @@ fmu_status fmu_get_indicators(fmu *unit, double *z);
 /* Derive what depends on parameters; then enter the initial mode. */
 fmu_status fmu_initialize(fmu *unit);
 
-/* Keep the values of surfaces before inputs jump: an event begins. */
+/* An event begins: what is given now is what was before it. */
 void fmu_enter_events(fmu *unit);
 
 /* Handle what is due at the present time; `jumped` says whether states have changed, `next` is the next known event. */
