@@ -10,10 +10,10 @@ from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import is_mode, select, total, whole
-from hsdsl.expression.trigger import Reached, comparisons, number, reached
-from hsdsl.functions import maximum, minimum, replaced
+from hsdsl.expression.trigger import Reached, comparisons, either, number, reached
+from hsdsl.functions import below, replaced
 from hsdsl.names import memory
-from hsdsl.system import ONE, TIME, ZERO, Edge, Mode, Surface
+from hsdsl.system import HALF, ONE, TIME, ZERO, Edge, Mode, Surface
 
 Values = dict[str, Any]
 
@@ -77,10 +77,10 @@ class Event:
     def ready(self) -> Any:
         """1 where it is to be made at this instant, else 0."""
         if self.slots:
-            ready = minimum(self.symbol("waiting"), ONE) * reached(TIME, self.slots[0].at)
+            ready = below(self.symbol("waiting"), HALF, ZERO, ONE) * reached(TIME, self.slots[0].at)
         else:
             ready = self.symbol("armed") * self.rises()
-            ready = maximum(ready, self.symbol("due")) if self.jumps else ready
+            ready = either(ready, self.symbol("due")) if self.jumps else ready
         here = self.here({}, {})
         return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
 

@@ -23,7 +23,7 @@ def highest_priority(events: Sequence[Event]) -> Any | None:
     if all(event.event.priority is None for event in events):
         return None
     least = reduce(minimum, (event.priority for event in events))
-    return reduce(lambda most, e: e.ready * maximum(most, e.priority) + (1 - e.ready) * most, events, least)
+    return reduce(maximum, (below(event.ready, HALF, least, event.priority) for event in events))
 
 
 def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
