@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import TIE, Arithmetic, Number
@@ -9,12 +10,13 @@ from hsdsl.integrators.stepper import State
 from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate.input_segments import Timeline
+from hsdsl.simulate.queues import Waits
 from hsdsl.simulate.settings import Settings
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A program, its numbers, and where it starts: mode, the names of its states, and ``x`` at t = 0."""
+    """A program, its numbers, and where it starts: mode, the names of its states, ``x`` at t = 0, and what ``waits``."""
 
     program: Program
     kernel: Kernel
@@ -23,6 +25,7 @@ class Problem:
     mode: int
     states: tuple[str, ...]
     x: State
+    waits: Mapping[str, Sequence[Waits]]
 
     @property
     def arithmetic(self) -> Arithmetic:
@@ -31,7 +34,7 @@ class Problem:
 
     def with_settings(self, settings: Settings) -> Problem:
         """The same problem with other settings."""
-        return Problem(self.program, self.kernel, settings, self.timeline, self.mode, self.states, self.x)
+        return Problem(self.program, self.kernel, settings, self.timeline, self.mode, self.states, self.x, self.waits)
 
     def tie(self, t: Number) -> Number:
         """Times closer than this to t are the same instant, however long the run goes on."""

@@ -44,7 +44,9 @@ def with_scene(source: Source) -> Source:
     system = scene_as_outputs(system)
     given = source.problem
     program = lower(system)
-    problem = Problem(program, given.kernel, given.settings, given.timeline, given.mode, given.states, given.x)
+    problem = Problem(
+        program, given.kernel, given.settings, given.timeline, given.mode, given.states, given.x, given.waits
+    )
     return replace(source, system=system, problem=problem)
 
 

@@ -89,6 +89,10 @@ static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here,
     place(run, mode, dimension, t, from_here ? &before : 0);
     before = run->here;
     const hs_mode *table = run->here.table;
+    if (run->full_queue >= 0) {
+      run->task->stop.edge = run->full_queue;
+      return stopped(run, HS_WAITING, t);
+    }
     if (table->final) return stopped(run, HS_FINAL, t);
     if (make_room(run)) return stopped(run, HS_INTERRUPTED, t);
     if (visit(&run->task->visited, run->width, mode, run->x, dimension)) return stopped(run, HS_ZENO, t);

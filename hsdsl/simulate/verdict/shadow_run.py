@@ -18,6 +18,7 @@ from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import terms
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.verdict.correction import Array, corrected
 
 MOST_CHANGES = 8  # of Newton's method
@@ -44,6 +45,7 @@ class ShadowRun:
         self.x: State = tuple(run.values[0, : len(run.arcs[0].states)].tolist())
         self.data = self.problem.timeline.segments[0].data
         self.enclosing: dict[int, ModeKernel] = {}
+        self.tails = Tails(problem.waits)
 
     def follow(self, arc: Arc, made: Transition | None) -> None:
         """Follow one arc, and the transition that ends it."""
@@ -157,4 +159,5 @@ class ShadowRun:
         self._compare(arc.last, list(made.before.values()), y)
         self.t += s
         self.time_errors.append(abs(float(made.time) - self.t))
-        self.x = kernel.resets[k](self.t, *y)
+        target = self.problem.program.modes[mode.edges[k].target]
+        self.x = self.tails.advance(mode, y, target, kernel.resets[k](self.t, *y))
