@@ -20,8 +20,8 @@ from hsdsl.model import automatic
 from hsdsl.model.ensemble_request import EnsembleRequest
 from hsdsl.model.options import KEYS, Options
 from hsdsl.model.settings import check_memory, setting_columns, whole
-from hsdsl.model.waiting import check_alone
 from hsdsl.model.values import InstanceTable, evaluate_parameters, initial_columns, start_of_parts
+from hsdsl.model.waiting import check_alone
 from hsdsl.model.workers import ArrayRecorder, Progress, run_compiled, run_in_turn
 from hsdsl.simulate import Prepared, Settings
 from hsdsl.simulate.ensemble import Instances, Kept

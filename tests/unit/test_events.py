@@ -94,7 +94,7 @@ def test_one_more_than_may_wait_ends_the_run(engine):
 
 
 def sawtooth(delay: str, until: str, further: str = ""):
-    """x rises to 1 and is taken to 0 each second; the event counts at the halves, a delay later."""
+    """A clock x rises to 1 and is taken to 0 each second; the event counts at the halves, a delay later."""
     tick = "{when: x >= 1, to: m, reset: {x: 0, k: k + 1}}"
     late = f"{{name: late, event: x >= 1/2, delay: {delay}, reset: {{n: n + 1, m: m + k}}{further}}}"
     return model("x: 1, k: 0, n: 0, m: 0", f"{tick}, {late}", "x: 0, k: 0, n: 0, m: 0", until)
@@ -102,7 +102,6 @@ def sawtooth(delay: str, until: str, further: str = ""):
 
 @pytest.mark.parametrize("waits", [7, 50, 1000])
 def test_as_many_wait_as_a_delay_needs(waits):
-    """With `values: trigger` n becomes what it was where the condition turned true, plus one."""
     run = sawtooth(f"{waits}.25", f"{2 * waits}.9", ", values: execution").simulate(engine=ENGINES[-1])
     made = times(run, "late")
     assert made == pytest.approx([k + 0.5 + waits + 0.25 for k in range(waits + 1)], abs=1e-9 * waits)
@@ -138,8 +137,8 @@ def test_a_run_goes_on_with_all_that_waits(engine):
         model.ensemble(initial=start | {"x": [0, 0.1]})
 
 
-def test_ensembles_and_streams_wait_as_runs_do(tmp_path):
-    model = sawtooth("20 + 3*sin(k)", "50")
+def test_ensembles_wait_as_runs_do():
+    model = sawtooth("20 + 3*sin(k)", "50", ", values: execution")
     alone = model.simulate(initial={"x": 0.25})
     found = model.ensemble(initial={"x": [0.0, 0.25]})
     assert [*found.stop] == ["until", "until"] and found.state["n"][1] == alone.final.state["n"] > 20
@@ -162,7 +161,8 @@ def test_no_execution_is_lost():
 
 
 def test_a_fifth_trigger_ends_the_run_also_by_a_reset():
-    text = "{name: e, event: x >= 1, delay: 90, waiting: 4, reset: {n: 1}}, {name: go, when: s >= 1, to: m, reset: {s: 0, x: 3 - x}}"
+    event = "{name: e, event: x >= 1, delay: 90, waiting: 4, reset: {n: 1}}"
+    text = f"{event}, {{name: go, when: s >= 1, to: m, reset: {{s: 0, x: 3 - x}}}}"
     run = model("s: 1, x: 0, n: 0", text, "s: 0, x: 0, n: 0", "20").simulate()
     assert times(run, "e triggers") == pytest.approx([1, 3, 5, 7, 9])
     assert run.stop.reason == "waiting_limit" and run.stop.time == pytest.approx(9)

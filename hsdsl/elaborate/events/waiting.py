@@ -7,7 +7,6 @@ States have the first that waits; where several can, `hsdsl.simulate.queues` kee
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from hsdsl.elaborate.events.event import Event, Values
 from hsdsl.expression.scope import symbol
