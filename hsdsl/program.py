@@ -230,7 +230,7 @@ class ModeProgram:
     ``slides`` names the two modes between which a mode of a completion slides.
     ``measured`` numbers states whose slopes at the end of an implicit step are put into the states before the last.
     The last ``derived`` states are derivatives of the others: surfaces and conditions do not depend on them.
-    ``queues`` are those of events whose executions wait.
+    ``queues`` are those of events whose executions wait. States that are ``idle`` decide no transition.
     """
 
     name: str
@@ -252,6 +252,12 @@ class ModeProgram:
     measured: tuple[int, ...] = ()
     derived: int = 0
     queues: tuple[Queue, ...] = ()
+    idle: tuple[int, ...] = ()
+
+    @cached_property
+    def deciding(self) -> tuple[int, ...]:
+        """The states that are not idle."""
+        return tuple(i for i in range(len(self.states)) if i not in self.idle)
 
     @property
     def surfaces(self) -> range:

@@ -10,6 +10,7 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.program import EdgeProgram
+from hsdsl.simulate.cascade import decisive
 from hsdsl.simulate.run import ModeState, Run, reset
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import ENTERED, endless, entered_final, left_domain, too_many_wait
@@ -37,9 +38,10 @@ def enter(
             return too_many_wait(here.mode, run.tails.full, t)
         if here.mode.final:
             return entered_final(here.mode.name, t)
-        if (mode, x) in visited:
+        decides = mode, decisive(here.mode, x)
+        if decides in visited:
             return endless(here.mode.name, t)
-        visited.add((mode, x))
+        visited.add(decides)
         try:
             values = here.kernel.surfaces(t, *x)
             finite = all(map(run.arithmetic.isfinite, values))

@@ -265,7 +265,7 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     entered = enter(run, *target, resumed, after, scale, here, arrival)
     if isinstance(entered, Stop):
         return entered
-    if run.cascade.returns(flowed, entered.index, entered.x):
+    if run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
         return slides(edge.name, here.mode, entered.mode, entered.t)
     return close_tail(run, entered, crossing.edge)
 

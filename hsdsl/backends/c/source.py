@@ -220,6 +220,8 @@ class _Writer:
             str(len(mode.states) - mode.derived),
             str(len(mode.queues)),
             self.table("hs_queue", "queues", list(map(self.queue, mode.queues))),
+            str(len(mode.idle)),
+            self.table("int", "places", list(map(str, mode.idle))),
         ]
         return f"{{{', '.join(fields)}}}"
 

@@ -130,6 +130,8 @@ typedef struct {
   int own;                 /* states but the last ones, which are derivatives of these: surfaces depend on none of them */
   int queues;
   const hs_queue *queue;
+  int idle; /* states that decide no transition */
+  const int *idles;
 } hs_mode;
 
 typedef struct {
