@@ -12,6 +12,7 @@ DEFAULTS: dict[str, Any] = {
     "relaxation": Fraction("1e-6"),
     "max_transitions": 10**6,
 }
+MOST_WAITING = 10**6  # executions of one event
 DEFAULT_TOLERANCE = Fraction("1e-9")
 _FOR_ROUNDOFF = 7  # digits: of the 16 of float64 the default tolerance keeps 9
 

@@ -102,6 +102,11 @@ def memory(owner: str, part: str) -> str:
     return f"{owner}{_MEMORY}{part}"
 
 
+def nth_memory(state: str, number: int) -> str:
+    """What the state of an execution that waits is called of the one with a number, from 1, in their order."""
+    return state if number == 1 else f"{state}[{number}]"
+
+
 def without_memory(names: Iterable[str]) -> tuple[str, ...]:
     """The names of states that readers see: those of the file."""
     return tuple(name for name in names if _MEMORY not in name)

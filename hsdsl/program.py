@@ -187,6 +187,19 @@ class Jacobian:
 
 
 @dataclass(frozen=True)
+class Queue:
+    """States of a mode, by number, that say of executions that wait how many do, at most so many, and the first.
+
+    ``name`` is that of the state with their number; ``values`` are a time and what the execution gives.
+    """
+
+    name: str
+    waiting: int
+    values: tuple[int, ...]
+    most: int
+
+
+@dataclass(frozen=True)
 class ModeProgram:
     """A mode: its data without numbers, and its routines.
 
@@ -224,6 +237,7 @@ class ModeProgram:
     ``slides`` names the two modes between which a mode of a completion slides.
     ``measured`` numbers states whose slopes at the end of an implicit step are put into the states before the last.
     The last ``derived`` states are derivatives of the others: surfaces and conditions do not depend on them.
+    ``queues`` are those of events whose executions wait. States that are ``idle`` decide no transition.
     """
 
     name: str
@@ -244,6 +258,13 @@ class ModeProgram:
     slides: tuple[str, ...] = ()
     measured: tuple[int, ...] = ()
     derived: int = 0
+    queues: tuple[Queue, ...] = ()
+    idle: tuple[int, ...] = ()
+
+    @cached_property
+    def deciding(self) -> tuple[int, ...]:
+        """The states that are not idle."""
+        return tuple(i for i in range(len(self.states)) if i not in self.idle)
 
     @property
     def surfaces(self) -> range:
@@ -360,6 +381,16 @@ class Program:
     def contact_count(self) -> int:
         """How many contacts the mode with most has."""
         return max((sum(edge.contact is not None for edge in mode.edges) for mode in self.modes), default=0)
+
+    @cached_property
+    def queues(self) -> tuple[str, ...]:
+        """The names of the queues of all modes, each once."""
+        return tuple(dict.fromkeys(queue.name for mode in self.modes for queue in mode.queues))
+
+    @cached_property
+    def queued(self) -> int:
+        """How many values the executions of the queue with most have."""
+        return max((len(queue.values) for mode in self.modes for queue in mode.queues), default=0)
 
     @property
     def all_states(self) -> tuple[str, ...]:

@@ -195,6 +195,22 @@ class Shape:
 
 
 @dataclass(frozen=True)
+class Queue:
+    """States that say of the delayed executions of an event how many are ``waiting``, at most so many, and the first.
+
+    ``values`` are the time at which the first is made and the values that it gives. The others wait elsewhere.
+    """
+
+    waiting: str
+    values: tuple[str, ...]
+    most: int
+
+    def of_states(self, names: Container[str]) -> Queue:
+        """The queue with values in these states, and no others."""
+        return replace(self, values=tuple(name for name in self.values if name in names))
+
+
+@dataclass(frozen=True)
 class Mode:
     """A mode: states in file order, their flow, walls, outgoing edges in file order, outputs and scene.
 
@@ -222,6 +238,7 @@ class Mode:
     derived: int = 0
     varied: tuple[tuple[int, ...], ...] = ()
     measured: tuple[int, ...] = ()
+    queues: tuple[Queue, ...] = ()
 
     def __post_init__(self) -> None:
         if not len(self.states) == len(self.flow) == len(self.flow_texts):

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+from hsdsl.defaults import MOST_WAITING
 from hsdsl.elaborate.resolver import ExpressionResolver
 from hsdsl.elaborate.symbols import SymbolTable
 from hsdsl.expression.scope import Scope, symbol
@@ -21,7 +22,6 @@ from hsdsl.source import ABSENT, Key, Scalar
 from hsdsl.system import ZERO, Edge, Event, Surface
 
 NOWHERE = Surface(ZERO, ZERO, ZERO, "")
-MOST_WAITING = 100
 _GUARDED = re.compile(r"(\S+)\s+(?:if|when)\s+(.+)")
 
 

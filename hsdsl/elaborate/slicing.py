@@ -96,6 +96,9 @@ def _mode(mode: Mode, needed: set[Node], outputs: list[int], own: set[str]) -> M
         flow_texts=tuple(mode.flow_texts[k] for k in kept),
         edges=tuple(_edge(edge, needed, own) for edge in mode.edges),
         outputs=tuple(mode.outputs[k] for k in outputs),
+        queues=tuple(
+            q.of_states([mode.states[k] for k in kept]) for q in mode.queues if (mode.name, q.waiting) in needed
+        ),
         scene=tuple(None if value is None or gone & {*_states(mode, [value])} else value for value in mode.scene),
     )
 

@@ -52,7 +52,7 @@ class Stop:
     ----------
     reason : str
         ``until`` or ``final``; ``left_domain`` or ``zeno``, where the execution itself ends; ``transition_limit``,
-        ``memory_limit``, ``not_finite``, ``step_underflow`` or ``interrupted``.
+        ``waiting_limit``, ``memory_limit``, ``not_finite``, ``step_underflow`` or ``interrupted``.
     time : number
         When.
     message : str
@@ -71,7 +71,7 @@ class Stop:
 
 COMPLETE = ("until", "final")  # the run got to where it was going
 LEFT = ("left_domain", "zeno")  # the execution itself ends there
-INCOMPLETE = ("transition_limit", "memory_limit", "not_finite", "step_underflow", "interrupted")
+INCOMPLETE = ("transition_limit", "waiting_limit", "memory_limit", "not_finite", "step_underflow", "interrupted")
 REASONS = (*COMPLETE, *LEFT, *INCOMPLETE)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from hsdsl import __version__
 from hsdsl.arithmetic import FLOAT64
 from hsdsl.backends.python import PythonKernel
+from hsdsl.errors import UsageError
 from hsdsl.export.identifiers import ascii_name
 from hsdsl.lower import lower_constants
 from hsdsl.model import Model
@@ -75,6 +76,9 @@ def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
 def _prepared(pipeline: Pipeline, arguments: Mapping[str, Any]) -> tuple[HybridSystem, Problem]:
     """The system with the modes of its completion, and the problem."""
     problem = pipeline.prepare({**arguments, "engine": "python"})
+    if problem.waits:
+        name = next(iter(problem.waits))
+        raise UsageError(f"{name} is above 1, and an exported run starts with one execution that waits, or none")
     completed = pipeline.sliding if problem.settings.completion == "auto" else pipeline
     return completed.system, problem
 

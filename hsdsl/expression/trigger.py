@@ -12,7 +12,7 @@ import sympy as sp
 from hsdsl.expression import symbolic
 from hsdsl.expression.scope import Scope
 from hsdsl.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
-from hsdsl.functions import absolute, below, maximum, minimum
+from hsdsl.functions import absolute, below
 from hsdsl.names import shown
 
 _OPPOSITE = {">": "<=", ">=": "<", "<": ">=", "<=": ">"}
@@ -60,7 +60,7 @@ class Reached:
     def rises(self, rate: Any, time: Any) -> Any:
         """1 where it holds beyond round-off, or is on its surface and rises; 0 elsewhere."""
         beyond = _positive(self.residual - self._reach(rate, time))
-        return maximum(beyond, minimum(self.nearly_holds(rate, time), _positive(rate)))
+        return either(beyond, self.nearly_holds(rate, time) * _positive(rate))
 
     def turns(self, other: Reached) -> bool | None:
         """Whether it turns true where another one does, or false; None where their surfaces are not the same."""
@@ -76,6 +76,11 @@ def _positive(value: Any) -> Any:
 def _not_negative(value: Any) -> Any:
     """1 where a number is not negative, 0 elsewhere."""
     return below(value, sp.S.Zero, sp.S.Zero, sp.S.One)
+
+
+def either(one: Any, other: Any) -> Any:
+    """The truth that one of two truths, 0 or 1, is 1: a polynomial, which has no switches of time as `max` has."""
+    return one + other - one * other
 
 
 def without_roundoff(expression: Any) -> Any:
@@ -169,6 +174,6 @@ def number(trigger: Trigger, of: Callable[[Reached], Any]) -> Any:
         values = [number(part, of) for part in trigger.parts]
         value = values[0]
         for other in values[1:]:
-            value = minimum(value, other) if trigger.word == "and" else maximum(value, other)
+            value = value * other if trigger.word == "and" else either(value, other)
         return value
     return of(trigger) if isinstance(trigger, Reached) else sp.Integer(int(trigger))

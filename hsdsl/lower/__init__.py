@@ -27,6 +27,7 @@ from hsdsl.expression.scope import slope_symbol
 from hsdsl.expression.stack import deep_stack
 from hsdsl.expression.timebox import OutOfTime, timebox
 from hsdsl.lower.constants import constants, initial_order, initial_values, lower_constants, lower_expressions
+from hsdsl.lower.deciding import idle_states
 from hsdsl.lower.mode import LoweredMode, lowered_overlay
 from hsdsl.lower.names import Names, number
 from hsdsl.lower.routines import print_routines
@@ -105,6 +106,8 @@ def _modes(system: HybridSystem, found: Sequence[Overlay | None], names: Names, 
     every = [*modes, *(lowered_overlay(each, names) for each in found if each)]
     routines, others = both(lambda: [each.routines() for each in every], lambda: [each.others() for each in every])
     programs = [each.program(indices, *pair) for each, *pair in zip(every, routines, others, strict=True)]
+    for i, idle in enumerate(idle_states(system)):
+        programs[i] = replace(programs[i], idle=idle)
     last = len(modes)
     for i, motion in enumerate(found):
         if motion:

@@ -72,6 +72,7 @@ class LoweredMode:
     ) -> lowered.ModeProgram:
         """The mode's routines, and its data for a loop."""
         mode = self.mode
+        number = {name: i for i, name in enumerate(mode.states)}
         program = lowered.ModeProgram(
             name=mode.name,
             states=mode.states,
@@ -84,6 +85,10 @@ class LoweredMode:
             slides=mode.slides or (),
             measured=mode.measured,
             derived=mode.derived,
+            queues=tuple(
+                lowered.Queue(q.waiting, number[q.waiting], tuple(map(number.__getitem__, q.values)), q.most)
+                for q in mode.queues
+            ),
             **others,
         )
         bounded = program.jumps or may_hide(self.flow, self.arguments)

@@ -21,6 +21,7 @@ from hsdsl.model.ensemble_request import EnsembleRequest
 from hsdsl.model.options import KEYS, Options
 from hsdsl.model.settings import check_memory, setting_columns, whole
 from hsdsl.model.values import InstanceTable, evaluate_parameters, initial_columns, start_of_parts
+from hsdsl.model.waiting import check_alone
 from hsdsl.model.workers import ArrayRecorder, Progress, run_compiled, run_in_turn
 from hsdsl.simulate import Prepared, Settings
 from hsdsl.simulate.ensemble import Instances, Kept
@@ -169,6 +170,7 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
     shared = start_of_parts(pipeline.program, dict.fromkeys(varied) | call["initial"])
     shared = {name: value for name, value in shared.items() if name not in varied}
     start = np.array(initial_columns(columns, base.states, shared, varied), dtype=float)
+    check_alone(base.program.modes[base.mode], start)
     options = pipeline.resolve(call.get("settings"), {key: call.get(key) for key in KEYS})
     settings = _settings(columns, base.settings, options)
     places = list(settings)

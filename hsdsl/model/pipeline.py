@@ -21,6 +21,7 @@ from hsdsl.model import automatic, engines
 from hsdsl.model.options import FILE, KEYS, Options, overrides_of, recorded, resolve
 from hsdsl.model.settings import arithmetic_of, following_digits, settings_of
 from hsdsl.model.values import Values, initial_state, with_parameters
+from hsdsl.model.waiting import initial_waits, waiting_apart
 from hsdsl.parts import numbered
 from hsdsl.program import Program
 from hsdsl.program_cache import SLIDING
@@ -225,7 +226,9 @@ class Pipeline:
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
         with applied(None if self._files is None else self._files.limits):
             settings = settings_of(options, values, recorded(parameters, initial, options))
+        initial, waiting = waiting_apart(self.program, initial)
         mode, states, x = initial_state(values, initial)
+        waits = initial_waits(values, self.program.modes[mode], x, waiting)
         if options.method is None:
             from hsdsl.model.mechanical import one_stop
 
@@ -235,7 +238,7 @@ class Pipeline:
             settings = automatic.chosen(settings, self.program, values.kernel, timeline, mode, x)
         settings = following_digits(settings, options, values.kernel.arithmetic)
         start = cache(partial(self._moved, parameters, initial, arithmetic_of(precision), settings.until))
-        problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x, start)
+        problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x, waits, start)
         awaited = None if wait or self._compiled is not None else self.program
         return prepare(problem, engines.choose(engine, settings, precision, self._compile, awaited))
 

@@ -6,6 +6,7 @@ from typing import Annotated, Any, cast
 
 from pydantic import BeforeValidator, ConfigDict, Discriminator, Tag, model_validator
 
+from hsdsl.defaults import MOST_WAITING
 from hsdsl.names import closest
 from hsdsl.schema.fields import (
     AnyKey,
@@ -165,7 +166,9 @@ class TransitionDocument(Document):
         "With `event`: whether the transition is made even if its condition turns false before.", False, default=True
     )
     waiting: Whole = optional(
-        "With `delay`: how many executions can wait at a time, at most 100. One more ends the run.", 8, default=4
+        "With `delay`: how many executions can wait at a time; one more ends the run with `waiting_limit`.",
+        50,
+        default=MOST_WAITING,
     )
     initially: Flag = optional(
         "With `event`: what its condition counts as before the mode is entered; with `false` it fires there if it "

@@ -153,6 +153,9 @@ class _Writer:
         """The derivatives that a mode has, column by column."""
         return [(k, x) for k in self.columns for x in names if (mode, x, k) in self.dependence.states]
 
+    def _derivatives(self, mode: str, names: Sequence[str]) -> Iterator[str]:
+        yield from (derivative_name(x, self.labels[k]) for k, x in self._pairs(mode, names))
+
     def _varied(self, mode: Mode) -> Iterator[tuple[int, ...]]:
         pairs = self._pairs(mode.name, mode.states)
         for k in self.columns if self.implicit else ():
@@ -187,6 +190,7 @@ class _Writer:
             flow_texts=(*mode.flow_texts, *(f"the {name}" for name in states[len(mode.flow) :])),
             edges=tuple(self._edge(mode, edge, jump) for edge, jump in zip(mode.edges, jumps, strict=True)),
             outputs=tuple(self._outputs(mode)),
+            queues=tuple(replace(q, values=(*q.values, *self._derivatives(mode.name, q.values))) for q in mode.queues),
             scene=(),
         )
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import State
+from hsdsl.program import ModeProgram
 
 PARALLEL = 1e-6  # of a component: flows that differ by less move no state on by more than this share of the way back
 
@@ -18,9 +19,9 @@ class Cascade:
     length: int = 0
     room: int = 1
 
-    def returns(self, flowed: bool, mode: int, x: State) -> bool:
+    def returns(self, flowed: bool, index: int, mode: ModeProgram, x: State) -> bool:
         """Count a transition that led to a state; say whether one of the same cascade has led there before."""
-        here = mode, x
+        here = index, decisive(mode, x)
         if flowed or self.reference is None:
             self.reference, self.length, self.room = here, 0, 1
             return False
@@ -30,6 +31,11 @@ class Cascade:
         if self.length == self.room:
             self.reference, self.length, self.room = here, 0, 2 * self.room
         return False
+
+
+def decisive(mode: ModeProgram, x: State) -> State:
+    """What of a state decides how a run goes on: a cascade that only counts comes back to it."""
+    return tuple(x[i] for i in mode.deciding) if mode.idle else x
 
 
 def takes_back(slope: State, back: State) -> bool:

@@ -6,8 +6,8 @@ The loop returns codes; the functions of the Python loop turn them into sentence
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from typing import Any
 
@@ -28,6 +28,7 @@ from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.interpolation import along_steps, interpolation
 from hsdsl.simulate.output_buffers import Sink
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.review import Review
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.state_layouts import StateLayouts
@@ -67,6 +68,8 @@ class CompiledPlan:
     def lay(self, workspace: Workspace, review: Review | None = None) -> None:
         """Put everything on a workspace, unless it lies there from the run before."""
         workspace.clear(0 if workspace.chunks.sink else self._rows, self.memory, review)
+        if self.problem.waits:
+            workspace.put_waits(self.problem.waits, self.problem.program.queues)
         if workspace.plan is self:
             return
         task, workspace.plan = workspace.task, self
@@ -139,6 +142,7 @@ class CompiledRun:
     plan: CompiledPlan
     workspace: Workspace
     review: Review | None = None
+    waits: Mapping[str, Number] = field(default_factory=dict[str, Number])  # at its end, as states
     _columns: Columns | None = None
     _accumulated: Stop | None = None
 
@@ -195,6 +199,10 @@ class CompiledRun:
             self.workspace.simulate()
         if self.workspace.failed:
             raise self.workspace.failed[0]
+        if self.plan.problem.program.queues:
+            program = self.plan.problem.program
+            sizes = {queue.name: len(queue.values) for mode in program.modes for queue in mode.queues}
+            self.waits = Tails(self.workspace.waits(program.queues, sizes)).states(program.modes)
 
     def _note(self, notes: Array, diagnostics: Diagnostics) -> None:
         if len(notes):

@@ -10,9 +10,10 @@ from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Stop
 from hsdsl.integrators.stepper import State
 from hsdsl.program import EdgeProgram
+from hsdsl.simulate.cascade import decisive
 from hsdsl.simulate.run import ModeState, Run, reset
 from hsdsl.simulate.standstill import standstill
-from hsdsl.simulate.stops import ENTERED, endless, entered_final, left_domain
+from hsdsl.simulate.stops import ENTERED, endless, entered_final, left_domain, too_many_wait
 from hsdsl.simulate.surfaces import ANY, Arrival, Crossing
 
 
@@ -33,11 +34,14 @@ def enter(
     visited: set[tuple[int, State]] = set()
     while True:
         here = run.place(mode, states, t, x, scale, before)
+        if run.tails.full is not None:
+            return too_many_wait(here.mode, run.tails.full, t)
         if here.mode.final:
             return entered_final(here.mode.name, t)
-        if (mode, x) in visited:
+        decides = mode, decisive(here.mode, x)
+        if decides in visited:
             return endless(here.mode.name, t)
-        visited.add((mode, x))
+        visited.add(decides)
         try:
             values = here.kernel.surfaces(t, *x)
             finite = all(map(run.arithmetic.isfinite, values))
@@ -58,9 +62,9 @@ def enter(
         outcome = reset(here, chosen, tuple(max(abs(a), s) for a, s in zip(x, scale, strict=True)), run)
         if isinstance(outcome, Stop):
             return outcome
-        run.record(here, chosen, t, outcome[0], alternatives, entry=True)
-        edge = edges[chosen.edge]
-        before, mode, states, (x, scale) = here, edge.target, edge.target_states, outcome
+        edge, scale = edges[chosen.edge], outcome[1]
+        x = run.record(here, chosen, t, outcome[0], alternatives, entry=True)
+        before, mode, states = here, edge.target, edge.target_states
         arrival = Arrival(arrival.since)
 
 

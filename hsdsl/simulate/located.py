@@ -260,14 +260,14 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     after, scale = outcome
     since = run.tie(t) if event.alternatives or same_instant(run, t) else run.arithmetic.zero
     flowed = run.has_flowed(t)
-    run.record(here, crossing, resumed, after, event.alternatives)
+    after = run.record(here, crossing, resumed, after, event.alternatives)
     stood = still_on(here, event) if edge.target == here.index else NONE
     arrival = Arrival(since, reset_at=t if resumed > t else None, stood=stood)
     target = edge.target, edge.target_states
     entered = enter(run, *target, resumed, after, scale, here, arrival)
     if isinstance(entered, Stop):
         return entered
-    if run.cascade.returns(flowed, entered.index, entered.x):
+    if run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
         return slides(edge.name, here.mode, entered.mode, entered.t)
     return close_tail(run, entered, crossing.edge)
 

@@ -48,6 +48,8 @@ def stop(problem: Problem, workspace: Workspace, reason: str) -> Stop:
         return stops.reset_not_finite(mode.edges[int(found.edge)], t)
     if reason == "zeno":
         return stops.endless(mode.name, t)
+    if reason == "waiting":
+        return stops.too_many_wait(mode, mode.queues[int(found.edge)].name, t)
     if reason == "limit":
         return stops.limit(problem.settings.max_transitions, t)
     if reason in ("entered outside", "left"):

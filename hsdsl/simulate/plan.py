@@ -15,6 +15,7 @@ from hsdsl.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.simulate.control import make_control
 from hsdsl.simulate.output_buffers import Sink
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.recorder import OutOfRoom, Overtaken, Progress, Recorder, Room
 from hsdsl.simulate.refinement import finer_settings
 from hsdsl.simulate.result import about, from_recorder, written
@@ -150,7 +151,8 @@ class Prepared(Problem):
             overtaken=self.pending and self.pending.overtakes,
         )  # fmt: skip
         problem = vars(self.with_settings(settings))
-        return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder)
+        tails = Tails(self.waits)
+        return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder, tails=tails)
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
         from hsdsl.simulate.entry import enter

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from hsdsl.arithmetic import TIE, Arithmetic, Number
@@ -11,12 +11,13 @@ from hsdsl.kernel import Kernel
 from hsdsl.program import Program
 from hsdsl.simulate.input_segments import Timeline
 from hsdsl.simulate.moving import Start
+from hsdsl.simulate.queues import Waits
 from hsdsl.simulate.settings import Settings
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A program, its numbers, and where it starts: mode, the names of its states, and ``x`` at t = 0.
+    """A program, its numbers, and where it starts: mode, the names of its states, ``x`` at t = 0, and what ``waits``.
 
     ``moved`` gives start and inputs as their round-off moves them; None where there is none, or nothing is known of it.
     """
@@ -28,6 +29,7 @@ class Problem:
     mode: int
     states: tuple[str, ...]
     x: State
+    waits: Mapping[str, Sequence[Waits]]
     moved: Callable[[], Start | None]
 
     @property
@@ -37,7 +39,7 @@ class Problem:
 
     def with_settings(self, settings: Settings) -> Problem:
         """The same problem with other settings."""
-        return Problem(self.program, self.kernel, settings, self.timeline, self.mode, self.states, self.x, self.moved)
+        return self._from(settings, self.timeline, self.x, self.moved)
 
     @property
     def start(self) -> Start:
@@ -46,8 +48,10 @@ class Problem:
 
     def moved_with(self, settings: Settings) -> Problem:
         """The same problem from where its round-off moves it."""
-        x, timeline = self.start.x, self.start.timeline
-        return Problem(self.program, self.kernel, settings, timeline, self.mode, self.states, x, lambda: None)
+        return self._from(settings, self.start.timeline, self.start.x, lambda: None)
+
+    def _from(self, settings: Settings, timeline: Timeline, x: State, moved: Callable[[], Start | None]) -> Problem:
+        return Problem(self.program, self.kernel, settings, timeline, self.mode, self.states, x, self.waits, moved)
 
     def tie(self, t: Number) -> Number:
         """Times closer than this to t are the same instant, however long the run goes on."""

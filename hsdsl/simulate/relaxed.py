@@ -176,9 +176,9 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     run.wait(here, [(t, depth * 0), (event.t1, depth), (resumed, epsilon)], q)
     after, scale = outcome
     flowed = run.has_flowed(t)
-    run.record(here, crossing, resumed, after, event.alternatives)
+    after = run.record(here, crossing, resumed, after, event.alternatives)
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, Arrival(reset_at=t))
-    if isinstance(entered, Stop) or not run.cascade.returns(flowed, entered.index, entered.x):
+    if isinstance(entered, Stop) or not run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
         return entered
     return slides(edge.name, here.mode, entered.mode, entered.t) if moves_on(here, crossing, entered) else entered
 

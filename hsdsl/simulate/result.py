@@ -37,7 +37,7 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Repeti
         repetition=again,
         settings=described(run.settings, run.program.left_out),
         transitions=transitions,
-        final=_final(columns["arcs"][-1], columns, run.program.outputs),
+        final=_final(columns["arcs"][-1], columns, run.program.outputs, run.tails.states(run.program.modes)),
         **columns,
     )
     execution.check()
@@ -71,7 +71,7 @@ def written(
         assessment=partial(_assessment_of, under_way),
         repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
-        compiled=_Written(under_way, columns, under_way.made, under_way.entries),
+        compiled=_Written(under_way, columns, under_way.made, under_way.entries, under_way.waits),
     )
 
 
@@ -82,6 +82,7 @@ class _Written(NamedTuple):
     columns: Columns
     made: int
     entries: int
+    waits: Mapping[str, Number]
 
     @property
     def enters_beyond(self) -> bool:
@@ -149,7 +150,9 @@ _LATER: dict[str, Callable[[Execution], Any]] = {
     "settings": _settings,
     "transitions": _transitions,
     "arcs": _arcs,
-    "final": lambda execution: _final(_last_arc(execution), _of(execution).columns, execution.output_names),
+    "final": lambda execution: _final(
+        _last_arc(execution), _of(execution).columns, execution.output_names, _of(execution).waits
+    ),
     "verdict": _verdict,
 }
 
@@ -176,14 +179,16 @@ def _native(value: Any) -> Number:
     return float(value) if isinstance(value, np.float64) else value
 
 
-def _final(last: Arc, columns: Columns | Mapping[str, Any], outputs: tuple[str, ...]) -> Point:
+def _final(
+    last: Arc, columns: Columns | Mapping[str, Any], outputs: tuple[str, ...], waits: Mapping[str, Number]
+) -> Point:
     row, width = last.last, len(last.states)
     return Point(
         time=_native(columns["times"][row]),
         mode=last.mode,
         jump=last.jump,
         kind=last.kind,
-        state={s: _native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)},
+        state={s: _native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)} | waits,
         outputs={name: _native(v) for name, v in zip(outputs, columns["outputs"][row], strict=True)},
     )
 

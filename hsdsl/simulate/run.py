@@ -18,6 +18,7 @@ from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.input_segments import Segment
 from hsdsl.simulate.moving import moved_by_flow, moved_reset
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.recorder import OpenArc, Recorder
 from hsdsl.simulate.stops import limit, reset_not_finite
 from hsdsl.simulate.surfaces import Crossing, Surfaces
@@ -59,6 +60,7 @@ class Run(Problem):
     recorder: Recorder
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     cascade: Cascade = field(default_factory=Cascade)
+    tails: Tails = field(default_factory=Tails)
 
     def stepper(self, here: ModeState) -> Stepper:
         """The method for the mode that the run is in."""
@@ -143,9 +145,14 @@ class Run(Problem):
         after: State | None,
         alternatives: tuple[str, ...],
         entry: bool = False,
-    ) -> None:
-        """Write one transition down."""
+    ) -> State:
+        """Write one transition down; return the state after it, with the first of the executions that wait then."""
         edge = here.mode.edges[crossing.edge]
+        after = (
+            None
+            if after is None
+            else self.tails.advance(here.mode, crossing.state, self.program.modes[edge.target], after)
+        )
         self.recorder.transitions.append(
             Transition(
                 index=len(self.recorder.transitions),
@@ -160,6 +167,7 @@ class Run(Problem):
                 entry=entry,
             )
         )
+        return after or ()
 
 
 def choose(here: ModeState, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:

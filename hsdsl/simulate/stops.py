@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 from hsdsl.arithmetic import Number
+from hsdsl.defaults import MOST_WAITING
 from hsdsl.execution import Stop
 from hsdsl.program import EdgeProgram, ModeProgram
 
@@ -45,6 +46,15 @@ def endless(mode: str, t: Number) -> Stop:
 def limit(most: int, t: Number) -> Stop:
     """As many transitions as the run may make."""
     return Stop("transition_limit", t, f"made max_transitions = {most} transitions by t = {show(t)}")
+
+
+def too_many_wait(mode: ModeProgram, full: str, t: Number) -> Stop:
+    """As many delayed executions of an event as may wait, and one more."""
+    queue = next(queue for queue in mode.queues if queue.name == full)
+    event = full.partition("@")[0]
+    asked = queue.most < MOST_WAITING
+    more = "allow more with its `waiting`" if asked else "its condition turns true too often for its delay"
+    return Stop("waiting_limit", t, f"at t = {show(t)} more than {queue.most} executions of {event} wait: {more}")
 
 
 def memory(most: int, t: Number) -> Stop:

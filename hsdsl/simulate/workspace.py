@@ -6,6 +6,7 @@ To fetch fresh memory from the system costs more than a short run.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping, Sequence
 from types import FrameType
 from typing import Any
 from weakref import WeakValueDictionary
@@ -17,6 +18,7 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel, runtime
 from hsdsl.simulate.columns import Shape
 from hsdsl.simulate.output_buffers import OutputBuffers, grown
+from hsdsl.simulate.queues import Waits
 from hsdsl.simulate.review import Review
 
 VISITED = 64
@@ -37,16 +39,21 @@ class Workspace:
         self._workspace = np.empty(compiled.workspace(method, scheme))
         self._x, self._slope, self._scales = (np.empty(self._width) for _ in range(3))
         self._visited = [grown(self.task.visited, VISITED, self._width)]  # the last is in use
+        self._queued, self.tails = model.queued, (structures.Tail * max(1, model.queues))()
+        self._waits: list[Array] = []  # of all tails, those in use and those before
+        self.task.tail = ctypes.addressof(self.tails)
         self.task.model, self.task.method = (structures.address(ctypes.pointer(each)) for each in (model, method))
         self.task.workspace = self._workspace.ctypes.data
         self.task.stop.x, self.task.stop.slope = self._x.ctypes.data, self._slope.ctypes.data
         self.task.stop.scales = self._scales.ctypes.data
-        self.task.flush, self.task.poll, self.task.grow = _flush, _poll, _grow
+        self.task.flush, self.task.poll, self.task.grow, self.task.lengthen = _flush, _poll, _grow, _lengthen
         self._runtime, self._where = runtime(), ctypes.addressof(self.task)
         _workspaces[self._where] = self
 
     def clear(self, rows: float, memory: int, review: Review | None = None) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
+        for tail in self.tails if self._queued else ():
+            tail.first = tail.count = 0
         self.pressed = False
         self.failed.clear()
         self.chunks.clear(rows, memory, review)
@@ -101,6 +108,38 @@ class Workspace:
             return 1
         return 0
 
+    def longer(self, tail: Any) -> int:
+        """Make room for as many that wait as a tail says."""
+        try:
+            self._waits.append(np.empty(tail.room * self._queued))
+            tail.waits = self._waits[-1].ctypes.data
+        except BaseException as error:
+            self.failed.append(error)
+            return 1
+        return 0
+
+    def put_waits(self, waits: Mapping[str, Sequence[Waits]], names: Sequence[str]) -> None:
+        """Let executions wait where a run starts, of queues with these names."""
+        for name, rows in waits.items():
+            tail = self.tails[names.index(name)]
+            tail.first, tail.count = 0, len(rows)
+            if tail.room < len(rows):
+                tail.room = len(rows)
+                self.longer(tail)
+            numbers = structures.array_at(ctypes.c_double, tail.waits, tail.room * self._queued)
+            for i, row in enumerate(rows):
+                numbers[i * self._queued : i * self._queued + len(row)] = row
+
+    def waits(self, names: Sequence[str], queues: Mapping[str, int]) -> dict[str, list[Waits]]:
+        """The executions that wait, of queues with these names and so many values."""
+        found: dict[str, list[Waits]] = {}
+        for name, tail in zip(names, self.tails, strict=False):
+            start, end = (i * self._queued for i in (tail.first, tail.first + tail.count))
+            if tail.count:
+                numbers = structures.array_at(ctypes.c_double, tail.waits, end)
+                found[name] = [tuple(numbers[i : i + queues[name]]) for i in range(start, end, self._queued)]
+        return found
+
 
 class Workspaces:
     """The free workspaces of one model, method and scheme."""
@@ -126,7 +165,7 @@ class Workspaces:
             self._free.append(workspace)
 
 
-# The three functions that C calls are made once; they find the workspace by its task's place in memory.
+# The functions that C calls are made once; they find the workspace by its task's place in memory.
 _workspaces: WeakValueDictionary[int, Workspace] = WeakValueDictionary()
 
 
@@ -142,8 +181,17 @@ def _answer_grow(task: int, larger: Any) -> int:
     return _workspaces[task].more_visited(structures.Visited.from_address(larger))
 
 
+def _answer_lengthen(task: int, tail: Any) -> int:
+    return _workspaces[task].longer(structures.Tail.from_address(tail))
+
+
 _callbacks = dict(structures.Task._fields_)
-_flush, _poll, _grow = (
+_flush, _poll, _grow, _lengthen = (
     _callbacks[name](answer)
-    for name, answer in (("flush", _answer_flush), ("poll", _answer_poll), ("grow", _answer_grow))
+    for name, answer in (
+        ("flush", _answer_flush),
+        ("poll", _answer_poll),
+        ("grow", _answer_grow),
+        ("lengthen", _answer_lengthen),
+    )
 )

@@ -14,7 +14,7 @@ from textwrap import dedent
 from hsdsl.backends.c.printer import function_body
 from hsdsl.backends.c.routine import routine_function
 from hsdsl.backends.c.series import flow_lines, is_large, line_count, piecewise, read_by_surfaces, surface_lines
-from hsdsl.program import EdgeProgram, ModeProgram, Program, Routines, Tape
+from hsdsl.program import EdgeProgram, ModeProgram, Program, Queue, Routines, Tape
 from hsdsl.sparsity import Elimination, Variation
 
 _DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
@@ -106,7 +106,7 @@ def _written(program: Program) -> tuple[_Writer, str]:
         f"{max(len(m.surfaces) for m in program.flows)}, {max(len(m.edges) for m in program.flows)}, "
         f"{len(program.outputs)}, {len(writer.data) - program.contact_count}, {program.contact_count}, "
         f"{lines(program)}, {len(writer.states)}, {derivatives(program)}, {factors(program)}, {varied(program)}, "
-        f"{table}}};\n"
+        f"{len(program.queues)}, {program.queued}, {table}}};\n"
     )
     return writer, model
 
@@ -186,7 +186,7 @@ def routine_functions(routines: Routines, program: Program, prefix: str) -> str:
 class _Writer:
     def __init__(self, program: Program) -> None:
         self.data = data_names(program)
-        self.states = program.all_states
+        self.states, self.queues = program.all_states, program.queues
         self.functions: dict[str, str] = {}  # by the routine's text
         self.tables: list[str] = []
         self._names: dict[str, str] = {}
@@ -218,8 +218,17 @@ class _Writer:
             self.table("int", "measured", list(map(str, mode.measured))),
             self.variation(mode.jacobian.variation),
             str(len(mode.states) - mode.derived),
+            str(len(mode.queues)),
+            self.table("hs_queue", "queues", list(map(self.queue, mode.queues))),
+            str(len(mode.idle)),
+            self.table("int", "places", list(map(str, mode.idle))),
         ]
         return f"{{{', '.join(fields)}}}"
+
+    def queue(self, queue: Queue) -> str:
+        """Write where executions of an event wait."""
+        values = self.table("int", "places", list(map(str, queue.values)))
+        return f"{{{self.queues.index(queue.name)}, {queue.waiting}, {len(queue.values)}, {values}, {queue.most}}}"
 
     def sparse(self, routine: str, places: Sequence[int]) -> str:
         """Write a routine with the places of its values."""

@@ -3,7 +3,7 @@
 
 The memory of an event NAME is in states that do not flow (`hsdsl.names.memory`): ``NAME@armed`` is 1 once the
 condition was false, and ``NAME@due`` where a reset made it true. With a delay ``NAME@waiting`` counts the executions
-that wait; the first is made at ``NAME@at``, and ``NAME@to.x`` is the value that x then gets; others end in ``[2]``.
+that wait; the first is made at ``NAME@at``, and ``NAME@to.x`` is the value that x then gets. Others are no states.
 An event of a part belongs to one mode of it: in the others its surfaces are inside and its memory means nothing.
 """
 
@@ -16,7 +16,6 @@ from dataclasses import replace
 from hsdsl.elaborate.events.event import Event, chosen
 from hsdsl.elaborate.events.firing import edges_of, highest_priority
 from hsdsl.elaborate.events.remembering import Memory, all_states, entered, new_values, remembered
-from hsdsl.elaborate.events.waiting import overflow
 from hsdsl.expression.scope import symbol
 from hsdsl.names import SINCE
 from hsdsl.parts import Part
@@ -29,13 +28,11 @@ def with_events(system: HybridSystem) -> HybridSystem:
     events = {mode.name: _events(system, mode, timed) for mode in system.modes}
     if not any(events.values()):
         return system
-    final = tuple(overflow(e, system) for own in events.values() for e in own if e.delay is not None)
-    events |= {mode.name: () for mode in final}
-    order = {mode.name: (*mode.states, *all_states(events[mode.name])) for mode in (*system.modes, *final)}
+    order = {mode.name: (*mode.states, *all_states(events[mode.name])) for mode in system.modes}
     memories = {name: Memory(own) for name, own in events.items()}
     modes = tuple(_mode(mode, memories, order) for mode in system.modes)
     parts = tuple(_part(part, [event for own in events.values() for event in own]) for part in system.parts)
-    return replace(system, modes=modes + final, initial=_start(system, events), parts=parts)
+    return replace(system, modes=modes, initial=_start(system, events), parts=parts)
 
 
 def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
@@ -45,7 +42,7 @@ def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
     drafts = [Event(edge, mode, timed, flow, constants) for edge in mode.edges if edge.event is not None]
     index, jumps = Memory(drafts), set[str]()
     changes = [new_values(edge, timed) for edge in mode.edges if edge.target == mode.name and drafts]
-    stored = [slot.values for event in drafts for slot in event.slots[:1]]  # which may be that of a state itself
+    stored = [event.stored for event in drafts]  # which may be that of a state itself
     for meaning in [*changes, *({symbol(x): symbol(name) for x, name in values.items()} for values in stored)]:
         jumps |= {event.edge.name for event in index.concerned(meaning) if event.touched(meaning)}
     return tuple(replace(e, jumps=not e.event.initially or e.edge.name in jumps) for e in drafts)
@@ -76,6 +73,7 @@ def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[
         flow=(*mode.flow, *(ZERO for _ in further)),
         flow_texts=(*mode.flow_texts, *("0" for _ in further)),
         edges=tuple(edges),
+        queues=tuple(event.queue for event in own if event.queue is not None),
     )
 
 

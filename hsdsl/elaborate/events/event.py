@@ -10,10 +10,10 @@ from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import is_mode, select, total, whole
-from hsdsl.expression.trigger import Reached, comparisons, number, reached
-from hsdsl.functions import maximum, minimum, replaced
+from hsdsl.expression.trigger import Reached, comparisons, either, number, reached
+from hsdsl.functions import below, replaced
 from hsdsl.names import memory
-from hsdsl.system import ONE, TIME, ZERO, Edge, Mode, Surface
+from hsdsl.system import HALF, ONE, TIME, ZERO, Edge, Mode, Queue, Surface
 
 Values = dict[str, Any]
 
@@ -39,18 +39,27 @@ class Event:
         return {part: memory(self.edge.name, part) for part in parts}
 
     @cached_property
-    def slots(self) -> tuple[Slot, ...]:
-        """The executions that can wait at a time, in the order in which they are made.
-
-        One that is not persistent is gone before it is triggered again; numbers need no memory.
-        """
-        if self.delay is None:
-            return ()
+    def stored(self) -> dict[str, str]:
+        """States that the execution that waits gives values, and the states that have these; numbers need no memory."""
         given = self.edge.values
-        own = () if self.event.at_execution else self.event.given
-        stored = tuple(state for state in own if state in given and given[state].free_symbols)
-        most = self.event.waiting if self.event.persistent else 1
-        return tuple(Slot(self.edge.name, stored, k) for k in range(1, most + 1))
+        own = () if self.delay is None or self.event.at_execution else self.event.given
+        return {x: memory(self.edge.name, f"to.{x}") for x in own if x in given and given[x].free_symbols}
+
+    @property
+    def at(self) -> Any:
+        """The time at which the execution that waits is made."""
+        return symbol(self._at)
+
+    @property
+    def _at(self) -> str:
+        return memory(self.edge.name, "at")
+
+    @property
+    def queue(self) -> Queue | None:
+        """Where several executions can wait: one that is not persistent is gone before it is triggered again."""
+        if self.delay is None or not self.event.persistent:
+            return None
+        return Queue(self.names["waiting"], (self._at, *self.stored.values()), self.event.waiting)
 
     @cached_property
     def symbols(self) -> frozenset[Any]:
@@ -76,11 +85,11 @@ class Event:
     @cached_property
     def ready(self) -> Any:
         """1 where it is to be made at this instant, else 0."""
-        if self.slots:
-            ready = minimum(self.symbol("waiting"), ONE) * reached(TIME, self.slots[0].at)
+        if self.delay is not None:
+            ready = below(self.symbol("waiting"), HALF, ZERO, ONE) * reached(TIME, self.at)
         else:
             ready = self.symbol("armed") * self.rises()
-            ready = maximum(ready, self.symbol("due")) if self.jumps else ready
+            ready = either(ready, self.symbol("due")) if self.jumps else ready
         here = self.here({}, {})
         return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
 
@@ -91,7 +100,7 @@ class Event:
 
     @property
     def states(self) -> tuple[str, ...]:
-        return (*self.names.values(), *(name for slot in self.slots for name in slot.states))
+        return (*self.names.values(), *(() if self.delay is None else (self._at, *self.stored.values())))
 
     def symbol(self, part: str) -> Any:
         return symbol(self.names[part])
@@ -137,30 +146,6 @@ class Event:
     def rises(self) -> Any:
         """1 where the flow turns the condition true at this instant, else 0."""
         return number(self.event.trigger, lambda part: part.rises(self.rate(part.residual), TIME))
-
-
-@dataclass(frozen=True)
-class Slot:
-    """An execution that can wait: its event, states that get the values that are ``stored``, and its number from 1."""
-
-    name: str
-    stored: tuple[str, ...]
-    number: int
-
-    def _state(self, part: str) -> str:
-        return memory(self.name, part if self.number == 1 else f"{part}[{self.number}]")
-
-    @property
-    def at(self) -> Any:
-        return symbol(self._state("at"))
-
-    @property
-    def values(self) -> dict[str, str]:
-        return {state: self._state(f"to.{state}") for state in self.stored}
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        return (self.at.name, *self.values.values())
 
 
 def number_left(edge: Edge) -> dict[Any, Any]:

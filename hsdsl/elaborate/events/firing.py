@@ -9,7 +9,7 @@ from functools import partial, reduce
 from typing import Any
 
 from hsdsl.elaborate.events.event import Event, Values
-from hsdsl.elaborate.events.waiting import begins_to_wait, dropped, due, executes, has_room, is_full, overflowing
+from hsdsl.elaborate.events.waiting import begins_to_wait, dropped, executes
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.trigger import Reached, comparisons, condition
 from hsdsl.functions import below, maximum, minimum
@@ -23,7 +23,7 @@ def highest_priority(events: Sequence[Event]) -> Any | None:
     if all(event.event.priority is None for event in events):
         return None
     least = reduce(minimum, (event.priority for event in events))
-    return reduce(lambda most, e: e.ready * maximum(most, e.priority) + (1 - e.ready) * most, events, least)
+    return reduce(maximum, (below(event.ready, HALF, least, event.priority) for event in events))
 
 
 def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
@@ -33,23 +33,18 @@ def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
     if event.delay is not None:  # what only remembers goes before anything that changes states
         fires = replace(fires, priority=1 + max(other.priority for other in event.mode.edges))
     turn = None if highest is None else at_least(event.priority, highest)
-    free = [has_room(event)] if event.slots else [] if turn is None else [turn]
+    free = [] if turn is None or event.delay is not None else [turn]
     for part in comparisons(trigger):
         others = condition(trigger, partial(_with, event, part, True))
         surface = event.surface(part.left, part.right, part.text)
-        when = all_of(at_least(armed, HALF), others)
-        yield replace(fires, surface=surface, condition=all_of(when, *free), condition_text=_text(event)), event, part
-        if event.slots:
-            full = all_of(when, is_full(event))
-            yield replace(overflowing(fires, event), surface=surface, condition=full), None, None
+        when = all_of(at_least(armed, HALF), others, *free)
+        yield replace(fires, surface=surface, condition=when, condition_text=_text(event)), event, part
     if event.jumps:
-        now = due(event, False) if event.slots else event.symbol("due")
-        if highest is not None and not event.slots:
+        now = event.symbol("due")
+        if highest is not None and event.delay is None:
             now *= below(event.priority - highest, ZERO, ZERO, ONE)
         yield _when_due(fires, event, now), event, None
-        if event.slots:
-            yield _when_due(overflowing(fires, event), event, due(event, True)), None, None
-    if event.slots:
+    if event.delay is not None:
         made = executes(event)
         yield made if turn is None else replace(made, condition=all_of(made.condition, turn)), None, None
     arms = staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | dropped(event))

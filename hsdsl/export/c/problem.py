@@ -92,6 +92,8 @@ def _sizes(problem: Problem) -> str:
         "DATA": len(problem.timeline.segments[0].data),
         "CONTACTS": program.contact_count,
         "SEGMENTS": len(problem.timeline.segments),
+        "QUEUES": len(program.queues),
+        "QUEUED": program.queued,
     }
     located = f" + {_LOCATED}" if problem.settings.scheme == "located" else ""
     own = in_both(*(_of_method(settings) for settings in _both(problem.settings)))

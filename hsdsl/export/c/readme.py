@@ -61,6 +61,7 @@ instance has all of its memory, and nothing is allocated.
 | `-DHS_NO_CLOCK` | there is no `clock()` |
 | `-DHS_INLINE=static` | smaller and slower code |
 | `-DPROBLEM_ROWS=N` | rows that wait for the sink, by default 64 |
+| `-DPROBLEM_WAITING=N` | executions of an event that can wait behind the first, by default 64 |
 | `-DPROBLEM_VISITED=N` | modes that one chain of transitions at an instant may enter, by default 64 |
 | `-DMOST_PIECES=N` | pieces that a surface is cut into while a state rests on a guard, by default 1000 |
 

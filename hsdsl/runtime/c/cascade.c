@@ -12,14 +12,15 @@ static int has_flowed(const hs_run *run, hs_time t) { return !run->jump || t > m
 static int returns(hs_run *run, int flowed) {
   hs_cascade *const cascade = &run->cascade;
   const int n = run->here.dimension, mode = run->here.mode;
+  const hs_real *const x = decisive(run);
   if (!flowed && cascade->room) {
-    if (mode == cascade->mode && same_state(run->x, cascade->x, n)) return 1;
+    if (mode == cascade->mode && same_state(x, cascade->x, n)) return 1;
     if (++cascade->length != cascade->room) return 0;
   }
   cascade->room = flowed || !cascade->room ? 1 : 2 * cascade->room;
   cascade->length = 0;
   cascade->mode = mode;
-  copy(cascade->x, run->x, n);
+  copy(cascade->x, x, n);
   return 0;
 }
 

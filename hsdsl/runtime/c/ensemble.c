@@ -107,6 +107,7 @@ void hs_run_ensemble(hs_ensemble *e) {
     task->timeline = &e->timeline[e->done];
     task->settings = e->settings[e->done];
     task->x = e->start + e->done * task->dimension;
+    hs_forget_waits(task->model, task->tail);
     hs_simulate(task);
     if (*e->stop && task->stop.reason == HS_INTERRUPTED) return;
     if (task->chunk.rows) keep(e);

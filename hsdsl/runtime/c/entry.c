@@ -10,6 +10,15 @@ static int same_state(const hs_real *a, const hs_real *b, int n) {
   return 1;
 }
 
+/* What of the present state decides how the run goes on: the rest is 0. */
+static const hs_real *decisive(hs_run *run) {
+  const hs_mode *const mode = run->here.table;
+  if (!mode->idle) return run->x;
+  copy(run->error, run->x, run->here.dimension);
+  for (int i = 0; i < mode->idle; i++) run->error[mode->idles[i]] = 0.0;
+  return run->error;
+}
+
 static uint64_t hash_of(int mode, const hs_real *x, int n) {
   uint64_t hash = 1469598103934665603u ^ (uint64_t)mode;
   for (int s = 0; s < n; s++) {
@@ -89,9 +98,13 @@ static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here,
     place(run, mode, dimension, t, from_here ? &before : 0);
     before = run->here;
     const hs_mode *table = run->here.table;
+    if (run->full_queue >= 0) {
+      run->task->stop.edge = run->full_queue;
+      return stopped(run, HS_WAITING, t);
+    }
     if (table->final) return stopped(run, HS_FINAL, t);
     if (make_room(run)) return stopped(run, HS_INTERRUPTED, t);
-    if (visit(&run->task->visited, run->width, mode, run->x, dimension)) return stopped(run, HS_ZENO, t);
+    if (visit(&run->task->visited, run->width, mode, decisive(run), dimension)) return stopped(run, HS_ZENO, t);
     if (table->values(run->here.p, t, run->x, run->ahead) || enter_surfaces(run, t, since, jumped, reset_at))
       return stopped(run, HS_HERE_NOT_FINITE, t);
     if (!all_finite(run->ahead, table->surfaces)) return stopped(run, HS_HERE_NOT_FINITE, t);

@@ -25,6 +25,7 @@
 #include "stall_detection.c"
 #include "surfaces.c"
 #include "input_segments.c"
+#include "queues.c"
 #include "recorder.c"
 #include "run.c"
 #include "entry.c"
@@ -202,6 +203,7 @@ static hs_run open_run(hs_task *task) {
   run.control.failed_at = NAN;
   run.control.implicit = is_implicit(task->method);
   run.steps_to_poll = run.poll_steps = 32;
+  run.full_queue = -1;
   copy(run.x, task->x, task->dimension);
   for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
   for (int i = 0; i < run.model->states; i++) run.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;

@@ -94,6 +94,15 @@ typedef struct {
   int releases;   /* of a mode with motion along guards: the contact that it ends, or -1 */
 } hs_edge;
 
+/* Executions of an event that wait: states of a mode with how many do, and with the time and values of the first. */
+typedef struct {
+  int number; /* among the queues of all modes */
+  int waiting;
+  int values; /* the time is the first */
+  const int *value;
+  double most;
+} hs_queue;
+
 typedef struct {
   int dimension;
   int edges;
@@ -119,6 +128,10 @@ typedef struct {
   const int *measured;
   const hs_variation *variation; /* 0 where no states are derivatives of others */
   int own;                 /* states but the last ones, which are derivatives of these: surfaces depend on none of them */
+  int queues;
+  const hs_queue *queue;
+  int idle; /* states that decide no transition */
+  const int *idles;
 } hs_mode;
 
 typedef struct {
@@ -135,6 +148,8 @@ typedef struct {
   int derivatives; /* of a flow that are not zero everywhere, of the mode with most */
   int factors; /* entries of a matrix of an implicit step, of the mode with most */
   int varied; /* derivatives of the flow by the states, of the mode with most; 0 where none has a variation */
+  int queues; /* of all modes, by name */
+  int queued; /* values of the queue with most */
   const hs_mode *mode;
 } hs_model;
 

@@ -139,6 +139,12 @@ typedef struct {
   int64_t *slot; /* one more than the place of a state, or 0 */
 } hs_visited;
 
+/* Executions that wait behind the first of a queue, in the order in which they are made. */
+typedef struct {
+  int64_t room, first, count;
+  hs_real *waits; /* (room, model->queued): time and values */
+} hs_tail;
+
 /* Why a run ends: what the loop calls it, and the word for its users. Where it is stuck only the sentence tells. */
 #define HS_REASONS(reason)                \
   reason(UNTIL, until)                    \
@@ -147,6 +153,7 @@ typedef struct {
   reason(FINAL, final)                    \
   reason(ZENO, zeno)                      \
   reason(LIMIT, transition_limit)         \
+  reason(WAITING, waiting_limit)          \
   reason(RESET_NOT_FINITE, not_finite)    \
   reason(HERE_NOT_FINITE, not_finite)     \
   reason(ENTERED_OUTSIDE, left_domain)    \
@@ -203,6 +210,8 @@ typedef struct hs_task {
   int (*flush)(struct hs_task *);                      /* makes room in chunk: 0; 1: room, but stop; 2: no room */
   int (*poll)(struct hs_task *);                       /* called now and then: not 0 to stop */
   int (*grow)(struct hs_task *, hs_visited *larger);   /* twice the room, slots zero: 0 */
+  hs_tail *tail;                                       /* (model->queues): what waits at the start, and at the end */
+  int (*lengthen)(struct hs_task *, hs_tail *larger);  /* memory for the room that it has: 0 */
   hs_time now;                                   /* to be looked at while it runs */
   int64_t made;
   int64_t entries; /* of the transitions made, those on entry */
@@ -219,6 +228,12 @@ typedef struct {
   const double *before, *after; /* (transitions, model->width) */
   const int32_t *alternatives;  /* of all transitions */
 } hs_record;
+
+/* Take part in a reset from x to z, which gets the first executions that wait then; the number of a queue of the mode in
+   which more wait than may, or -1. Let none wait. */
+HS_EXPORT int hs_let_wait(const hs_model *model, hs_tail *tail, hs_task *task, const hs_mode *from, const hs_real *x,
+                          const hs_mode *to, hs_real *z);
+HS_EXPORT void hs_forget_waits(const hs_model *model, hs_tail *tail);
 
 HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme);
 HS_EXPORT void hs_simulate(hs_task *task);

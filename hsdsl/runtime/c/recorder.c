@@ -82,6 +82,9 @@ static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, co
   hs_chunk *chunk = &run->task->chunk;
   const int w = run->width;
   const hs_edge *edge = &run->here.table->edge[crossing->edge];
+  const hs_mode *const own = &run->model->mode[run->here.mode], *const next = &run->model->mode[edge->target];
+  if (resumed == resumed && run->model->queues)
+    run->full_queue = hs_let_wait(run->model, run->task->tail, run->task, own, crossing->state, next, run->after);
   const hs_made made = {crossing->time, resumed, run->here.mode, crossing->edge, edge->target, entry};
   run->made[run->jump % FREE] = made;
   run->jump++;

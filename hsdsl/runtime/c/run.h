@@ -250,6 +250,7 @@ typedef struct {
   int has_middle;
   hs_real *began;                   /* where a motion along a guard began */
   int still;                         /* whether it ended there */
+  int full_queue; /* a queue of the mode in which more wait than may, or -1 */
   int *unsettled, noted_crowded;     /* unsettled: for each mode and surface */
   hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
   int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */

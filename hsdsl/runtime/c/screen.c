@@ -145,6 +145,10 @@ static hs_view make_view(hs_screen *s, hs_store *store) {
   v.around = take(store, registers, sizeof(hs_expansion));
   v.slopes = take(store, w, sizeof(hs_expansion));
   v.nearest = take(store, model->modes, sizeof(hs_near_miss));
+  int64_t waits = 0;
+  for (int q = 0; has_shadow(s) && q < model->queues; q++) waits += waits_of(s, q) * model->queued;
+  v.tail = take(store, model->queues, sizeof(hs_tail));
+  v.waits = numbers(store, waits);
   return v;
 }
 

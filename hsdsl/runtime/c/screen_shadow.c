@@ -64,7 +64,31 @@ static int shadow_jumps(hs_view *v, hs_shadow *c, int64_t j, double *errors) {
   for (int i = 0; i < c->table->dimension; i++) grow(&errors[i], fabs(before[i] - c->y[i]));
   v->time_errors[j] = hs_max(j ? v->time_errors[j - 1] : tie_of(screen, 0.0),
                       fabs(made->time - c->t));
-  return trace_reset(v, c, made->edge);
+  if (!trace_reset(v, c, made->edge)) return 0;
+  return !screen->model->queues || hs_let_wait(screen->model, v->tail, 0, c->table, c->y,
+                                           &screen->model->mode[c->table->edge[made->edge].target], c->x) < 0;
+}
+
+/* Twice as many as wait in a run at a time, and room to move them together. */
+static int64_t waits_of(const hs_screen *s, int number) {
+  double most = 0.0;
+  for (int64_t j = 0; j < s->run.transitions; j++) {
+    const hs_transition *const made = &s->run.transition[j];
+    const hs_mode *const mode = &s->model->mode[made->mode];
+    for (int k = 0; k < mode->queues; k++)
+      if (mode->queue[k].number == number) grow(&most, (s->run.before + j * s->model->width)[mode->queue[k].waiting]);
+  }
+  return 2 * (int64_t)(most + FEWEST_WAITS);
+}
+
+/* Let nothing wait in the shadow run. */
+static void lay_out_waits(hs_view *v) {
+  double *waits = v->waits;
+  for (int q = 0; q < v->s->model->queues; q++) {
+    const hs_tail none = {waits_of(v->s, q), 0, 0, waits};
+    v->tail[q] = none;
+    waits += none.room * v->s->model->queued;
+  }
 }
 
 /* Follow the run: how far each row is from the shadow run, to `shadow_errors`, and each transition, to
@@ -75,6 +99,7 @@ static int follow_run(hs_view *v) {
   hs_shadow c = {.p = s->data, .x = v->x, .y = v->y, .moved = v->z, .roundoff = v->roundoff};
   c.lines = v->lines;
   int64_t followed = 0;
+  lay_out_waits(v);
   c.t = run->times[0];
   c.order = FEWEST < s->order ? FEWEST : s->order;
   copy(c.x, s->start, s->model->mode[run->arc[0].mode].dimension);

@@ -46,6 +46,16 @@ static int goes_at_once(hs_view *v, const hs_mode *table, const double *p, doubl
   return beyond >= 0 ? beyond : standing;
 }
 
+/* Whether others than the first of a queue take part in a reset from x to z: what waits then is not known here. */
+static int needs_tail(const hs_mode *from, const hs_mode *to, const double *x, const double *z) {
+  int needed = 0;
+  for (int q = 0; from == to && q < to->queues; q++) {
+    const double had = x[to->queue[q].waiting], has = z[to->queue[q].waiting];
+    needed |= had != has && had >= 1 && has >= 1;
+  }
+  return needed;
+}
+
 /* Take edge k, then what goes at the same instant: 1, or 0 where that has no end or is not known. */
 static int land_after(hs_view *v, const hs_tied *tied, int k, hs_landed *landed) {
   const hs_model *const model = v->s->model;
@@ -55,6 +65,7 @@ static int land_after(hs_view *v, const hs_tied *tied, int k, hs_landed *landed)
   for (int i = 0; i < LONGEST; i++) {
     const hs_edge *const edge = &table->edge[k];
     if (hs_changed(edge, edge->reset, p, tied->t, landed->x, landed->x, v->x)) return 0;
+    if (needs_tail(table, &model->mode[edge->target], landed->x, v->x)) return 0;
     copy(landed->x, v->x, edge->target_dimension);
     landed->mode = edge->target, landed->dimension = edge->target_dimension;
     table = &model->mode[edge->target];

@@ -54,6 +54,8 @@ typedef struct {
   hs_expansion *around, *slopes;
   double *drift;  /* how far parts of a step have moved states unseen */
   hs_near_miss *nearest; /* of each mode */
+  hs_tail *tail; /* what waits in the shadow run */
+  double *waits;
   int parts; /* of the step that were tried */
 } hs_view;
 

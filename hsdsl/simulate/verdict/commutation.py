@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from hsdsl.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.execution import Transition
 from hsdsl.integrators.stepper import State
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.surfaces import Arrival
 from hsdsl.simulate.verdict.finding import Finding
@@ -37,7 +38,7 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
         rivals = {name: other for name, other in rivals.items() if not outranked(run, place, k, other, made)}
         if not rivals:
             continue
-        if commute(run, place, [k, *rivals.values()]):
+        if commute(run, place, [k, *rivals.values()], run.tails_before(made)):
             commuting.append(made.time)
             continue
         others = " or ".join(rivals)
@@ -67,14 +68,14 @@ def outranked(run: RunView, place: Place, k: int, other: int, made: Transition) 
     return place.outranks(k, other, error)
 
 
-def commute(run: RunView, place: Place, tied: Sequence[int], since: Number = 0) -> bool:
+def commute(run: RunView, place: Place, tied: Sequence[int], tails: Tails, since: Number = 0) -> bool:
     """Whether each of the tied edges of a place, taken first, leads to the same point.
 
-    Surfaces that are reached within the time ``since`` count as reached together.
+    Surfaces that are reached within the time ``since`` count as reached together. ``tails`` are what waits there.
     """
     since = max(since, 2 * run.tie(place.t))  # what is tied may be that far apart, and off a surface by the rest
     try:
-        landed = [settle(run, place, k, since) for k in tied]
+        landed = [settle(run, place, k, since, tails.copy()) for k in tied]
     except DOMAIN_ERRORS:
         return False
     return None not in landed and all(_same(run, landed[0], other) for other in landed[1:])
@@ -89,11 +90,12 @@ def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
     return all(abs(a - b) <= SAME * max(abs(a), abs(b), size) for a, b, size in pairs)
 
 
-def settle(run: RunView, place: Place, k: int, since: Number) -> Landed | None:
+def settle(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> Landed | None:
     """Take edge k, then what fires at the same instant; None where that has no end."""
     for _ in range(LONGEST):
-        edge = place.mode.edges[k]
-        place = run.place(edge.target, place.t, place.kernel.resets[k](place.t, *place.x))
+        target, x = place.mode.edges[k].target, place.kernel.resets[k](place.t, *place.x)
+        x = tails.advance(place.mode, place.x, run.problem.program.modes[target], x)
+        place = run.place(target, place.t, x)
         if place.mode.final:
             return place.mode.name, place.x
         following = _next(place, since)

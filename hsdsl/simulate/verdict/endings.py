@@ -46,7 +46,11 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
             what = f"an input or function of time jumps at t = {show(place.t)}"
             yield Finding("order", "unknown", f"{what}, within the error of reaching the surface of {place.name(k)}")
         elif k < len(place.mode.edges) and not commute(
-            run, place, (crossed, k), TWICE * -place.value(k) / place.rate(k)
+            run,
+            place,
+            (crossed, k),
+            run.tails_before(run.transitions[arc.jump]),
+            TWICE * -place.value(k) / place.rate(k),
         ):
             sentence = (
                 f"the order of {place.name(crossed)} and {place.name(k)} at t = {show(place.t)} is within the error"

@@ -100,9 +100,9 @@ def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:
     if k == edge and target == run.index(made.source) and _untouched(before, edge):
         return True
     for moved in before.along_guard(edge, run.safe_error(before, run.row_before(made))):
-        landed = before.kernel.resets[edge](made.time, *moved)
+        landed = run.landed(made, run.tails_before(made).copy(), moved)
         after = run.place(target, made.time, landed)
-        here = before.kernel.resets[edge](made.time, *before.x)
+        here = run.landed(made, run.tails_before(made).copy())
         slopes = after.kernel.gradients[k](after.t, *after.x)[1:]
         change = sum((abs(g * (a - b)) for g, a, b in zip(slopes, landed, here, strict=True)), run.arithmetic.zero)
         if abs(after.value(k) - value) > ALONG * change + run.roundoff(after, k, run.row_before(made)):

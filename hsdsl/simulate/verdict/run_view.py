@@ -12,6 +12,7 @@ from hsdsl.arithmetic import Number
 from hsdsl.execution import Arc, Execution, Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.program import ModeProgram
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.surfaces import Surfaces
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.simulate.verdict.place import Place
@@ -44,6 +45,9 @@ class RunView(RecordedRun):
     followed: bool = False
     by_shadow: bool = False
     screen_made: Screen | None = None
+
+    def __post_init__(self) -> None:
+        self._tails = 0, Tails(self.problem.waits)
 
     @cached_property
     def errors(self) -> Errors | None:
@@ -85,6 +89,22 @@ class RunView(RecordedRun):
             return self.reliable_transitions
         marked = np.flatnonzero(self.screen.marked("crossing") & mark).tolist()
         return [self.transitions[index] for index in marked]
+
+    def tails_before(self, made: Transition) -> Tails:
+        """What waits behind the first of each queue where a transition begins."""
+        index, tails = self._tails
+        if index > made.index:
+            index, tails = 0, Tails(self.problem.waits)
+        for earlier in self.transitions[index : made.index] if self.problem.program.queues else ():
+            self.landed(earlier, tails)
+        self._tails = made.index, tails
+        return tails
+
+    def landed(self, made: Transition, tails: Tails, x: State | None = None) -> State:
+        """Where a transition leads from its state or another one, while executions wait."""
+        place, k = self.before(made)
+        x, target = place.x if x is None else x, self.problem.program.modes[place.mode.edges[k].target]
+        return tails.advance(place.mode, x, target, place.kernel.resets[k](place.t, *x))
 
     @property
     def reliable_flows(self) -> list[Arc]:

@@ -168,7 +168,7 @@ def screens_of(plan: CompiledPlan, by_shadow: bool) -> Screens | None:
         problem = plan.problem
         located = problem.settings.scheme == "located" and problem.settings.tolerance is not None
         can = located and not any(mode.slides for mode in problem.program.modes)
-        can = can and (may_have_shadow(problem) or not by_shadow)
+        can = can and (may_have_shadow(problem) or not by_shadow) and not problem.waits
         plan.of_screens[by_shadow] = Screens(problem, plan, by_shadow) if can else None
     return plan.of_screens[by_shadow]
 

@@ -17,6 +17,7 @@ from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import terms
 from hsdsl.simulate.moving import flow_roundoff, moved_reset
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.verdict.correction import Array, corrected
 
 MOST_CHANGES = 8  # of Newton's method
@@ -42,6 +43,7 @@ class ShadowRun:
         self.t: float = float(run.times[0])
         self.x: State = problem.start.x
         self.data, self.moved = problem.timeline.segments[0].data, problem.start.data
+        self.tails = Tails(problem.waits)
 
     def follow(self, arc: Arc, made: Transition | None) -> None:
         """Follow one arc, and the transition that ends it."""
@@ -150,6 +152,7 @@ class ShadowRun:
         self._compare(arc.last, list(made.before.values()), y)
         self.t += s
         self.time_errors.append(abs(float(made.time) - self.t))
-        self.x = moved_reset(self.problem.kernel, index, k, self.moved, self.t, y) or ()
-        if not self.x and mode.edges[k].target_states:
+        after = moved_reset(self.problem.kernel, index, k, self.moved, self.t, y) or ()
+        if not after and mode.edges[k].target_states:
             raise Lost
+        self.x = self.tails.advance(mode, y, self.problem.program.modes[mode.edges[k].target], after)

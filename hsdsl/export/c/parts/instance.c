@@ -76,6 +76,18 @@ static int has_no_more_room(hs_task *task, hs_visited *larger) {
   return 1;
 }
 
+static int cannot_lengthen(hs_task *task, hs_tail *larger) {
+  (void)task, (void)larger;
+  return 1;
+}
+
+void hs_place_waits(hs_waiting *waiting) {
+  for (int q = 0; q < PROBLEM_QUEUES; q++) {
+    waiting->tail[q].room = PROBLEM_WAITING;
+    waiting->tail[q].waits = waiting->numbers + q * PROBLEM_WAITING * PROBLEM_QUEUED;
+  }
+}
+
 static void lay_out_chunk(hs_instance *instance) {
   const hs_chunk chunk = {PROBLEM_ROWS, 0, PROBLEM_ARCS, 0, PROBLEM_TRANSITIONS, 0, PROBLEM_TRANSITIONS, 0,
                           instance->times, instance->values, instance->outputs, instance->depth, instance->pieces,
@@ -109,6 +121,9 @@ void hs_open(hs_instance *instance) {
   task->flush = flush;
   task->poll = never_stops;
   task->grow = has_no_more_room;
+  task->tail = instance->waiting.tail;
+  task->lengthen = cannot_lengthen;
+  hs_place_waits(&instance->waiting);
   task->stop.x = instance->stop_x;
   task->stop.slope = instance->stop_slope;
   task->stop.scales = instance->stop_scales;
@@ -139,6 +154,7 @@ int hs_start(hs_instance *instance) {
 void hs_run_instance(hs_instance *instance) {
   hs_task *task = &instance->task;
   instance->rows = instance->jumps = 0;
+  hs_forget_waits(task->model, task->tail);
   hs_simulate(task);
   flush(task);
 }
@@ -150,6 +166,7 @@ static int handed_over(hs_instance *instance) {
 
 int hs_begin_instance(hs_instance *instance, hs_time start) {
   instance->rows = instance->jumps = 0;
+  hs_forget_waits(instance->task.model, instance->task.tail);
   hs_begin(&instance->task, &instance->pause, start);
   return handed_over(instance);
 }

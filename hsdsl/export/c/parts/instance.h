@@ -13,7 +13,17 @@
 #define PROBLEM_VISITED 64 /* modes that one chain of transitions at an instant may enter */
 #endif
 
+#ifndef PROBLEM_WAITING
+#define PROBLEM_WAITING 64 /* executions of an event that can wait behind the first */
+#endif
+
 typedef struct hs_instance hs_instance;
+
+/* What waits. Copied, its `tail` has the addresses of the numbers that it was copied from. */
+typedef struct {
+  hs_tail tail[PROBLEM_QUEUES + 1];
+  hs_real numbers[PROBLEM_QUEUES * PROBLEM_WAITING * PROBLEM_QUEUED + 1];
+} hs_waiting;
 
 /* A row of the run: times and states never wait for more than a chunk. `mode` is that of its arc, `kind` whether it is
    a strip, `piece` the interpolant from the row before to this one. */
@@ -68,11 +78,15 @@ struct hs_instance {
   int32_t visited_mode[PROBLEM_VISITED];
   hs_real visited[PROBLEM_VISITED * PROBLEM_WIDTH + 1];
   int64_t slot[2 * PROBLEM_VISITED];
+  hs_waiting waiting;
   hs_pause pause;
   hs_real pause_numbers[HS_PAUSE_NUMBERS(PROBLEM_WIDTH, PROBLEM_MODES, PROBLEM_STATES)];
   hs_real pause_data[PROBLEM_DATA + 1];
   int32_t pause_integers[HS_PAUSE_INTEGERS(PROBLEM_SURFACES, PROBLEM_MODES)];
 };
+
+/* Put what waits where it was copied to. */
+void hs_place_waits(hs_waiting *waiting);
 
 /* Make an instance ready: the problem as the model's file has it. */
 void hs_open(hs_instance *instance);

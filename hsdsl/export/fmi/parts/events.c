@@ -175,6 +175,9 @@ static const char *make(fmu *unit, int k, const double *p, double *x, const doub
   if (reset_of(mode, k, p, t, x, after) || mode->values(p, t, x, from)) return "not_finite";
   for (int s = 0; s < mode->edge[k].target_dimension; s++)
     if (!hs_finite(after[s])) return "not_finite";
+  const hs_mode *const own = &hs_the_model.mode[source], *const next = &hs_the_model.mode[mode->edge[k].target];
+  const int full = hs_let_wait(&hs_the_model, unit->run.waiting.tail, &unit->run.task, own, x, next, after);
+  if (full >= 0) return fmu_too_many_wait;
   fmu_enter(unit, source, k, after);
   now->jumps++;
   now->resting = -1;

@@ -257,8 +257,13 @@ static void follow_run(fmu *unit) {
 #define TEXT_NOW(a) #a
 #define TEXT(a) TEXT_NOW(a)
 
+const char fmu_too_many_wait[] =
+    "waiting_limit: more than " TEXT(PROBLEM_WAITING) " executions of an event wait, or than it may have: compile the "
+    "sources of the unit with a larger PROBLEM_WAITING";
+
 /* Why a run ended; nothing but a full table of modes interrupts it. */
 static const char *why(const hs_stop *stop) {
+  if (stop->reason == HS_WAITING) return fmu_too_many_wait;
   if (stop->reason != HS_INTERRUPTED) return hs_stop_word(stop);
   return "more than " TEXT(PROBLEM_VISITED) " transitions at one instant, for which the unit has no room: "
          "compile its sources with a larger PROBLEM_VISITED";
@@ -339,6 +344,8 @@ void fmu_save(const fmu *unit, void *bytes) {
   memcpy(data->numbers, unit->run.pause_numbers, sizeof unit->run.pause_numbers);
   memcpy(data->data, unit->run.pause_data, sizeof unit->run.pause_data);
   memcpy(data->integers, unit->run.pause_integers, sizeof unit->run.pause_integers);
+  data->waiting = unit->run.waiting;
+  for (int q = 0; q < PROBLEM_QUEUES; q++) data->waiting.tail[q].waits = 0;
 }
 
 int fmu_restore(fmu *unit, const void *bytes) {
@@ -351,6 +358,8 @@ int fmu_restore(fmu *unit, const void *bytes) {
   memcpy(unit->run.pause_numbers, unit->now.numbers, sizeof unit->run.pause_numbers);
   memcpy(unit->run.pause_data, unit->now.data, sizeof unit->run.pause_data);
   memcpy(unit->run.pause_integers, unit->now.integers, sizeof unit->run.pause_integers);
+  unit->run.waiting = unit->now.waiting;
+  hs_place_waits(&unit->run.waiting);
   unit->now.tuned = 1;
   unit->bound = 0;
   return 0;

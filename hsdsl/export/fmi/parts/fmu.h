@@ -45,6 +45,7 @@ typedef struct {
   double numbers[HS_PAUSE_NUMBERS(PROBLEM_WIDTH, PROBLEM_MODES, PROBLEM_STATES)];
   double data[PROBLEM_DATA + 1];
   int32_t integers[HS_PAUSE_INTEGERS(PROBLEM_SURFACES, PROBLEM_MODES)];
+  hs_waiting waiting;
 } fmu_data;
 
 typedef struct {
@@ -61,6 +62,8 @@ typedef struct {
   const char *complaint; /* why the run ended */
   const char *refusal;   /* why the last call was refused, until it is logged */
 } fmu;
+
+extern const char fmu_too_many_wait[]; /* why a run ended */
 
 fmu *fmu_new(int co_simulation);
 void fmu_free(fmu *unit);

@@ -32,6 +32,7 @@ function stopped(run) {
     "final": `final: entered final mode ${modeOf(mode)} at ${time(t)}`,
     "zeno": `zeno: at ${time(t)} transitions return to the same state in mode ${modeOf(mode)} without end`,
     "limit": `transition_limit: made ${most} transitions by ${time(t)}${most === 20000 ? "; a page makes no more" : ""}`,
+    "waiting": `waiting_limit: by ${time(t)} more executions of an event wait than may`,
     "reset not finite": `not_finite: the reset of ${edgeOf(mode, edge)} has no finite value at ${time(t)}`,
     "here not finite": `not_finite: ${nothing}`,
     "step not finite": `not_finite: ${nothing}`,

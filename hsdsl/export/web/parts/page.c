@@ -69,6 +69,14 @@ static int grow(hs_task *task, hs_visited *larger) {
   return !larger->mode || !larger->state || !larger->slot;
 }
 
+static hs_tail tails[PROBLEM_QUEUES + 1];
+
+static int lengthen(hs_task *task, hs_tail *larger) {
+  (void)task;
+  larger->waits = malloc((size_t)larger->room * (PROBLEM_QUEUED + 1) * sizeof *larger->waits);
+  return !larger->waits;
+}
+
 static page_refusal set_task(void) {
   hs_task *t = &run.task;
   hs_chunk *c = &t->chunk;
@@ -82,7 +90,9 @@ static page_refusal set_task(void) {
   t->interpolation = &problem_interpolation;
   t->mode = problem_mode, t->dimension = PAGE_STARTS, t->x = run.x;
   t->workspace = run.workspace;
-  t->flush = flush, t->poll = poll, t->grow = grow;
+  t->flush = flush, t->poll = poll, t->grow = grow, t->lengthen = lengthen;
+  t->tail = tails;
+  hs_forget_waits(&hs_the_model, tails);
   t->stop.x = run.stop_x, t->stop.slope = run.stop_slope, t->stop.scales = run.stop_scales;
   t->stop.edge = t->stop.surface = -1;
   return PAGE_RAN;
