@@ -91,14 +91,20 @@ NO_MEX = "warning('off', 'all'); addpath(fullfile(pwd, 'none')); "
 @pytest.mark.tools
 @octave
 def test_without_mex_files_a_program_is_compiled_and_called(tmp_path: Path) -> None:
-    (tmp_path / "none").mkdir()
+    tmp_path /= "it's $(false) here"
+    (tmp_path / "none").mkdir(parents=True)
     lacking = "function [output, status] = mkoctfile(varargin)\n  output = 'no octave-dev';\n  status = 1;\nend\n"
     (tmp_path / "none" / "mkoctfile.m").write_text(lacking)
     model = hsdsl.load(ROOT / "models/thermostat.yaml")
     assert_runs(model, tmp_path, f"{NO_MEX} r = NAME_run();")
     assert list(tmp_path.glob("*.exe")) and not list(tmp_path.glob("*.mex"))
-    for path in tmp_path.glob("*.exe"):
-        path.unlink()
+    (program,) = tmp_path.glob("*.exe")
+    program.unlink()
+    command = re.search(r"    cc .*?-lm\n", (tmp_path / "README.md").read_text(), re.DOTALL)
+    assert command is not None
+    subprocess.run(["bash", "-ec", command[0]], cwd=tmp_path, check=True)
+    assert_runs(model, tmp_path, f"{NO_MEX} r = NAME_run();")
+    program.unlink()
     tried = f"{NO_MEX} try, thermostat_run(); catch e, disp(e.message); end"
     found = evaluated(tmp_path, tried, CC="false")
     assert found.startswith("expected a C compiler for MEX files or programs: no octave-dev")

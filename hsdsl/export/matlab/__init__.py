@@ -6,6 +6,7 @@ import ast
 import hashlib
 from collections.abc import Iterable
 from pathlib import Path
+from textwrap import wrap
 
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.matlab.language import body, helpers, literal
@@ -46,7 +47,8 @@ def _part(path: str, source: Source, gateway: str) -> str:
     heading = comment(source.heading) if path.endswith(".m") else "".join(f"    {line}\n" for line in source.heading)
     begin = (PARTS / "begin.m").read_text(encoding="utf-8")
     texts = {"BEGIN\n": begin, "HEADING\n": heading, "NAME": source.name, "METHOD": settings.method.name}
-    texts |= {"EXACT": " ".join(EXACT_FLAGS), "GATEWAY": gateway}
+    exact, wrapped = " ".join(EXACT_FLAGS), wrap(" ".join(EXACT_FLAGS), 110, break_on_hyphens=False)
+    texts |= {"EXACT": exact if path.endswith(".m") else " \\\n      ".join(wrapped), "GATEWAY": gateway}
     for key, value in texts.items():
         text = text.replace(f"@{key}", value)
     return text

@@ -47,7 +47,7 @@ function given = numbers_of(m, p, x0, s)
                 m.settings.until, s.until));
   x = zeros(m.width, 1);
   x(1:numel(x0) - 1) = x0(2:end);
-  values = cellfun(@(field) p.(field), m.parameters);
+  values = cellfun(@(field) double(p.(field)), m.parameters);
   given = [strcmp(s.scheme, 'located'); step; s.tolerance; largest; s.relaxation; s.until; s.max_transitions; q; ...
            x; values(:)];
   check(all(isfinite(given)) && s.relaxation > 0, 'numbers', 'expected finite numbers and a positive relaxation');
@@ -136,7 +136,7 @@ function out = called(m, given)
   file = fopen(in, 'w');
   fwrite(file, given, 'double');
   fclose(file);
-  status = system(sprintf('"%s" "%s" "%s"', program, in, answer));
+  status = system(quoted({program, in, answer}));
   delete(in);
   check(status == 0, 'program', sprintf('expected %s to end with 0, got %d', program, status));
   file = fopen(answer, 'r');
@@ -181,11 +181,19 @@ function compiled_program(program, folder, failed)
   if isempty(compiler)
     compiler = 'cc';
   end
-  quoted = sprintf(' "%s"', sources{:});
   c = fullfile(folder, 'c');
-  command = sprintf('%s %s -DGATEWAY_PROGRAM -I"%s" -I"%s" -o "%s"%s -lm', compiler, flags, c, ...
-                    fullfile(c, 'runtime'), program, quoted);
-  [status, output] = system([command ' 2>&1']);
+  words = [{['-I' c], ['-I' fullfile(c, 'runtime')], '-o', program}, sources];
+  [status, output] = system([compiler ' ' flags ' -DGATEWAY_PROGRAM' quoted(words) ' -lm 2>&1']);
   check(status == 0, 'compiler', ...
         sprintf('expected a C compiler for MEX files or programs: %s; %s', strtrim(failed), strtrim(output)));
+end
+
+function text = quoted(words)
+% Words of a command line: none of their signs means anything.
+  if ispc()
+    text = sprintf(' "%s"', words{:});
+  else
+    words = strrep(words, '''', '''\''''');
+    text = sprintf(' ''%s''', words{:});
+  end
 end
