@@ -31,7 +31,7 @@ TARGETS = {
     "fmi3": "a functional mock-up unit of FMI 3.0, for model exchange and co-simulation",
     "jax": "a module for JAX, whose simulators vectorise and differentiate",
     "latex": "the model as mathematics, a LaTeX document",
-    "matlab": "functions and a driver for MATLAB and GNU Octave",
+    "matlab": "functions for MATLAB and GNU Octave, and runs in C",
     "mermaid": "the mode graph as a Mermaid diagram",
     "rust": "a crate for Rust without its standard library",
     "web": "one HTML page that runs the model in a browser",
@@ -40,7 +40,7 @@ TARGETS = {
 
 Modes = Literal["local", "output", "none"]  # what the number of the mode is in a functional mock-up unit
 DOCUMENTS = ("latex", "mermaid")  # targets that do not run
-OF_PARTS = ("c", "fmi2", "fmi3", "latex", "mermaid", "rust", "web")  # targets that keep systems of parts
+OF_PARTS = ("c", "fmi2", "fmi3", "latex", "matlab", "mermaid", "rust", "web")  # targets that keep systems of parts
 
 
 def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:

@@ -1,15 +1,14 @@
-"""Exports that have a loop of their own, run, and held against runs of the engine."""
+"""Modules for JAX, run, and held against runs of the engine."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isnan
 from pathlib import Path
 from typing import Any
 
 import pytest
-from export.octave import OCTAVE, evaluated, exported
 
 NAN = float("nan")
 
@@ -76,33 +75,3 @@ def by_jax(model: Any, folder: Path, **arguments: Any) -> Outcome:
     made = [Made(name, float(t), float(resumed), after.tolist()) for name, t, resumed, after in rows]
     made += [Made("", NAN, NAN)] * (int(found.count) - len(made))
     return Outcome(made, module.STOPS[int(found.stop)], float(found.t), found.x.tolist())
-
-
-def by_octave(model: Any, folder: Path, **arguments: Any) -> Outcome:
-    """Functions for MATLAB, run by GNU Octave."""
-    return octave_run(folder, f"r = {exported(model, folder, **arguments)}_run();")
-
-
-def octave_run(folder: Path, statement: str) -> Outcome:
-    """What a statement gives that makes a run ``r`` of functions in a folder."""
-    *lines, last = (line.split("\t") for line in evaluated(folder, statement + PRINT).splitlines())
-    made = [Made(edge, float(t), float(resumed), [*map(float, after.split())]) for _, edge, t, resumed, after in lines]
-    return Outcome(made, last[1], float(last[2]), [*map(float, last[3].split())])
-
-
-# the final state is that of the last row, behind the mode's number
-PRINT = """
-for k = 1:numel(r.transitions)
-  e = r.transitions(k);
-  fprintf('T\\t%s\\t%.17g\\t%.17g\\t', e.edge, e.time, e.resumed);
-  fprintf('%.17g ', e.after);
-  fprintf('\\n');
-end
-fprintf('E\\t%s\\t%.17g\\t', r.stop, r.t(end));
-fprintf('%.17g ', r.x(end, 2:end));
-fprintf('\\n');
-"""
-
-
-OF_TOOLS = {"matlab": OCTAVE}
-BY: dict[str, Callable[..., Outcome]] = {"jax": by_jax, "matlab": by_octave}

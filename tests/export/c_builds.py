@@ -43,6 +43,32 @@ def _objects() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="hsdsl-objects-")
 
 
+COMPILER = """\
+import hashlib, os, pathlib, shutil, subprocess, sys
+words, kept = sys.argv[1:], pathlib.Path(__file__).parent
+if not any(word.endswith("runtime/hs.c") for word in words) or "-c" not in words:
+    sys.exit(subprocess.run(["cc", *words]).returncode)
+call = lambda words: subprocess.run(["cc", *words], stdout=subprocess.PIPE, check=True).stdout
+at = words.index("-o") + 1
+rest = words[: at - 1] + words[at + 1 :]
+flags = [word for word in rest if not os.path.exists(word) and not word.startswith("-I")]
+text = call([word for word in rest if word != "-c"] + ["-E", "-P"])
+found = kept / hashlib.sha256(repr(flags).encode() + text).hexdigest()
+if not found.exists():
+    call([*words[:at], f"{found}.{os.getpid()}", *words[at + 1 :]])
+    os.replace(f"{found}.{os.getpid()}", found)
+shutil.copy(found, words[at])
+"""
+
+
+@cache
+def cached_compiler() -> str:
+    """The words of a compiler that compiles the loop once: of the same text with the same flags it keeps the object."""
+    script = Path(_objects().name) / "cc.py"
+    script.write_text(COMPILER)
+    return f"{sys.executable} {script}"
+
+
 @cache
 def runtime_object(command: tuple[str, ...]) -> str:
     """The runtime compiled by a command, once for all tests: it is the same in every export."""

@@ -4,7 +4,7 @@
 set -euo pipefail
 packages=(
   chromium chromium-driver fonts-dejavu-core          # pages of --to web
-  octave                                              # --to matlab
+  octave octave-dev                                   # --to matlab, and MEX files
   cargo rustc                                         # --to rust
   texlive-latex-base texlive-latex-recommended        # --to latex
   clang cmake                                         # --to c with a second compiler, and its own build files

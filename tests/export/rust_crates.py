@@ -5,15 +5,12 @@ from __future__ import annotations
 import json
 import os
 import subprocess
-import sys
-from functools import cache
 from pathlib import Path
 from shutil import which
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
-from export.c_builds import exported
+from export.c_builds import cached_compiler, exported
 
 from hsdsl.model import Model
 from hsdsl.report import as_json
@@ -29,40 +26,9 @@ def needs_tools(test: Any) -> Any:
     return test
 
 
-# a compiler that looks an object up by the text that is compiled
-COMPILER = """\
-import hashlib, os, pathlib, shutil, subprocess, sys
-words, kept = sys.argv[1:], pathlib.Path(__file__).parent
-call = lambda words: subprocess.run(["cc", *words], capture_output=True, check=True).stdout
-if "c/runtime/hs.c" not in words:
-    sys.exit(subprocess.run(["cc", *words]).returncode)
-at = words.index("-o")
-rest = words[:at] + words[at + 2 :]
-text = call([word for word in rest if word != "-c"] + ["-E", "-P"])
-found = kept / hashlib.sha256(repr(rest).encode() + text).hexdigest()
-if not found.exists():
-    call([*words[: at + 1], f"{found}.{os.getpid()}", *words[at + 2 :]])
-    os.replace(f"{found}.{os.getpid()}", found)
-shutil.copy(found, words[at + 1])
-"""
-
-
-@cache
-def _objects() -> TemporaryDirectory[str]:
-    return TemporaryDirectory(prefix="hsdsl-objects-")
-
-
-@cache
-def compiler() -> str:
-    """The words of a compiler that compiles the loop once."""
-    script = Path(_objects().name) / "cc.py"
-    script.write_text(COMPILER)
-    return f"{sys.executable} {script}"
-
-
 def cargo(crate: Path, *words: str) -> str:
     """What cargo prints; crates are built once, and not debugged."""
-    environment = {**os.environ, "CARGO_NET_OFFLINE": "true", "RUSTFLAGS": "-D warnings", "CC": compiler()}
+    environment = {**os.environ, "CARGO_NET_OFFLINE": "true", "RUSTFLAGS": "-D warnings", "CC": cached_compiler()}
     environment |= {"CARGO_INCREMENTAL": "0", "CARGO_PROFILE_DEV_DEBUG": "0", "CFLAGS": "-Wall -Wextra -Werror"}
     made = subprocess.run(["cargo", *words], cwd=crate, env=environment, capture_output=True, text=True)
     assert made.returncode == 0, made.stderr

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -19,7 +20,9 @@ from hsdsl.export import files_of, source_of
 from hsdsl.export.c.readme import MEASURED, SMALL, SMALL_MEASURED
 from hsdsl.export.c.sources import COMPILED, c_sources
 from hsdsl.report import as_json
+from hsdsl.runtime.library import RUNTIME
 
+EVENTS = Path(__file__).parents[1] / "conformance" / "events"
 FAST = {"bouncing-ball", "thermostat", "digital-control"}
 # the fast ones by every compiler, of the others one in turn; all in a campaign
 EACH = [
@@ -108,6 +111,13 @@ def test_static_memory_is_what_the_runtime_takes(name: str, arguments: dict[str,
     assert taken == given > 0
 
 
+def test_what_events_remember_is_no_state(tmp_path: Path) -> None:
+    run = as_json((model := hsdsl.load(EVENTS / "m13-priority.yaml")).simulate(engine="c"))
+    found = output(built(exported(model, tmp_path), next(iter(COMPILERS.values()))))
+    assert found["transitions"] == run["transitions"]
+    assert found["final"]["state"] == run["final"]["state"]
+
+
 SINGLE_TOLERANCE = 32 * 2.0**-24  # of a step in 32-bit floats, relative to sizes; the same of time, over a run
 STUCK = {"oscillator-with-stop-2"}  # how often a relaxed run hits while a mass is stuck is a matter of rounding
 
@@ -169,6 +179,22 @@ def test_a_scheme_without_a_c_loop_is_refused(tmp_path: Path, capsys: pytest.Cap
     assert obey(["export", ball, "--to", "c", "--scheme", "paoli-schatzman", "--out", str(out)]) == 2
     assert "paoli-schatzman" in capsys.readouterr().err
     assert not out.exists()
+
+
+def test_exports_that_call_c_have_the_words_of_its_stop_reasons() -> None:
+    export = Path(hsdsl.__file__).parent / "export"
+    header = (RUNTIME / "hs_simulate.h").read_text()
+    expected = {*re.findall(r"^  reason\(\w+, (\w+)\)", header, re.MULTILINE)} - {"stuck"}
+    expected |= {"step_underflow"}  # one of the words that a stuck run has
+    lists = {
+        "c/parts/given.h": r"words\[\] = \{(.*?)\}",
+        "rust/crate/src/lib.rs": r"const ALL.*?\[(\n.*?)\];",
+        "matlab/parts/hsdsl_simulate.m": r"words = \{(.*?)\}",
+    }
+    found = [re.findall(r"[\"'](\w+)[\"']", re.search(pattern, (export / path).read_text(), re.DOTALL)[1])
+             for path, pattern in lists.items()]  # fmt: skip
+    assert [*found[0], "interrupted"] == found[1] == found[2]
+    assert {*found[1]} == expected
 
 
 STACK = """

@@ -3,61 +3,121 @@
 from __future__ import annotations
 
 import re
+import subprocess
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
-from export.agreement import assert_agree, by_octave, octave_run, of_run
-from export.octave import OCTAVE, evaluated, exported
+from export.c_builds import COMPILERS
+from export.octave import OCTAVE, assert_runs, evaluated, exported
 from shipped import assert_golden
 
 import hsdsl
 from hsdsl.errors import UsageError
 from hsdsl.export import files_of, source_of
+from hsdsl.export.c.sources import EXACT_FLAGS
 
 ROOT = Path(__file__).parents[2]
-MODELS = sorted((ROOT / "models").glob("*.yaml"))
-FIXED, ADAPTIVE = 1e-9, 1e-7  # of times of transitions, relative to the run
+CASES = [f"tests/conformance/{name}" for name in ("cases", "events", "parts")]
+octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not installed: tests/export/install-tools.sh")
+EVERY = [
+    pytest.param(path, marks=[pytest.mark.slow] if folder != "models" else [], id=f"{path.parent.name}-{path.stem}")
+    for folder in ("models", "models/gallery", "models/parts", *CASES)
+    for path in sorted((ROOT / folder).glob("*.yaml"))
+    if ".expect" not in path.name
+]
 LOCATED: dict[str, Any] = {"scheme": "located", "method": "rk4", "step": "1/100"}
 RELAXED: dict[str, Any] = {"scheme": "relaxed", "method": "midpoint", "step": "1/100", "relaxation": "1e-3"}
-octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not installed: tests/export/install-tools.sh")
-SHORT = {
-    "oscillator-with-stop-1": {"until": "8"},
-    "oscillator-with-stop-2": {"until": "5", "relaxation": "1e-2"},
-    "thermostat": {"until": "7"},
-    "bouncing-ball": {"until": "6"},
-}
-
-
-def compare(model: Any, folder: Path, tolerance: float, **arguments: Any) -> None:
-    assert_agree(of_run(model.simulate(**arguments)), by_octave(model, folder, **arguments), tolerance)
-
-
-def kept(path: Path, arguments: dict[str, Any]) -> dict[str, Any]:
-    return arguments | SHORT.get(path.stem, {})
+ADAPTIVE: dict[str, Any] = {"scheme": "relaxed", "method": "dopri5", "tolerance": 1e-7}
 
 
 @pytest.mark.tools
 @octave
-@pytest.mark.parametrize("arguments", [LOCATED, RELAXED], ids=lambda a: a["scheme"])
-@pytest.mark.parametrize("path", [p for p in MODELS if p.stem != "stiff-switch"], ids=lambda p: p.stem)
-def test_fixed_steps_make_our_transitions(path: Path, arguments: dict[str, Any], tmp_path: Path) -> None:
-    compare(hsdsl.load(path), tmp_path, FIXED, **kept(path, arguments))
+@pytest.mark.parametrize("path", EVERY)
+def test_every_model_and_every_case_runs_as_it_does_here(path: Path, tmp_path: Path) -> None:
+    assert_runs(hsdsl.load(path), tmp_path)
 
 
 @pytest.mark.tools
 @octave
-@pytest.mark.parametrize("path", MODELS, ids=lambda p: p.stem)
-def test_settings_of_the_file_make_our_transitions(path: Path, tmp_path: Path) -> None:
-    shorter = SHORT | {"oscillator-with-stop-1": {"until": "3"}, "thermostat": {}, "bouncing-ball": {}}
-    compare(hsdsl.load(path), tmp_path, ADAPTIVE, **shorter.get(path.stem, {}))
+@pytest.mark.parametrize("arguments", [LOCATED, RELAXED, ADAPTIVE], ids=["located", "relaxed", "adaptive"])
+@pytest.mark.parametrize("name", ["bouncing-ball", "digital-control", "thermostat"])
+def test_other_schemes_and_methods(name: str, arguments: dict[str, Any], tmp_path: Path) -> None:
+    assert assert_runs(hsdsl.load(ROOT / f"models/{name}.yaml"), tmp_path, **arguments).transitions
 
 
 @pytest.mark.tools
 @octave
-def test_a_ball_comes_to_rest(tmp_path: Path) -> None:
-    compare(hsdsl.load(ROOT / "models/bouncing-ball.yaml"), tmp_path, FIXED, **LOCATED | {"until": "14"})
+@pytest.mark.parametrize(("export", "scheme"), [("located", "relaxed"), ("relaxed", "located")])
+def test_settings_of_a_run_change(export: str, scheme: str, tmp_path: Path) -> None:
+    model, method = hsdsl.load(ROOT / "models/bouncing-ball.yaml"), {"method": "dopri5", "relaxation": 1e-3}
+    statement = f"""m = NAME_model(); s = m.settings; s.scheme = '{scheme}'; s.until = 13; s.tolerance = 1e-6;
+      s.max_transitions = 9; r = hsdsl_simulate(m, NAME_parameters(), NAME_initial(NAME_parameters()), s);"""
+    given = {"scheme": scheme, "until": 13, "tolerance": 1e-6, "max_transitions": 9}
+    run = assert_runs(model, tmp_path, statement, given, **method, scheme=export)
+    assert run.stop.reason == "transition_limit"
+
+
+REFUSED = """
+m = NAME_model(); p = NAME_parameters(); x0 = NAME_initial(p);
+function tried(m, p, x0, varargin)
+  s = m.settings;
+  for k = 1:2:numel(varargin), s.(varargin{k}) = varargin{k + 1}; end
+  try, hsdsl_simulate(m, p, x0, s); catch e, disp([e.identifier ' ' e.message]); end
+end
+tried(m, p, [3; 0]); tried(m, p, 1); tried(m, p, x0, 'scheme', 'exact'); tried(m, p, x0, 'step', 1);
+tried(m, p, x0, 'until', 99); tried(m, p, NaN * x0); tried(m, p, [1; NaN]); tried(m, p, x0, 'relaxation', 0);
+"""
+
+
+@pytest.mark.tools
+@octave
+def test_what_has_no_meaning_is_refused(tmp_path: Path) -> None:
+    model = hsdsl.loads(
+        "hsdsl: 1\ninputs: {u: {times: [0, 1], values: [1, 2], hold: zero}}\nmodes: {m: {flow: {x: u}}}\n"
+        "initial: {mode: m, x: 0}\nexperiment: {until: 4}\n"
+    )
+    name = exported(model, tmp_path)
+    lines = evaluated(tmp_path, REFUSED.replace("NAME", name)).splitlines()
+    words = ["mode", "initial", "scheme", "step", "until", "mode", "numbers", "numbers"]
+    assert [line.partition(" ")[0] for line in lines] == [f"hsdsl:{word}" for word in words]
+    assert not list(tmp_path.glob("*.mex"))
+
+
+NO_MEX = "warning('off', 'all'); addpath(fullfile(pwd, 'none')); "
+
+
+@pytest.mark.tools
+@octave
+def test_without_mex_files_a_program_is_compiled_and_called(tmp_path: Path) -> None:
+    tmp_path /= "it's $(false) here"
+    (tmp_path / "none").mkdir(parents=True)
+    lacking = "function [output, status] = mkoctfile(varargin)\n  output = 'no octave-dev';\n  status = 1;\nend\n"
+    (tmp_path / "none" / "mkoctfile.m").write_text(lacking)
+    model = hsdsl.load(ROOT / "models/thermostat.yaml")
+    assert_runs(model, tmp_path, f"{NO_MEX} r = NAME_run();")
+    assert list(tmp_path.glob("*.exe")) and not list(tmp_path.glob("*.mex"))
+    (program,) = tmp_path.glob("*.exe")
+    program.unlink()
+    command = re.search(r"    cc .*?-lm\n", (tmp_path / "README.md").read_text(), re.DOTALL)
+    assert command is not None
+    subprocess.run(["bash", "-ec", command[0]], cwd=tmp_path, check=True)
+    assert_runs(model, tmp_path, f"{NO_MEX} r = NAME_run();")
+    program.unlink()
+    tried = f"{NO_MEX} try, thermostat_run(); catch e, disp(e.message); end"
+    found = evaluated(tmp_path, tried, CC="false")
+    assert found.startswith("expected a C compiler for MEX files or programs: no octave-dev")
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_the_program_compiles_without_warnings(compiler: str, tmp_path: Path) -> None:
+    exported(hsdsl.load(ROOT / "models/thermostat.yaml"), tmp_path)
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-DGATEWAY_PROGRAM", "-Ic", "-Ic/runtime"]
+    sources = [f"c/{name}" for name in ("gateway.c", "instance.c")]
+    command = [*COMPILERS[compiler], *flags, *EXACT_FLAGS, "-c", *sources]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 HOSTILE = """
@@ -77,20 +137,8 @@ experiment: {until: 2}
 
 @pytest.mark.tools
 @octave
-@pytest.mark.parametrize("reset", ["select(v, v, -0.3*v)", "max(-0.4*v, 0)", "abs(v)/3"])
-def test_a_body_rests_where_its_reset_has_kinks(reset: str, tmp_path: Path) -> None:
-    model = hsdsl.loads(
-        "hsdsl: 1\nmodes: {m: {flow: {x: v, v: -3}, transitions: [{when: x <= 0, to: m, "
-        f"reset: {{v: '{reset}'}}}}]}}}}\n"
-        "initial: {mode: m, x: 1, v: 0}\nexperiment: {until: 4}\n"
-    )
-    compare(model, tmp_path, ADAPTIVE)
-
-
-@pytest.mark.tools
-@octave
 def test_names_and_texts_of_a_model_are_only_that(tmp_path: Path) -> None:
-    compare(hsdsl.loads(HOSTILE), tmp_path, FIXED, **LOCATED)
+    assert_runs(hsdsl.loads(HOSTILE), tmp_path, **LOCATED)
 
 
 @pytest.mark.tools
@@ -101,8 +149,7 @@ def test_parameters_change_and_others_follow(tmp_path: Path) -> None:
     chosen = f"p = {name}_parameters('if_', 0.7);"
     text = evaluated(tmp_path, f"{chosen} fprintf('%.17g ', p.d, p.w0, {name}_initial(p));")
     assert [float(v) for v in text.split()] == [1.4, 0.35, 1, 7, 0, 0, 0]
-    ours = model.simulate(**LOCATED, parameters={"if": "0.7"})
-    assert_agree(of_run(ours), octave_run(tmp_path, f"{chosen} r = {name}_run(p);"), FIXED)
+    assert_runs(model, tmp_path, f"{chosen} r = NAME_run(p);", {"parameters": {"if": "0.7"}}, **LOCATED)
     text = evaluated(tmp_path, f"try, {name}_parameters('q', 1); catch e, disp(e.message); end")
     assert text.strip() == "there is no parameter q"
 
@@ -117,11 +164,11 @@ end
 for k = 1:numel(r.transitions)
   e = r.transitions(k);
   x = zeros(size(r.x, 2), 1);
-  x(1) = find(strcmp(m.mode_names, e.source));
+  x(1) = max([1, find(strcmp(m.mode_names, e.source))]);
   x(2:numel(e.before) + 1) = e.before;
   after = NAME_g(x, e.time, k);
   bad = bad + ~NAME_D(x, e.time, k) + (norm(after(2:numel(e.after) + 1) - e.after) > 1e-12);
-  bad = bad + ~strcmp(m.mode_names{after(1)}, e.target);
+  bad = bad + ~(any(strcmp(m.mode_names{after(1)}, e.target)) || numel(m.part_names) > 0);
 end
 dx = NAME_f(r.x(2, :).', r.t(2), 0);
 fprintf('%d %d ', bad, numel(r.transitions));
@@ -131,7 +178,7 @@ fprintf('%.17g ', dx);
 
 @pytest.mark.tools
 @octave
-@pytest.mark.parametrize("stem", ["bouncing-ball", "constrained-pendulum", "thermostat"])
+@pytest.mark.parametrize("stem", ["bouncing-ball", "constrained-pendulum", "thermostat", "parts/rooms"])
 def test_sets_and_maps_fit_the_run(stem: str, tmp_path: Path) -> None:
     model = hsdsl.load(ROOT / f"models/{stem}.yaml")
     name = exported(model, tmp_path)
@@ -153,7 +200,7 @@ def test_files_are_functions_of_their_names_in_plain_matlab() -> None:
         assert re.match(rf"function (\w+ = )?{name[:-2]}\b", text)
         code = re.sub(r"'(?:[^'\n]|'')*'|%.*", "", text)  # without strings and comments; no transpose is left
         assert not re.search(r"\"|!|#|\+=|\bprintf\b|\bendfunction\b|\bendif\b|\bunwind_protect\b", code), name
-        opened = len(re.findall(r"^\s*(?:function|if|for|while|try)\b", code, re.MULTILINE))
+        opened = len(re.findall(r"^\s*(?:function|if|for|while|switch|try)\b", code, re.MULTILINE))
         assert opened == len(re.findall(r"^\s*end\b", code, re.MULTILINE)), name
         assert all(len(word) <= 63 for word in re.findall(r"\w+", code))
 
@@ -162,11 +209,15 @@ def test_text_of_the_model_stays() -> None:
     model = hsdsl.load(ROOT / "models/thermostat.yaml")
     files = files_of(source_of(model, {}), "matlab")
     found = "".join(files[f"thermostat_{part}.m"].decode() for part in ("model", "parameters", "initial", "D"))
-    found = "".join(line for line in found.splitlines(keepends=True) if not line.startswith(("% Generated", "% model")))
+    found = "".join(
+        line
+        for line in found.splitlines(keepends=True)
+        if not line.startswith(("% Generated", "% model", "  m.gateway"))
+    )
     assert_golden(found, Path(__file__).parent / "golden" / "thermostat.matlab.txt")
 
 
-def test_what_the_driver_lacks_is_refused(tmp_path: Path) -> None:
+def test_what_it_lacks_is_refused(tmp_path: Path) -> None:
     model = hsdsl.load(ROOT / "models/oscillator-with-stop-1.yaml")
     with pytest.raises(UsageError, match="no scheme paoli-schatzman"):
         files_of(source_of(model, {"scheme": "paoli-schatzman", "step": "1e-3"}), "matlab")

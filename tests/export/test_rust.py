@@ -15,16 +15,11 @@ import hsdsl
 from hsdsl.export import files_of, source_of, write
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = (
-    "models",
-    "models/gallery",
-    "models/parts",
-    *(f"tests/conformance/{k}" for k in ("cases", "events", "parts")),
-)
+CASES = [f"tests/conformance/{name}" for name in ("cases", "events", "parts")]
 EVERY = [
     pytest.param(path, marks=[*needs_cargo, *([pytest.mark.slow] if folder != "models" else [])],
                  id=f"{path.parent.name}-{path.stem}")
-    for folder in FOLDERS
+    for folder in ("models", "models/gallery", "models/parts", *CASES)
     for path in sorted((ROOT / folder).glob("*.yaml"))
     if ".expect" not in path.name
 ]  # fmt: skip

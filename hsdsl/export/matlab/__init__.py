@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import ast
+import hashlib
 from collections.abc import Iterable
 from pathlib import Path
+from textwrap import wrap
 
-from hsdsl.errors import UsageError
+from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.matlab.language import body, helpers, literal
-from hsdsl.export.matlab.method import driven_by
-from hsdsl.export.matlab.model import ModelText, definitions, parameter_fields
+from hsdsl.export.matlab.model import ModelText, parameter_fields
 from hsdsl.export.matlab.text import comment, string
 from hsdsl.export.parameters import derived, followed, structural
+from hsdsl.export.routines import definitions
 from hsdsl.export.source import Source
 from hsdsl.names import visible
 
@@ -21,34 +23,32 @@ PARTS = Path(__file__).parent / "parts"
 def files(source: Source) -> dict[str, bytes]:
     """Functions, each in a file of its name.
 
-    Raises UsageError: the driver has no such scheme.
+    Raises UsageError: the C runtime has no such scheme.
     """
-    settings = source.problem.settings
-    if settings.method is None:
-        raise UsageError(f"the driver for MATLAB has no scheme {settings.scheme}", "choose --scheme located or relaxed")
     name = source.name
+    c = c_sources(source, True, "given.h") | {"gateway.c": (PARTS / "gateway.c").read_bytes()}
+    digest = hashlib.sha256(b"\0".join(c.values())).hexdigest()[:8]  # what was compiled before is not taken for this
+    gateway = f"{name}_{digest}"
     texts = {
-        f"{name}_model.m": ModelText(source).text(),
+        f"{name}_model.m": ModelText(source, gateway).text(),
         f"{name}_parameters.m": _parameters(source),
         f"{name}_initial.m": _initial(source),
-        f"{name}_run.m": _part("run.m", source),
-        **{f"{name}_{part}.m": _part(f"{part}.m", source) for part in ("f", "C", "g", "D")},
-        "hsdsl_simulate.m": (PARTS / "hsdsl_simulate.m").read_text(encoding="utf-8"),
-        "README.md": _part("README.md", source),
+        **{f"{name}_{part}.m": _part(f"{part}.m", source, gateway) for part in ("run", "f", "C", "g", "D")},
+        **{part: _part(part, source, gateway) for part in ("hsdsl_simulate.m", "README.md")},
     }
-    return {path: text.encode() for path, text in texts.items()}
+    return {path: text.encode() for path, text in texts.items()} | {f"c/{path}": text for path, text in c.items()}
 
 
-def _part(path: str, source: Source) -> str:
+def _part(path: str, source: Source, gateway: str) -> str:
     """A file that is the same for every model but for names; no text of the model is markup in it."""
     text = (PARTS / path).read_text(encoding="utf-8")
     settings = source.problem.settings
     assert settings.method is not None
-    method = driven_by(settings.method).name
-    instead = "" if method == settings.method.name else f" in place of {settings.method.name}"
     heading = comment(source.heading) if path.endswith(".m") else "".join(f"    {line}\n" for line in source.heading)
     begin = (PARTS / "begin.m").read_text(encoding="utf-8")
-    texts = {"BEGIN\n": begin, "HEADING\n": heading, "NAME": source.name, "METHOD": method + instead}
+    texts = {"BEGIN\n": begin, "HEADING\n": heading, "NAME": source.name, "METHOD": settings.method.name}
+    exact, wrapped = " ".join(EXACT_FLAGS), wrap(" ".join(EXACT_FLAGS), 110, break_on_hyphens=False)
+    texts |= {"EXACT": exact if path.endswith(".m") else " \\\n      ".join(wrapped), "GATEWAY": gateway}
     for key, value in texts.items():
         text = text.replace(f"@{key}", value)
     return text

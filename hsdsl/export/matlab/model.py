@@ -6,16 +6,18 @@ import ast
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from hsdsl.backends.c import width
 from hsdsl.export import routines
 from hsdsl.export.identifiers import identifiers
 from hsdsl.export.matlab.language import KEYWORDS, body, helpers, reserved
-from hsdsl.export.matlab.method import method_text
 from hsdsl.export.matlab.settings import run_fields
 from hsdsl.export.matlab.text import cell, comment, string, strings, vector
-from hsdsl.export.routines import definitions, mode_definitions
+from hsdsl.export.routines import mode_definitions
 from hsdsl.export.source import Source
 from hsdsl.names import visible
+from hsdsl.parts import layout_of
 from hsdsl.program import ModeProgram, Program
+from hsdsl.simulate.control import LARGEST_SHARE
 
 _LAST = """
 function k = enabled(m, x, t, p)
@@ -73,6 +75,7 @@ class ModelText:
     """The text of ``NAME_model.m`` under way: functions, and the handles that the structure has."""
 
     source: Source
+    gateway: str
     functions: list[str] = field(default_factory=list[str])
     handles: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
 
@@ -80,7 +83,7 @@ class ModelText:
         """All of it."""
         source, problem = self.source, self.source.problem
         program = problem.program
-        for number, mode in enumerate(self.flows, start=1):
+        for number, mode in enumerate(program.modes, start=1):
             self.mode(number, mode)
         parts = [
             f"function m = {source.name}_model()\n",
@@ -89,43 +92,38 @@ class ModelText:
             *(f"  m.{key} = {cell(handles)};\n" for key, handles in self.handles.items()),
             "  m.roundoff = @roundoff;\n  m.enabled = @enabled;\n",
             *(f"  m.{key} = {value};\n" for key, value in run_fields(problem)),
-            *(f"  m.method.{key} = {value};\n" for key, value in method_text(problem.settings)),
             "end\n\n",
         ]
         functions = "\n".join(self.functions) + _LAST
         calls = helpers(functions)
         return "".join(parts) + functions + (f"\n{calls}" if calls else "")
 
-    @property
-    def flows(self) -> tuple[ModeProgram, ...]:
-        """The modes, then those with motion along guards, where a run has them."""
-        problem = self.source.problem
-        return problem.program.modes if problem.settings.completion == "none" else problem.program.flows
-
     def facts(self, program: Program) -> Iterable[tuple[str, str]]:
         """Names and sizes."""
-        modes, states, none = self.flows, program.all_states, self.source.problem.settings.completion == "none"
+        problem, modes, states = self.source.problem, program.modes, program.all_states
+        layout = layout_of(program.parts, modes[0].states)
+        assert problem.settings.method is not None
         yield "name", string(self.source.name)
+        yield "gateway", string(self.gateway)
         yield "mode_names", strings(program.mode_names)
         yield "state_names", cell(strings(mode.states) for mode in modes)
+        yield "parameters", strings(parameter_fields(program).values())
         yield "dim", vector(len(mode.states) for mode in modes)
+        yield "width", str(width(program))
         yield "final", vector(int(mode.final) for mode in modes)
         yield "state_index", cell(vector(1 + states.index(name) for name in mode.states) for mode in modes)
         yield "walls", cell(strings(mode.walls) for mode in modes)
         yield "edge_names", cell(strings(edge.name for edge in mode.edges) for mode in modes)
         yield "edge_target", cell(vector(1 + edge.target for edge in mode.edges) for mode in modes)
+        yield "edge_states", cell(vector(len(edge.target_states) for edge in mode.edges) for mode in modes)
         yield "edge_priority", cell(vector(edge.priority for edge in mode.edges) for mode in modes)
-        yield "edge_changes", cell(cell(vector(1 + i for i in edge.changes) for edge in mode.edges) for mode in modes)
-        yield "edge_counts", cell(cell(vector(1 + i for i in edge.counts) for edge in mode.edges) for mode in modes)
-        held = [0 if none or mode.held is None else 1 + mode.held for mode in modes]
-        yield "held", vector(held)
-        yield "contacts", str(program.contact_count)
-        places = [[(e.contact, e.releases, e.push_order) for e in mode.edges] for mode in modes]
-        numbers = [[tuple(0 if k is None or none else k + 1 for k in both) for *both, _ in edges] for edges in places]
-        yield "edge_contact", cell(vector(contact for contact, _ in edges) for edges in numbers)
-        yield "edge_releases", cell(vector(ends for _, ends in edges) for edges in numbers)
-        yield "edge_order", cell(vector(order for *_, order in edges) for edges in places)
         yield "edge_conditional", cell(f"{vector(int(e.conditional) for e in mode.edges)} == 1" for mode in modes)
+        yield "part_names", strings(part.name for part in program.parts)
+        yield "part_modes", cell(strings(part.modes) for part in program.parts)
+        yield "part_number", vector(1 + number for number in layout.numbers)
+        yield "adaptive", _truth(problem.settings.method.adaptive)
+        yield "largest_share", vector([LARGEST_SHARE])
+        yield "fixed_until", _truth(bool(program.inputs or program.switches))
 
     def mode(self, number: int, mode: ModeProgram) -> None:
         """The functions of a mode."""
@@ -137,25 +135,12 @@ class ModelText:
             self.add(
                 name, cell(self.function(f"{name}_{number}_{k + 1}", found[f"{name}_{k}"], mode) for k in mode.surfaces)
             )
-        for name in ("reset", "spread"):
-            self.add(name, cell(self.function(f"{name}_{number}_{k + 1}", found[f"{name}_{k}"], mode) for k in edges))
-        self.add("slow", cell(self.slow(number, k, mode) for k in edges))
+        self.add("reset", cell(self.function(f"reset_{number}_{k + 1}", found[f"reset_{k}"], mode) for k in edges))
         self.add("condition", cell(self.condition(number, k, found, mode) for k in edges))
-        method = self.source.problem.settings.method
-        needed = (method is not None and method.implicit) or mode.held is not None
-        self.add("jacobian", self.jacobian(number, mode) if needed else "[]")
 
     def add(self, key: str, handle: str) -> None:
         """One more mode's entry of a table."""
         self.handles.setdefault(key, []).append(handle)
-
-    def slow(self, number: int, k: int, mode: ModeProgram) -> str:
-        """The reset of an edge that leads back to its mode, or the branch of it that slow impacts take."""
-        if not mode.edges[k].branched:
-            return f"@reset_{number}_{k + 1}"
-        assert mode.held is not None
-        definition = mode_definitions(self.source.problem.program.flows[mode.held])[f"reset_{k}"]
-        return self.function(f"slow_{number}_{k + 1}", definition, mode)
 
     def condition(self, number: int, k: int, found: Mapping[str, ast.FunctionDef], mode: ModeProgram) -> str:
         """The parts of a condition; an edge without one has none."""
@@ -164,31 +149,24 @@ class ModelText:
         parts = enumerate(mode.conditions[k], 1)
         return cell(self.function(f"condition_{number}_{k + 1}_{i}", found[name], mode) for i, name in parts)
 
-    def jacobian(self, number: int, mode: ModeProgram) -> str:
-        """The derivatives of a mode's flow as a matrix."""
-        (definition,) = definitions(mode.jacobian.routines).values()
-        values = self.function(f"derivatives_{number}", definition, mode).removeprefix("@")
-        n = len(mode.states)
-        places = vector((place // n + 1 + n * (place % n) for place in mode.jacobian.places), "; ")  # by columns
-        body = f"  J = zeros({n}, {n});\n  J({places}) = {values}(t, x, p, d);\n"
-        self.functions.append(f"function J = jacobian_{number}(t, x, p, d)\n{body}end\n")
-        return f"@jacobian_{number}"
-
     def function(self, name: str, definition: ast.FunctionDef, mode: ModeProgram) -> str:
         """Print one routine; return its handle."""
         program = self.source.problem.program
-        taken = reserved(mode.routines.source + mode.jacobian.routines.source)
+        taken = reserved(mode.routines.source)
         own = identifiers(mode.states, taken | set(parameter_fields(program).values()))
         names = {f"x{i}": own[state] for i, state in enumerate(mode.states)}
         names |= {f"p{i}": f"p.{f}" for i, f in enumerate(parameter_fields(program).values())}
-        names |= {f"s{i}": f"s({i + 1})" for i in range(len(mode.states))} | data_names(program) | {"t": "t"}
+        names |= data_names(program) | {"t": "t"}
         text = body(definition, names)
-        arguments = "t, x, p, d, s" if name.startswith("spread") else "t, x, p, d"
         used = {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)}
         unpack = [f"  {own[s]} = x({i + 1});\n" for i, s in enumerate(mode.states) if f"x{i}" in used]
         lines = "".join(unpack) + text
-        self.functions.append(f"function out = {name}({arguments})\n{comment([_about(name, mode)])}{lines}\nend\n")
+        self.functions.append(f"function out = {name}(t, x, p, d)\n{comment([_about(name, mode)])}{lines}\nend\n")
         return f"@{name}"
+
+
+def _truth(value: bool) -> str:
+    return "true" if value else "false"
 
 
 def _about(name: str, mode: ModeProgram) -> str:
@@ -198,6 +176,6 @@ def _about(name: str, mode: ModeProgram) -> str:
     texts = [*(edge.text for edge in mode.edges), *mode.walls]
     if kind in ("gradient", "rate") and len(numbers) > 1:
         return visible(f"mode {mode.name}, {kind} of {texts[int(numbers[1]) - 1]}")
-    if kind in ("reset", "slow", "spread", "condition") and len(numbers) > 1:
+    if kind in ("reset", "condition") and len(numbers) > 1:
         return visible(f"mode {mode.name}, {kind} of {mode.edges[int(numbers[1]) - 1].name}")
     return visible(f"mode {mode.name}: {kind}")

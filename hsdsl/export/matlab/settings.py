@@ -16,12 +16,9 @@ def run_fields(problem: Problem) -> Iterable[tuple[str, str]]:
     """
     settings, segments = problem.settings, problem.timeline.segments
     yield "starts", _column(s.start for s in segments)
-    yield "ends", _column(s.end for s in segments)
-    yield "jumps", _column(int(s.jump) for s in segments)
     rows = [s.data[len(problem.program.parameters) :] for s in segments]
     yield "data", matrix(rows) if rows[0] else f"zeros({len(rows)}, 0)"
     scale = {name: float(settings.scale.get(name, 0.0)) for name in problem.program.all_states}
-    yield "scale", _column(scale.values())
     first = {name: abs(float(number)) for name, number in zip(problem.states, problem.x, strict=True)}
     yield "typical", _column(max(size, first.get(name, 0.0)) for name, size in scale.items())
     yield "settings.scheme", string(settings.scheme)
