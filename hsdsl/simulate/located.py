@@ -102,8 +102,7 @@ def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event |
         if here.surfaces.active:
             here.surfaces.leave(span.t1, span.z)
         t, x, before = span.t1, span.z, span
-        if run.settings.moves:
-            x = run.moved_along(here, t, x, span.h)
+        x = run.moved_along(here, t, x, span.h)
         arc.append(t, x, span.piece)
     return here.moved(t, x)
 

@@ -109,7 +109,7 @@ class Run(Problem):
 
     def moved_along(self, here: ModeState, t: Number, x: State, h: Number) -> State:
         """A state on its way, moved by what round-off of the flow does in a time h."""
-        if here.flow != here.index:  # its flow follows guards
+        if not self.settings.moves or here.flow != here.index:  # a flow that follows guards is not moved
             return x
         return moved_by_flow(self.kernel, here.index, here.segment.data, t, x, h, here.arc.scales)
 
