@@ -160,7 +160,8 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
         here.arc.append(t, q, crossing.piece)
     if stop := run.limit_reached(t):
         return stop
-    outcome = reset(here, crossing, event.scale, run)
+    crossing = run.moved_crossing(here, crossing)
+    q, outcome = crossing.state, reset(here, crossing, event.scale, run)
     resumed = event.t1 + (epsilon - depth)
     edge = here.mode.edges[crossing.edge]
     if resumed > until + run.tie(until):
