@@ -10,10 +10,10 @@ As ``runtime/c/roundoff.c`` does, with the same operations in the same order.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, reduce
+from functools import cache, partial, reduce
 from math import inf, isfinite
 from typing import Any
 
@@ -115,14 +115,23 @@ class Roundoff:
 
     def function(self, name: str, *arguments: Rounded) -> Rounded:
         """A smooth function of the library."""
-        values = [a.value for a in arguments]
-        value = self.base.functions[name](*values)
-        error = off = self.base.zero
-        for a, slope in zip(arguments, SLOPES[name](self.base.functions, value, *values), strict=True):
+        functions, values = self.base.functions, [a.value for a in arguments]
+        value, error, off = functions[name](*values), self.base.zero, self.base.zero
+        slopes = SLOPES[name](functions, value, values[0], values[-1])
+        for a, slope in zip(arguments, slopes, strict=True):
             error = error + slope * a.error if a.error != 0 else error
-        for a, steepest in zip(arguments, STEEPEST[name](self.base.functions, value, *arguments), strict=True):
-            off = off + a.off * steepest if a.off > 0 else off
+            off = off + a.off * self._steepest(name, a, slope) if a.off > 0 else off
         return Rounded(self, value, error, off + abs(value) * (LIBRARY * self.base.unit))
+
+    def _steepest(self, name: str, a: Rounded, slope: Number) -> Number:
+        """How steep a function is at most where its argument may be; of those that grow little, where it is."""
+        if name in ("sin", "cos", "tanh", "atan"):
+            return 1
+        if name == "exp":
+            return self.base.functions["exp"](a.value + a.off)
+        if name == "log":
+            return 1 / (a.value - a.off) if a.value - a.off > 0 else inf
+        return abs(slope)
 
     def root(self, a: Rounded) -> Rounded:
         """The square root; what it loses is known."""
@@ -152,6 +161,14 @@ class Roundoff:
             return Rounded(self, value, step(at) - value, step(at + a.off) - step(at - a.off))
         clear = abs(a.value) > a.off or a.off == 0 if name == "sign" else step(a.value - a.off) == step(a.value + a.off)
         return Rounded(self, value, self.base.zero, self.base.zero if clear else inf)
+
+    def tangent(self, a: Rounded) -> Rounded:
+        """The tangent, as a quotient."""
+        return self.function("sin", a) / self.function("cos", a)
+
+    def heaviside(self, a: Rounded) -> Rounded:
+        """Half of 1 and the sign."""
+        return self.constant(Fraction(1, 2)) * (self.constant(Fraction(1)) + self.stepped("sign", a))
 
     def least(self, a: Rounded, b: Rounded) -> Rounded:
         """The smaller of two, as round-off has it."""
@@ -194,59 +211,44 @@ def _repeated(base: Rounded, exponent: int) -> Rounded:
     return square * base if exponent % 2 else square
 
 
-Functions = Any  # by name
-SLOPES: dict[str, Callable[..., Iterable[Number]]] = {
-    "exp": lambda f, v, x: (v,),
-    "log": lambda f, v, x: (1 / x,),
-    "sin": lambda f, v, x: (f["cos"](x),),
-    "cos": lambda f, v, x: (-f["sin"](x),),
-    "tanh": lambda f, v, x: (1 - v * v,),
-    "atan": lambda f, v, x: (1 / (1 + x * x),),
-    "asin": lambda f, v, x: (_under(1, f["sqrt"](1 - x * x)),),
-    "acos": lambda f, v, x: (-_under(1, f["sqrt"](1 - x * x)),),
-    "sinh": lambda f, v, x: (f["cosh"](x),),
-    "cosh": lambda f, v, x: (f["sinh"](x),),
-    "asinh": lambda f, v, x: (1 / f["sqrt"](x * x + 1),),
-    "acosh": lambda f, v, x: (_under(1, f["sqrt"](x * x - 1)),),
-    "atanh": lambda f, v, x: (_under(1, 1 - x * x),),
-    "atan2": lambda f, v, y, x: (_under(x, x * x + y * y), _under(-y, x * x + y * y)),
-    "pow": lambda f, v, x, y: (_under(v * y, x), v * f["log"](x) if x > 0 else x * 0),
-}  # fmt: skip
-
-
-def _under(a: Number, b: Number) -> Number:
-    return a / b if b != 0 else inf
-
-
-def _steep(*slopes: Number) -> tuple[Number, ...]:
-    return tuple(map(abs, slopes))
-
-
-STEEPEST: dict[str, Callable[..., Iterable[Number]]] = {  # anywhere that the arguments may be; of the others here
-    **{
-        name: lambda f, v, *arguments, name=name: _steep(*SLOPES[name](f, v, *(a.value for a in arguments)))
-        for name in ("asin", "acos", "sinh", "cosh", "asinh", "acosh", "atanh", "atan2", "pow")
-    },
-    "exp": lambda f, v, a: (f["exp"](a.value + a.off),),
-    "log": lambda f, v, a: (1 / (a.value - a.off) if a.value - a.off > 0 else inf,),
-    **dict.fromkeys(("sin", "cos", "tanh", "atan"), lambda f, v, a: (1,)),
+Slopes = Callable[[Mapping[str, Any], Number, Number, Number], tuple[Number, ...]]
+SLOPES: dict[str, Slopes] = {  # by functions, its value and its arguments
+    "exp": lambda f, v, x, y: (v,),
+    "log": lambda f, v, x, y: (1 / x,),
+    "sin": lambda f, v, x, y: (f["cos"](x),),
+    "cos": lambda f, v, x, y: (-f["sin"](x),),
+    "tanh": lambda f, v, x, y: (1 - v * v,),
+    "atan": lambda f, v, x, y: (1 / (1 + x * x),),
+    "asin": lambda f, v, x, y: (_over(1, f["sqrt"](1 - x * x)),),
+    "acos": lambda f, v, x, y: (-_over(1, f["sqrt"](1 - x * x)),),
+    "sinh": lambda f, v, x, y: (f["cosh"](x),),
+    "cosh": lambda f, v, x, y: (f["sinh"](x),),
+    "asinh": lambda f, v, x, y: (1 / f["sqrt"](x * x + 1),),
+    "acosh": lambda f, v, x, y: (_over(1, f["sqrt"](x * x - 1)),),
+    "atanh": lambda f, v, x, y: (_over(1, 1 - x * x),),
+    "atan2": lambda f, v, x, y: (_over(y, y * y + x * x), _over(-x, y * y + x * x)),
+    "pow": lambda f, v, x, y: (_over(v * y, x), v * f["log"](x) if x > 0 else x * 0),
 }
+
+
+def _over(a: Number, b: Number) -> Number:
+    return a / b if b != 0 else inf
 
 
 @cache
 def following(base: Arithmetic, traced: bool) -> Arithmetic:
     """The arithmetic that follows the round-off of another one."""
     how = Roundoff(base, traced)
-    functions: dict[str, Any] = {name: _of(how, name) for name in SLOPES} | {
+    functions: dict[str, Any] = {name: partial(how.function, name) for name in SLOPES} | {
         "sqrt": how.root,
         "pow": how.power,
-        "tan": lambda a: how.function("sin", a) / how.function("cos", a),
+        "tan": how.tangent,
         "abs": abs,
-        "sign": lambda a: how.stepped("sign", a),
-        "floor": lambda a: how.stepped("floor", a),
-        "heaviside": lambda a: how.constant(Fraction(1, 2)) * (how.constant(Fraction(1)) + how.stepped("sign", a)),
-        "min": lambda *values: reduce(how.least, values),
-        "max": lambda *values: reduce(how.most, values),
+        "sign": partial(how.stepped, "sign"),
+        "floor": partial(how.stepped, "floor"),
+        "heaviside": how.heaviside,
+        "min": partial(_folded, how.least),
+        "max": partial(_folded, how.most),
         "below": how.below,
         "pi": how.beyond("pi"),
         "e": how.beyond("e"),
@@ -263,8 +265,8 @@ def following(base: Arithmetic, traced: bool) -> Arithmetic:
     )
 
 
-def _of(how: Roundoff, name: str) -> Callable[..., Rounded]:
-    return lambda *arguments: how.function(name, *arguments)
+def _folded(choose: Callable[[Rounded, Rounded], Rounded], *values: Rounded) -> Rounded:
+    return reduce(choose, values)
 
 
 def exactly(arithmetic: Arithmetic, values: Iterable[Number]) -> tuple[Rounded, ...]:
@@ -277,7 +279,7 @@ def moved(number: Rounded) -> Number:
     """A traced number moved by its round-off: at least to the next number, if it is not exact or nothing is known."""
     value, error, unit = number.value, number.error, number.of.base.unit
     by = abs(error) + number.off
-    if not by - by == 0 or by == 0:
+    if not number.of.base.isfinite(by) or by == 0:
         return value
     least = 2 * unit * abs(value)
     by = by if by > least else least

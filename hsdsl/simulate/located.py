@@ -102,8 +102,7 @@ def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event |
         if here.surfaces.active:
             here.surfaces.leave(span.t1, span.z)
         t, x, before = span.t1, span.z, span
-        if run.settings.moves:
-            x = run.moved_along(here, t, x, span.h)
+        x = run.moved_along(here, t, x, span.h)
         arc.append(t, x, span.piece)
     return here.moved(t, x)
 
@@ -240,7 +239,7 @@ def bracketed(residual: Callable[[Number], Number], s: Number, here: ModeState) 
 
 def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     """Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail."""
-    crossing, until = event.crossing, run.settings.until
+    crossing, until = run.moved_crossing(here, event.crossing), run.settings.until
     t, q, edge = crossing.time, crossing.state, here.mode.edges[crossing.edge]
     if stop := run.limit_reached(t):
         return stop

@@ -1,11 +1,12 @@
 """A run moved by its round-off, which errors are measured by: where it starts, its resets and its flow.
 
 Two runs of the same routines share what these round. So the finer run that another one is held against is moved by it:
-parameters, samples of inputs, initial values and results of resets by their rounding, which is known with its sign, and
-states along the flow by the most that rounding of its terms may do. The moves grow and fade as the run has it.
+parameters, samples of inputs, initial values and results of resets by their rounding, which is known with its sign;
+states along the flow by the most that rounding of its terms may do, and crossings by that of their surface. The moves
+grow and fade as the run has it.
 
-Each is at least to the next number where a result is not exact. Of the flow only what exceeds the least error of a
-state counts: less is in the last digits of every step.
+Each is at least to the next number where a result is not exact. Of flows and surfaces only what exceeds the least error
+of a state counts: less is in the last digits of every step.
 """
 
 from __future__ import annotations
@@ -47,6 +48,37 @@ def moved_reset(kernel: Kernel, mode: int, k: int, data: Sequence[Number], t: Nu
     return found if all(map(kernel.arithmetic.isfinite, found)) else None
 
 
+def surface_roundoff(kernel: Kernel, mode: int, k: int, data: Sequence[Number], t: Number, x: State) -> Number:
+    """What surface k is beyond its value, by its round-off; zero where that is not known."""
+    arithmetic, zero = following(kernel.arithmetic, traced=True), kernel.arithmetic.zero
+    try:
+        of = kernel.over(arithmetic).bind(mode, list(exactly(arithmetic, data)))
+        surface = of.surfaces(*exactly(arithmetic, (t, *x)))[k]
+    except DOMAIN_ERRORS:
+        return zero
+    beyond = surface.error - surface.off if surface.error < 0 else surface.error + surface.off
+    return beyond if kernel.arithmetic.isfinite(beyond) else zero
+
+
+def moved_crossing(
+    kernel: Kernel, mode: int, k: int, data: Sequence[Number], t: Number, q: State, scales: Sequence[Number]
+) -> State:
+    """The state that crosses surface k, moved along the flow to where it does so but for the surface's round-off."""
+    here = kernel.bind(mode, data)
+    try:
+        rate, flow = here.rates[k](t, *q)[0], here.flow(t, *q)
+    except DOMAIN_ERRORS:
+        return q
+    late = -surface_roundoff(kernel, mode, k, data, t, q) / rate if rate > 0 else 0
+    by = [late * f for f in flow]
+    return tuple(a + e if _counts(kernel, e, a, s) else a for a, e, s in zip(q, by, scales, strict=True))
+
+
+def _counts(kernel: Kernel, by: Number, a: Number, size: Number) -> bool:
+    """Whether a state moves by more than the least error of one."""
+    return abs(by) > ERROR_UNITS * kernel.arithmetic.unit * max(size, abs(a))
+
+
 def flow_roundoff(kernel: Kernel, mode: int, data: Sequence[Number], t: Number, x: State) -> list[Number] | None:
     """The most that rounding may change each component of a flow by; None where it has no bound."""
     arithmetic = following(kernel.arithmetic, traced=False)
@@ -65,9 +97,10 @@ def moved_by_flow(
     off = flow_roundoff(kernel, mode, data, t, x)
     if off is None:
         return x
+    by = [h * e for e in off]
     return tuple(
-        a + side(i) * (h * e) if h * e > ERROR_UNITS * kernel.arithmetic.unit * max(s, abs(a)) else a
-        for i, (a, e, s) in enumerate(zip(x, off, scales, strict=True))
+        a + side(i) * e if _counts(kernel, e, a, s) else a
+        for i, (a, e, s) in enumerate(zip(x, by, scales, strict=True))
     )
 
 

@@ -107,14 +107,12 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
             return stuck(run, here.moved(t, x), StepFailure("jump"), slope)
         if active or emerging:
             here.surfaces.leave(t1, z)
-        piece = method.piece(here.kernel.flow, t, h, x, z, stages, slope, end) if curved else None
-        if run.settings.moves:
-            z = run.moved_along(here, t1, z, h)
+        pieces = [method.piece(here.kernel.flow, t, h, x, z, stages, slope, end)] if curved else []
+        z = run.moved_along(here, t1, z, h)
         arc.times.append(t1)
         arc.values.append(z)
         arc.notice(z)
-        if piece is not None:
-            arc.pieces.append(piece)
+        arc.pieces.extend(pieces)
         t, x, slope = t1, z, end
     return here.moved(t, x)
 
@@ -162,7 +160,8 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
         here.arc.append(t, q, crossing.piece)
     if stop := run.limit_reached(t):
         return stop
-    outcome = reset(here, crossing, event.scale, run)
+    crossing = run.moved_crossing(here, crossing)
+    q, outcome = crossing.state, reset(here, crossing, event.scale, run)
     resumed = event.t1 + (epsilon - depth)
     edge = here.mode.edges[crossing.edge]
     if resumed > until + run.tie(until):

@@ -16,7 +16,7 @@ from hsdsl.simulate.cascade import Cascade
 from hsdsl.simulate.control import Control
 from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.input_segments import Segment
-from hsdsl.simulate.moving import moved_by_flow, moved_reset
+from hsdsl.simulate.moving import moved_by_flow, moved_crossing, moved_reset
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.recorder import OpenArc, Recorder
@@ -111,9 +111,17 @@ class Run(Problem):
 
     def moved_along(self, here: ModeState, t: Number, x: State, h: Number) -> State:
         """A state on its way, moved by what round-off of the flow does in a time h."""
-        if here.flow != here.index:  # its flow follows guards
+        if not self.settings.moves or here.flow != here.index:  # a flow that follows guards is not moved
             return x
         return moved_by_flow(self.kernel, here.index, here.segment.data, t, x, h, here.arc.scales)
+
+    def moved_crossing(self, here: ModeState, crossing: Crossing) -> Crossing:
+        """A crossing moved by the round-off of its surface."""
+        if not self.settings.moves:
+            return crossing
+        k, t, q = crossing.edge, crossing.time, crossing.state
+        at = moved_crossing(self.kernel, here.index, k, here.segment.data, t, q, here.arc.scales)
+        return replace(crossing, state=at)
 
     def wait(self, here: ModeState, rows: list[tuple[Number, Number]], q: State) -> None:
         """Write a strip: the state waits at q while time and depth pass through ``rows``; inputs go on."""

@@ -377,6 +377,7 @@ static int jump(hs_run *run) {
   if (crossing->theta == 0 && run->here.standing) stand(run, run->active_surfaces, run->here.table->surfaces);
   if (edge->target != mode)
     for (int j = 0; j < run->model->surfaces; j++) run->stood[j] = 0.0;
+  HS_MOVE(run, move_crossing(run));
   const int waits = crowded(run, crossing), without_value = reset(run, run->landed);
   if (waits) {
     if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);

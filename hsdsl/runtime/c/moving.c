@@ -27,6 +27,27 @@ static void move_reset(hs_run *run) {
   for (int i = 0; i < edge->changes; i++) run->after[edge->change[i]] = moved(v[formula->result[i]]);
 }
 
+/* Whether a state moves by more than the least error of one. */
+static int counts(const hs_run *run, int i, hs_real by, hs_real a) {
+  return fabs(by) > ERROR_UNITS * HS_UNIT * hs_max(run->scales[i], fabs(a));
+}
+
+/* Move the state of the chosen crossing along the flow to where it crosses but for the surface's round-off. */
+static void move_crossing(hs_run *run) {
+  const hs_crossing *const crossing = &run->chosen;
+  const hs_mode_state *const here = &run->here;
+  const hs_formulas *const f = &moves_of(run)->formulas[here->mode];
+  const int n = here->table->dimension;
+  hs_real rate, *const q = crossing->state, *const slope = run->error;
+  if (here->table->rates[crossing->edge](here->p, crossing->time, q, &rate) || !(rate > 0)) return;
+  if (here->table->flow(here->p, crossing->time, q, slope)) return;
+  hs_rounded *const v = bound_registers(run, 1);
+  rounded_formula(f, &f->surfaces, n, run->model->data, crossing->time, q, v, 1);
+  const hs_real late = -beyond_value(v[f->surfaces.result[crossing->edge]]) / rate;
+  for (int i = 0; i < n; i++)
+    if (counts(run, i, late * slope[i], q[i])) q[i] += late * slope[i];
+}
+
 /* Which way a state is moved along the flow: no two, four, eight, ... states after each other go the same ways. */
 static int side(unsigned state) {
   int way = 1;
@@ -45,7 +66,7 @@ static void move_along(hs_run *run, hs_time t, hs_real *x, hs_real h) {
     if (!hs_finite(v[f->flow.result[i]].off)) return;
   for (int i = 0; i < here->dimension; i++) {
     const hs_real by = h * v[f->flow.result[i]].off;
-    if (by > ERROR_UNITS * HS_UNIT * hs_max(run->scales[i], fabs(x[i]))) x[i] += side((unsigned)i) * by;
+    if (counts(run, i, by, x[i])) x[i] += side((unsigned)i) * by;
   }
 }
 

@@ -193,6 +193,7 @@ static int through_strip(hs_run *run) {
     append(run, t, crossing->state, &run->cubic);
   }
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
+  HS_MOVE(run, move_crossing(run));
   hs_time resumed = t1 + (run->epsilon - depth);
   const int without_value = reset(run, run->landed);
   if (resumed > until + tie(until)) {

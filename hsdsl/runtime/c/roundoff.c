@@ -176,6 +176,12 @@ static void rounded_formula(const hs_formulas *f, const hs_formula *formula, int
   rounded_operations(f, formula->first, formula->last, 1 + n + data + f->constants, v, traced);
 }
 
+/* What a traced number is beyond its value; zero where that is not known. */
+static double beyond_value(hs_rounded a) {
+  const double beyond = a.error < 0.0 ? a.error - a.off : a.error + a.off;
+  return hs_finite(beyond) ? beyond : 0.0;
+}
+
 /* A traced number moved by its round-off: at least to the next number, if it is not exact or nothing is known. */
 static double moved(hs_rounded a) {
   const double off = fabs(a.error) + a.off, least = ROUNDED * fabs(a.value);

@@ -22,16 +22,25 @@ static int bound_roundoff(hs_view *v, const hs_shadow *c) {
   return 1;
 }
 
-/* Move it along a straight line to where it crosses surface k, to y. */
+/* Follow the round-off of a formula of the mode at a point of the shadow run. */
+static void trace(hs_view *v, const hs_shadow *c, const hs_formula *formula, const double *x) {
+  const int n = c->table->dimension, data = v->s->model->data;
+  if (v->traced_mode != v->mode) bind_rounded(v->f, n, data, c->p, v->traced, 1), v->traced_mode = v->mode;
+  rounded_formula(v->f, formula, n, data, c->t, x, v->traced, 1);
+}
+
+/* Move it along a straight line to where it crosses surface k but for the surface's round-off, to y. */
 static int shadow_crosses(hs_view *v, hs_shadow *c, int k) {
   const double tie = tie_of(v->s, c->t);
   double change = INFINITY, rate, s = 0.0;
   if (c->table->flow(c->p, c->t, c->x, v->slope)) return 0;
+  trace(v, c, &v->f->surfaces, c->x);
+  const double beyond = beyond_value(v->traced[v->f->surfaces.result[k]]);
   copy(c->y, c->x, c->table->dimension);
   for (int i = 0; i < MOST_CHANGES && fabs(change) > CLOSED_IN * tie; i++) {
     if (c->table->values(c->p, c->t + s, c->y, v->values) || c->table->rates[k](c->p, c->t + s, c->y, &rate)) return 0;
     if (!(rate > 0)) return 0;
-    change = v->values[k] / rate;
+    change = (v->values[k] + beyond) / rate;
     s -= change;
     for (int m = 0; m < c->table->dimension; m++) c->y[m] = c->x[m] + s * v->slope[m];
   }
@@ -43,10 +52,8 @@ static int shadow_crosses(hs_view *v, hs_shadow *c, int k) {
 static int trace_reset(hs_view *v, hs_shadow *c, int k) {
   const hs_formula *const formula = &v->f->reset[k];
   const hs_edge *const edge = &c->table->edge[k];
-  const int n = c->table->dimension, data = v->s->model->data;
-  if (v->traced_mode != v->mode) bind_rounded(v->f, n, data, c->p, v->traced, 1), v->traced_mode = v->mode;
-  copy(c->x, c->y, n);
-  rounded_formula(v->f, formula, n, data, c->t, c->y, v->traced, 1);
+  copy(c->x, c->y, c->table->dimension);
+  trace(v, c, formula, c->y);
   for (int i = 0; i < edge->changes; i++) {
     const hs_rounded found = v->traced[formula->result[i]];
     c->x[edge->change[i]] = moved(found);

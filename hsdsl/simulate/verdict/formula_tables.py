@@ -17,7 +17,6 @@ from hsdsl.program import ModeProgram, Program
 from hsdsl.runtime import structures
 from hsdsl.simulate.verdict.formulas import Node, Operations
 
-
 MOST_OPERANDS = 4
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from hsdsl.execution import Arc, Execution, Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.integrators.taylor import terms
-from hsdsl.simulate.moving import flow_roundoff, moved_reset
+from hsdsl.simulate.moving import flow_roundoff, moved_reset, surface_roundoff
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.verdict.correction import Array, corrected
@@ -130,19 +130,19 @@ class ShadowRun:
         self.state_errors[row, : len(y)] = np.fmax(self.state_errors[row, : len(y)], away)
 
     def _jump(self, arc: Arc, made: Transition) -> None:
-        """Make a transition where it crosses the surface, along a straight line from where it is."""
+        """Make a transition where it crosses the surface but for its round-off, on a straight line from where it is."""
         mode, y = self.problem.program.modes[self.modes[arc.mode]], self.x
         index = self.modes[arc.mode]
         kernel = self.problem.kernel.bind(index, self.moved)
         found = [k for k, edge in enumerate(mode.edges) if edge.name == made.edge]
         k = min(found, key=lambda k: abs(kernel.surfaces(made.time, *made.before.values())[k]))
         tie, change, s = float(self.problem.tie(max(self.t, self.times[-1]))), np.inf, 0.0
-        slope = kernel.flow(self.t, *y)
+        slope, beyond = kernel.flow(self.t, *y), surface_roundoff(self.problem.kernel, index, k, self.moved, self.t, y)
         for _ in range(MOST_CHANGES):
             value, rate = kernel.surfaces(self.t + s, *y)[k], kernel.rates[k](self.t + s, *y)[0]
             if not rate > 0:
                 raise Lost
-            change = value / rate
+            change = (value + beyond) / rate
             s -= change
             y = tuple(a + s * b for a, b in zip(self.x, slope, strict=True))
             if abs(change) <= CLOSED_IN * tie:
