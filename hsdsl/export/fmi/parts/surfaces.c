@@ -118,6 +118,8 @@ fmu_status fmu_get_indicators(fmu *unit, double *z) {
   for (int k = 0; k < PROBLEM_SURFACES; k++) z[k] = 1.0;
   if (!p) return FMU_NO_VALUE;
   if (unit->now.ended) return FMU_OK;
+  unit->now.seen = unit->now.given;
+  memcpy(unit->now.seen_state, unit->now.state, sizeof unit->now.state);
   fmu_local(unit, x);
   if (mode->values(p, unit->now.time, x, r)) return FMU_NO_VALUE;
   for (int k = 0; k < mode->surfaces; k++) {
@@ -157,21 +159,22 @@ static int crossed(const hs_mode *mode, int k, const double *p, double *t, doubl
   return fmu_rate_of(mode, k, p, *t, x, &rate) || !(rate > 0);
 }
 
-/* Take a state that is beyond surface k by r back onto it: along the flow, else straight. From a surface that an input
-   moves it may be far, and then stays where it is. */
-int fmu_take_back(const fmu *unit, int k, const double *p, double r, double *t, double *x) {
-  const hs_mode *mode = fmu_table(unit);
-  const int driven = fmu_is_driven(unit, k);
-  double q[PROBLEM_WIDTH + 1], at = *t;
-  memcpy(q, x, sizeof q);
-  const int turned = crossed(mode, k, p, &at, q);
-  if (driven && (turned || at < unit->now.inside_at[k])) {
-    if (r > 2 * unit->now.margin[k]) return 0;
-    return projected(unit, mode, k, p, *t, x);
-  }
-  if (turned) return projected(unit, mode, k, p, *t, x);
-  memcpy(x, q, sizeof q);
-  *t = at;
-  return 0;
+/* Where an input moves surface k, it may have got far beyond the state: by how much of the way that leads back along the
+   flow the state has come since it was inside, at most all of it. */
+static double share_of(const fmu *unit, int k, double t, double at) {
+  const double inside_at = unit->now.inside_at[k];
+  if (!fmu_is_driven(unit, k) || at >= inside_at) return 1.0;
+  return hs_max(0.0, (t - inside_at) / (t - at));
 }
 
+int fmu_take_back(const fmu *unit, int k, const double *p, double r, double *t, double *x) {
+  const hs_mode *mode = fmu_table(unit);
+  double q[PROBLEM_WIDTH + 1], at = *t;
+  memcpy(q, x, sizeof q);
+  const int turned = crossed(mode, k, p, &at, q), near = r <= 2 * unit->now.margin[k];
+  const double share = turned ? 0.0 : share_of(unit, k, *t, at);
+  if (share < 1 && (near || !fmu_is_driven(unit, k))) return projected(unit, mode, k, p, *t, x);
+  for (int s = 0; s < mode->dimension; s++) x[s] = share < 1 ? x[s] + share * (q[s] - x[s]) : q[s];
+  *t = share < 1 ? *t + share * (at - *t) : at;
+  return 0;
+}
