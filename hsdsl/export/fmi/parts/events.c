@@ -65,7 +65,7 @@ static int holds(const hs_mode *mode, int k, const double *p, double t, const do
 static int entered_beyond(const fmu *unit, int k, double r) {
   const fmu_data *now = &unit->now;
   const double noise = ROUNDOFF * now->margin[k], left = unit->left[k];
-  if (fmu_may_be_beyond(unit, k) || now->side[k] == FMU_ON) return 0;
+  if (fmu_may_be_beyond(unit, k) || fmu_is_on(unit, k)) return 0;
   if (!unit->left_known) return r > now->margin[k];
   return r > left && (r > now->margin[k] || (k < fmu_table(unit)->edges && left < -noise && r >= -noise));
 }
@@ -78,7 +78,7 @@ static int fires(const fmu *unit, int k, const double *p, const double *x, const
   const int wall = k >= mode->edges, decided = fmu_is_driven(unit, k) && level > 0; /* by values alone */
   double rate, t = now->time, q[PROBLEM_WIDTH + 1];
   if (entry && entered_beyond(unit, k, r[k])) return 1;
-  if (now->side[k] == FMU_ON) level = now->furthest[k] + now->margin[k] / 2;
+  if (fmu_is_on(unit, k)) level = now->furthest[k] + now->margin[k] / 2;
   if (now->side[k] == FMU_OUTSIDE || !(r[k] > level)) return 0;
   if (!decided && !fmu_rate_of(mode, k, p, t, x, &rate) && !(rate > 0)) return 0;
   if (wall) return 1;
@@ -103,12 +103,20 @@ static int first_of(const fmu *unit, const double *p, const double *x, const dou
   return chosen;
 }
 
+/* The state behind the reset of edge k but for the states that it counts with. */
+static int reset_without_counts(const hs_mode *mode, int k, const double *p, double t, const double *x, double *after) {
+  const hs_edge *edge = &mode->edge[k];
+  if (reset_of(mode, k, p, t, x, after)) return 1;
+  for (int i = 0; i < edge->counts; i++) after[edge->count[i]] = x[edge->count[i]];
+  return 0;
+}
+
 /* The state that resets of edge k run to. */
 static int fixed_point(const hs_mode *mode, int k, const double *p, double t, double *x) {
   double one[PROBLEM_WIDTH + 1], two[PROBLEM_WIDTH + 1];
   for (int i = 0; i < MOST_RESETS; i++) {
     int same = 1;
-    if (reset_of(mode, k, p, t, x, one) || reset_of(mode, k, p, t, one, two)) return 1;
+    if (reset_without_counts(mode, k, p, t, x, one) || reset_without_counts(mode, k, p, t, one, two)) return 1;
     for (int s = 0; s < mode->dimension; s++) {
       const double bend = two[s] - 2 * one[s] + x[s];
       const double next = bend != 0 ? x[s] - (one[s] - x[s]) * (one[s] - x[s]) / bend : two[s];
@@ -153,13 +161,14 @@ static int enter_surfaces(fmu *unit, double t, const hs_mode *before, const int 
   if (fmu_set_margins(unit, r)) return 1;
   for (int k = 0; k < mode->surfaces; k++) {
     const int stays = mode == before;
-    const int on = k == made ? fabs(r[k] - from) <= margin[k] : now->side[k] == FMU_ON;
+    const int on = k == made ? fabs(r[k] - from) <= margin[k] : fmu_is_on(unit, k);
     const int outside = fmu_may_be_beyond(unit, k) && r[k] > margin[k] && !(stays && crossed[k]);
     now->side[k] = outside ? FMU_OUTSIDE : FMU_INSIDE;
     if (stays && on && fmu_is_driven(unit, k) && !fmu_may_be_beyond(unit, k) && r[k] > margin[k] / 2) now->side[k] = FMU_ON;
     if (now->side[k] == FMU_ON) now->furthest[k] = k == made ? r[k] : now->furthest[k];
     now->inside_at[k] = t;
-    now->left[k] = r[k] < -margin[k] || (stays && k != made && now->left[k]);
+    if (!stays || k == made) now->left_at[k] = INFINITY;
+    if (r[k] < -margin[k]) now->left_at[k] = hs_min(now->left_at[k], t);
     unit->made[k] = stays && (k == made || unit->made[k]);
   }
   return 0;
@@ -170,7 +179,7 @@ static const char *make(fmu *unit, int k, const double *p, double *x, const doub
   fmu_data *const now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   double after[PROBLEM_WIDTH + 1], from[PROBLEM_SURFACES + 1], t = now->time;
-  const int source = now->mode, stayed = !now->left[k], was_on = now->side[k] == FMU_ON;
+  const int source = now->mode, was_on = fmu_is_on(unit, k), stayed = !(now->left_at[k] <= t);
   int crossed[PROBLEM_SURFACES + 1];
   for (int j = 0; j < mode->edges; j++) crossed[j] = j != k && !now->side[j] && r[j] > now->margin[j] / 2;
   if (!entry && fmu_take_back(unit, k, p, r[k], &t, x)) return "not_finite";
@@ -205,7 +214,7 @@ static int set_sides(fmu *unit) {
   for (int k = 0; k < mode->surfaces; k++) {
     if (fmu_may_be_beyond(unit, k))
       now->side[k] = r[k] > now->margin[k] / 2 ? FMU_OUTSIDE : FMU_INSIDE;
-    else if (now->side[k] == FMU_ON && !(r[k] > now->margin[k] / 4))
+    else if (!fmu_is_on(unit, k) || !(r[k] > now->margin[k] / 4))
       now->side[k] = FMU_INSIDE;
     now->furthest[k] = hs_min(now->furthest[k], r[k]);
     now->inside_at[k] = now->time;
@@ -223,7 +232,7 @@ static void keep_sides(fmu *unit, int jumped) {
   for (int k = 0; k < mode->surfaces; k++) {
     const int conditional = fmu_may_be_beyond(unit, k), beyond = r[k] > now->margin[k] / 2;
     const int inside = !(unit->left[k] > now->margin[k] / 2);
-    const int stays = unit->made[k] && (now->side[k] == FMU_ON || fabs(unit->left[k]) <= now->margin[k]);
+    const int stays = unit->made[k] && (fmu_is_on(unit, k) || fabs(unit->left[k]) <= now->margin[k]);
     if (conditional && inside && (jumped || stays)) now->side[k] = beyond ? FMU_OUTSIDE : FMU_INSIDE;
     if (conditional || !fmu_is_driven(unit, k) || !stays || !beyond) continue;
     now->side[k] = FMU_ON;

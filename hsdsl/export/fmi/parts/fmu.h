@@ -33,7 +33,7 @@ typedef struct {
   double furthest[PROBLEM_SURFACES + 1]; /* how far beyond a surface the state is that is on it */
   double input_size[FMU_INPUTS + 1];     /* the largest so far */
   double inside_at[PROBLEM_SURFACES + 1]; /* when a state was inside at last */
-  int left[PROBLEM_SURFACES + 1]; /* whether it has been inside, off the surface, since the last transition there */
+  double left_at[PROBLEM_SURFACES + 1]; /* when it was inside at first, off the surface, since the last transition there */
   int again;                      /* transitions in a row from a surface that the state did not leave */
   fmu_given_values given, earlier; /* now, and before this event; in co-simulation before this step */
   fmu_given_values seen;           /* where indicators were evaluated last, at this state: */

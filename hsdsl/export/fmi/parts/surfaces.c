@@ -98,13 +98,18 @@ int fmu_may_be_beyond(const fmu *unit, int k) {
   return k < mode->edges && mode->edge[k].conditional && !fmu_lets_go(unit, k);
 }
 
+/* Whether the state is on surface k: some callers go on from it to the inside without an event. */
+int fmu_is_on(const fmu *unit, int k) {
+  return unit->now.side[k] == FMU_ON && !(unit->now.left_at[k] <= unit->now.time);
+}
+
 /* The indicator of surface k. */
 static int indicator(const fmu *unit, int k, const double *p, const double *x, const double *r, double *z) {
   const fmu_data *now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   const double margin = now->margin[k], back = margin / 4 - r[k];
   double rate;
-  if (now->side[k] == FMU_ON) return *z = hs_min(-back, now->furthest[k] + margin - r[k]), !hs_finite(*z);
+  if (fmu_is_on(unit, k)) return *z = hs_min(-back, now->furthest[k] + margin - r[k]), !hs_finite(*z);
   *z = now->side[k] == FMU_OUTSIDE ? back : margin - r[k];
   if (!fmu_may_be_beyond(unit, k) && !fmu_is_driven(unit, k) && !fmu_rate_of(mode, k, p, now->time, x, &rate))
     *z = hs_max(*z, -problem_settings.largest * rate); /* the flow may end at the surface */
@@ -123,9 +128,9 @@ fmu_status fmu_get_indicators(fmu *unit, double *z) {
   fmu_local(unit, x);
   if (mode->values(p, unit->now.time, x, r)) return FMU_NO_VALUE;
   for (int k = 0; k < mode->surfaces; k++) {
+    if (r[k] < -unit->now.margin[k]) unit->now.left_at[k] = hs_min(unit->now.left_at[k], unit->now.time);
     if (indicator(unit, k, p, x, r, &z[k])) return FMU_NO_VALUE;
     if (!(r[k] > unit->now.margin[k])) unit->now.inside_at[k] = unit->now.time;
-    unit->now.left[k] |= r[k] < -unit->now.margin[k];
   }
   return FMU_OK;
 }
