@@ -129,7 +129,9 @@ class Importer:
             if self.ended or self.time >= until - SAME:
                 return
             start, x = self.time, self.x
-            stops = [t for t in (*self.jumps, self.next, until) if t > start + SAME and (self.habit.jumps or t == until)]
+            stops = [
+                t for t in (*self.jumps, self.next, until) if t > start + SAME and (self.habit.jumps or t == until)
+            ]
             end = next((t for t in stops if abs(t - start - self.habit.step) < SAME), start + self.habit.step)
             end = min(end, self.next, *stops)
             if not np.array_equal(self.signs(start, x), self.known):  # an input that was set behind the last step
@@ -150,6 +152,8 @@ class Importer:
                 self.event()
         raise AssertionError(f"expected {until} to be reached, got to {self.time}")
 
-    def transitions(self, place: int) -> list[float]:
-        """The times at which a state jumped."""
-        return [time for time, row in self.rows if row[place] != row[place + self.states]]
+    def counted(self, name: str) -> list[float]:
+        """The times at which a state that counts has counted, each as often as it did."""
+        place = self.references[name] - 1  # behind time
+        changes = [(time, round(row[place + self.states] - row[place])) for time, row in self.rows]
+        return [time for time, count in changes for _ in range(count)]

@@ -38,8 +38,9 @@ def sources_of(unit: Unit, version: int) -> dict[str, bytes]:
     flat["variables.h"] = tables.header(unit, token_of(unit, version)).encode()
     flat["variables.c"] = tables.numbers(unit).encode()
     flat["fmi_version.h"] = f'#include "fmi{version}.h"\n'.encode()
-    parts = ("fmu.h", "fmu.c", "surfaces.h", "surfaces.c", "events.h", "events.c", "fmi.h", "fmi.c", f"fmi{version}.h", f"fmi{version}.c")
-    return flat | {name: (FOLDER / "parts" / name).read_bytes() for name in parts}
+    names = ("fmu", "surfaces", "events", "fmi", f"fmi{version}")
+    parts = (f"{name}.{kind}" for name in names for kind in "hc")
+    return flat | {part: (FOLDER / "parts" / part).read_bytes() for part in parts}
 
 
 def platform_folder(version: int) -> tuple[str, str]:

@@ -1,7 +1,8 @@
 /* Events in model exchange: which surfaces fire, and what they make.
 
    What the caller gives may be set at any time, and again. It has jumped where values differ at an event from those that
-   the event began with: first comes what is due with the old values, then what the state is beyond with the new ones. */
+   the event began with: first comes what is due with the old values, then what the state is beyond with the new ones.
+   Callers may find an event with one value of an input and begin it with a later one: what they saw comes before. */
 
 #include "events.h"
 
@@ -11,7 +12,8 @@
 #include "surfaces.h"
 
 #define ROUNDOFF 0x1p-14  /* of a margin: what counts as on a surface where an input jumps */
-#define MOST_AT_ONCE 1000 /* transitions at one instant, or in a row from the same surface */
+#define MOST_AT_ONCE 1000 /* transitions at one instant, or in a row from a surface that the state does not leave */
+#define MOST_ON 16        /* of these where an input moves the surface ever further past the state */
 #define MOST_RESETS 60    /* until they change nothing */
 
 int32_t fmu_segment_at(double time) {
@@ -63,7 +65,7 @@ static int holds(const hs_mode *mode, int k, const double *p, double t, const do
 static int entered_beyond(const fmu *unit, int k, double r) {
   const fmu_data *now = &unit->now;
   const double noise = ROUNDOFF * now->margin[k], left = unit->left[k];
-  if (fmu_may_be_beyond(unit, k) || now->side[k] == FMU_ON) return 0;
+  if (fmu_may_be_beyond(unit, k) || fmu_is_on(unit, k)) return 0;
   if (!unit->left_known) return r > now->margin[k];
   return r > left && (r > now->margin[k] || (k < fmu_table(unit)->edges && left < -noise && r >= -noise));
 }
@@ -76,7 +78,7 @@ static int fires(const fmu *unit, int k, const double *p, const double *x, const
   const int wall = k >= mode->edges, decided = fmu_is_driven(unit, k) && level > 0; /* by values alone */
   double rate, t = now->time, q[PROBLEM_WIDTH + 1];
   if (entry && entered_beyond(unit, k, r[k])) return 1;
-  if (now->side[k] == FMU_ON) level = now->furthest[k] + now->margin[k] / 2;
+  if (fmu_is_on(unit, k)) level = now->furthest[k] + now->margin[k] / 2;
   if (now->side[k] == FMU_OUTSIDE || !(r[k] > level)) return 0;
   if (!decided && !fmu_rate_of(mode, k, p, t, x, &rate) && !(rate > 0)) return 0;
   if (wall) return 1;
@@ -101,12 +103,20 @@ static int first_of(const fmu *unit, const double *p, const double *x, const dou
   return chosen;
 }
 
+/* The state behind the reset of edge k but for the states that it counts with. */
+static int reset_without_counts(const hs_mode *mode, int k, const double *p, double t, const double *x, double *after) {
+  const hs_edge *edge = &mode->edge[k];
+  if (reset_of(mode, k, p, t, x, after)) return 1;
+  for (int i = 0; i < edge->counts; i++) after[edge->count[i]] = x[edge->count[i]];
+  return 0;
+}
+
 /* The state that resets of edge k run to. */
 static int fixed_point(const hs_mode *mode, int k, const double *p, double t, double *x) {
   double one[PROBLEM_WIDTH + 1], two[PROBLEM_WIDTH + 1];
   for (int i = 0; i < MOST_RESETS; i++) {
     int same = 1;
-    if (reset_of(mode, k, p, t, x, one) || reset_of(mode, k, p, t, one, two)) return 1;
+    if (reset_without_counts(mode, k, p, t, x, one) || reset_without_counts(mode, k, p, t, one, two)) return 1;
     for (int s = 0; s < mode->dimension; s++) {
       const double bend = two[s] - 2 * one[s] + x[s];
       const double next = bend != 0 ? x[s] - (one[s] - x[s]) * (one[s] - x[s]) / bend : two[s];
@@ -151,13 +161,14 @@ static int enter_surfaces(fmu *unit, double t, const hs_mode *before, const int 
   if (fmu_set_margins(unit, r)) return 1;
   for (int k = 0; k < mode->surfaces; k++) {
     const int stays = mode == before;
-    const int on = k == made ? fabs(r[k] - from) <= margin[k] : now->side[k] == FMU_ON;
+    const int on = k == made ? fabs(r[k] - from) <= margin[k] : fmu_is_on(unit, k);
     const int outside = fmu_may_be_beyond(unit, k) && r[k] > margin[k] && !(stays && crossed[k]);
     now->side[k] = outside ? FMU_OUTSIDE : FMU_INSIDE;
     if (stays && on && fmu_is_driven(unit, k) && !fmu_may_be_beyond(unit, k) && r[k] > margin[k] / 2) now->side[k] = FMU_ON;
     if (now->side[k] == FMU_ON) now->furthest[k] = k == made ? r[k] : now->furthest[k];
     now->inside_at[k] = t;
-    now->left[k] = r[k] < -margin[k] || (stays && k != made && now->left[k]);
+    if (!stays || k == made) now->left_at[k] = INFINITY;
+    if (r[k] < -margin[k]) now->left_at[k] = hs_min(now->left_at[k], t);
     unit->made[k] = stays && (k == made || unit->made[k]);
   }
   return 0;
@@ -168,7 +179,7 @@ static const char *make(fmu *unit, int k, const double *p, double *x, const doub
   fmu_data *const now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   double after[PROBLEM_WIDTH + 1], from[PROBLEM_SURFACES + 1], t = now->time;
-  const int source = now->mode, stayed = !now->left[k];
+  const int source = now->mode, was_on = fmu_is_on(unit, k), stayed = !(now->left_at[k] <= t);
   int crossed[PROBLEM_SURFACES + 1];
   for (int j = 0; j < mode->edges; j++) crossed[j] = j != k && !now->side[j] && r[j] > now->margin[j] / 2;
   if (!entry && fmu_take_back(unit, k, p, r[k], &t, x)) return "not_finite";
@@ -185,7 +196,8 @@ static const char *make(fmu *unit, int k, const double *p, double *x, const doub
   if (now->ended) return 0;
   if (enter_surfaces(unit, t, mode, crossed, k, from[k])) return "not_finite";
   now->again = stayed && fmu_table(unit) == mode ? now->again + 1 : 0;
-  return now->again < MOST_AT_ONCE ? 0 : "zeno: more than a thousand transitions in a row from one surface";
+  if (now->again < (was_on ? MOST_ON : MOST_AT_ONCE)) return 0;
+  return "zeno: transitions follow each other from one surface, which the state does not leave";
 }
 
 /* The values of all surfaces now. */
@@ -205,7 +217,7 @@ static int set_sides(fmu *unit) {
   for (int k = 0; k < mode->surfaces; k++) {
     if (fmu_may_be_beyond(unit, k))
       now->side[k] = r[k] > now->margin[k] / 2 ? FMU_OUTSIDE : FMU_INSIDE;
-    else if (now->side[k] == FMU_ON && !(r[k] > now->margin[k] / 4))
+    else if (!fmu_is_on(unit, k) || !(r[k] > now->margin[k] / 4))
       now->side[k] = FMU_INSIDE;
     now->furthest[k] = hs_min(now->furthest[k], r[k]);
     now->inside_at[k] = now->time;
@@ -213,31 +225,40 @@ static int set_sides(fmu *unit) {
   return 0;
 }
 
-/* Where what is given has changed: the state has not crossed the edges with a condition that this has carried it beyond,
-   and is still on the surfaces of those whose transitions it just made. */
-static void keep_sides(fmu *unit) {
+/* Where other values are given: the state is still on the surfaces of edges whose transitions it just made. Where they
+   have `jumped` it has not crossed the edges with a condition that this has carried it beyond. */
+static void keep_sides(fmu *unit, int jumped) {
   fmu_data *const now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   double r[PROBLEM_SURFACES + 1];
   if (values_now(unit, r)) return; /* no value ends the run later */
   for (int k = 0; k < mode->surfaces; k++) {
-    const int inside = !(unit->left[k] > now->margin[k] / 2), beyond = r[k] > now->margin[k] / 2;
-    if (fmu_may_be_beyond(unit, k) && inside) now->side[k] = beyond ? FMU_OUTSIDE : FMU_INSIDE;
-    if (fmu_may_be_beyond(unit, k) || !fmu_is_driven(unit, k) || !unit->made[k]) continue;
-    if (!beyond || (now->side[k] != FMU_ON && !(fabs(unit->left[k]) <= now->margin[k]))) continue;
+    const int conditional = fmu_may_be_beyond(unit, k), beyond = r[k] > now->margin[k] / 2;
+    const int inside = !(unit->left[k] > now->margin[k] / 2);
+    const int stays = unit->made[k] && (fmu_is_on(unit, k) || fabs(unit->left[k]) <= now->margin[k]);
+    if (conditional && inside && (jumped || stays)) now->side[k] = beyond ? FMU_OUTSIDE : FMU_INSIDE;
+    if (conditional || !fmu_is_driven(unit, k) || !stays || !beyond) continue;
     now->side[k] = FMU_ON;
     now->furthest[k] = r[k];
   }
 }
 
-void fmu_enter_events(fmu *unit) {
-  fmu_given_values *const earlier = &unit->now.earlier;
+/* Copy the inputs that may change in time. */
+static void copy_inputs(fmu_given_values *to, const fmu_given_values *from) {
   for (int i = 0; i < FMU_INPUTS; i++) {
     if (fmu_input[i].held) continue; /* it changes at events alone, whenever it was set */
-    earlier->input[i] = unit->now.given.input[i];
-    earlier->input_set[i] = unit->now.given.input_set[i];
-    if (fmu_input[i].given >= 0) earlier->parameters[fmu_input[i].given] = earlier->input_set[i] ? 0.0 : 1.0;
+    to->input[i] = from->input[i];
+    to->input_set[i] = from->input_set[i];
+    if (fmu_input[i].given >= 0) to->parameters[fmu_input[i].given] = to->input_set[i] ? 0.0 : 1.0;
   }
+}
+
+void fmu_enter_events(fmu *unit) {
+  fmu_data *const now = &unit->now;
+  const fmu_given_values seen = now->seen;
+  copy_inputs(&now->earlier, &now->given);
+  now->seen = now->earlier;
+  if (!memcmp(now->seen_state, now->state, sizeof now->state)) copy_inputs(&now->seen, &seen);
 }
 
 /* Make the transitions that are due; why the run ends, if it does. */
@@ -272,19 +293,35 @@ static void settle(fmu *unit, int entry) {
   if (!unit->now.ended && (unit->complaint = transitions(unit, entry)) != 0) unit->now.ended = 1;
 }
 
-int fmu_has_changed(const fmu_data *now) {
-  const fmu_given_values *const given = &now->given, *const earlier = &now->earlier;
-  int changed = 0;
-  for (int i = 0; i < PROBLEM_PARAMETERS; i++) changed |= given->parameters[i] != earlier->parameters[i];
+static int differ(const fmu_given_values *some, const fmu_given_values *others) {
+  int differ = 0;
+  for (int i = 0; i < PROBLEM_PARAMETERS; i++) differ |= some->parameters[i] != others->parameters[i];
   for (int i = 0; i < FMU_INPUTS; i++)
-    changed |= given->input_set[i] != earlier->input_set[i] || given->input[i] != earlier->input[i];
-  return changed;
+    differ |= some->input_set[i] != others->input_set[i] || some->input[i] != others->input[i];
+  return differ;
 }
 
-/* Give other values than before, and have them put in place. */
-static void give(fmu *unit, fmu_given_values values) {
+int fmu_has_changed(const fmu_data *now) { return differ(&now->given, &now->earlier); }
+
+/* Make what is due, then give other values, to which what is given has come smoothly or `jumped`. */
+static void settle_and_give(fmu *unit, fmu_given_values values, int jumped) {
+  settle(unit, 0);
+  unit->left_known = !unit->now.ended && !values_now(unit, unit->left);
   unit->now.given = values;
   unit->now.tuned = 1;
+  if (unit->left_known) keep_sides(unit, jumped);
+  unit->left_known &= jumped;
+}
+
+/* Make what is due with the values that the caller found the event with, then with those that the event began with,
+   from which the present ones may have `jumped`. */
+static void settle_earlier(fmu *unit, int jumped) {
+  fmu_data *const now = &unit->now;
+  const fmu_given_values given = now->given, earlier = now->earlier;
+  now->given = now->seen;
+  now->tuned = 1;
+  if (differ(&now->seen, &earlier)) settle_and_give(unit, earlier, 0);
+  settle_and_give(unit, given, jumped);
 }
 
 /* The segment of the inputs at the present time, and whether one of them `jumped` where it begins. */
@@ -318,18 +355,11 @@ fmu_status fmu_update(fmu *unit, int *jumped, double *next) {
   memset(unit->made, 0, sizeof unit->made);
   now->given.segment = present_segment(now, &entry);
   unit->bound = 0;
-  if (entry || fmu_has_changed(now)) {
-    const fmu_given_values given = now->given;
-    give(unit, now->earlier);
-    settle(unit, 0);
-    unit->left_known = !now->ended && !values_now(unit, unit->left);
-    give(unit, given);
-    if (unit->left_known) keep_sides(unit);
-    entry = 1;
-  }
+  entry |= fmu_has_changed(now);
+  if (entry || differ(&now->seen, &now->earlier)) settle_earlier(unit, entry);
   settle(unit, entry);
   unit->left_known = 0;
-  now->earlier = now->given;
+  now->earlier = now->seen = now->given;
   if (!now->ended && set_sides(unit)) return FMU_ERROR;
   *jumped = now->jumps != jumps || now->resting != resting;
   if (now->given.segment + 1 < PROBLEM_SEGMENTS) *next = problem_timeline.start[now->given.segment + 1];

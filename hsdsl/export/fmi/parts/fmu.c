@@ -155,7 +155,7 @@ fmu_status fmu_get(fmu *unit, unsigned reference, double *value) {
       if (fmu_get_indicators(unit, indicators)) return FMU_NO_VALUE;
       *value = indicators[variable->index];
       return FMU_OK;
-    default: return FMU_ERROR;
+    default: unit->refusal = "a mode is an integer: export with --mode local for tools that read reals alone"; return FMU_ERROR;
   }
 }
 
@@ -292,7 +292,7 @@ fmu_status fmu_initialize(fmu *unit) {
   unit->bound = 0;
   now->started = 1;
   const fmu_status status = unit->co_simulation ? started(unit) : fmu_begin(unit);
-  now->earlier = now->given;
+  now->earlier = now->seen = now->given;
   return status;
 }
 

@@ -33,9 +33,11 @@ typedef struct {
   double furthest[PROBLEM_SURFACES + 1]; /* how far beyond a surface the state is that is on it */
   double input_size[FMU_INPUTS + 1];     /* the largest so far */
   double inside_at[PROBLEM_SURFACES + 1]; /* when a state was inside at last */
-  int left[PROBLEM_SURFACES + 1]; /* whether it has been inside, off the surface, since the last transition there */
+  double left_at[PROBLEM_SURFACES + 1]; /* when it was inside at first, off the surface, since the last transition there */
   int again;                      /* transitions in a row from a surface that the state did not leave */
   fmu_given_values given, earlier; /* now, and before this event; in co-simulation before this step */
+  fmu_given_values seen;           /* where indicators were evaluated last, at this state: */
+  double seen_state[PROBLEM_STATES + 1];
   int tuned; /* whether what is given has changed since it was put in place */
   /* of co-simulation: what is shown in place of the state while it waits in a strip, or before an event is handled */
   int shows_before, before_mode;

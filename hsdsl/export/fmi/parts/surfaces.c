@@ -98,13 +98,18 @@ int fmu_may_be_beyond(const fmu *unit, int k) {
   return k < mode->edges && mode->edge[k].conditional && !fmu_lets_go(unit, k);
 }
 
+/* Whether the state is on surface k: some callers go on from it to the inside without an event. */
+int fmu_is_on(const fmu *unit, int k) {
+  return unit->now.side[k] == FMU_ON && !(unit->now.left_at[k] <= unit->now.time);
+}
+
 /* The indicator of surface k. */
 static int indicator(const fmu *unit, int k, const double *p, const double *x, const double *r, double *z) {
   const fmu_data *now = &unit->now;
   const hs_mode *mode = fmu_table(unit);
   const double margin = now->margin[k], back = margin / 4 - r[k];
   double rate;
-  if (now->side[k] == FMU_ON) return *z = hs_min(-back, now->furthest[k] + margin - r[k]), !hs_finite(*z);
+  if (fmu_is_on(unit, k)) return *z = hs_min(-back, now->furthest[k] + margin - r[k]), !hs_finite(*z);
   *z = now->side[k] == FMU_OUTSIDE ? back : margin - r[k];
   if (!fmu_may_be_beyond(unit, k) && !fmu_is_driven(unit, k) && !fmu_rate_of(mode, k, p, now->time, x, &rate))
     *z = hs_max(*z, -problem_settings.largest * rate); /* the flow may end at the surface */
@@ -118,12 +123,14 @@ fmu_status fmu_get_indicators(fmu *unit, double *z) {
   for (int k = 0; k < PROBLEM_SURFACES; k++) z[k] = 1.0;
   if (!p) return FMU_NO_VALUE;
   if (unit->now.ended) return FMU_OK;
+  unit->now.seen = unit->now.given;
+  memcpy(unit->now.seen_state, unit->now.state, sizeof unit->now.state);
   fmu_local(unit, x);
   if (mode->values(p, unit->now.time, x, r)) return FMU_NO_VALUE;
   for (int k = 0; k < mode->surfaces; k++) {
+    if (r[k] < -unit->now.margin[k]) unit->now.left_at[k] = hs_min(unit->now.left_at[k], unit->now.time);
     if (indicator(unit, k, p, x, r, &z[k])) return FMU_NO_VALUE;
     if (!(r[k] > unit->now.margin[k])) unit->now.inside_at[k] = unit->now.time;
-    unit->now.left[k] |= r[k] < -unit->now.margin[k];
   }
   return FMU_OK;
 }
@@ -157,21 +164,22 @@ static int crossed(const hs_mode *mode, int k, const double *p, double *t, doubl
   return fmu_rate_of(mode, k, p, *t, x, &rate) || !(rate > 0);
 }
 
-/* Take a state that is beyond surface k by r back onto it: along the flow, else straight. From a surface that an input
-   moves it may be far, and then stays where it is. */
-int fmu_take_back(const fmu *unit, int k, const double *p, double r, double *t, double *x) {
-  const hs_mode *mode = fmu_table(unit);
-  const int driven = fmu_is_driven(unit, k);
-  double q[PROBLEM_WIDTH + 1], at = *t;
-  memcpy(q, x, sizeof q);
-  const int turned = crossed(mode, k, p, &at, q);
-  if (driven && (turned || at < unit->now.inside_at[k])) {
-    if (r > 2 * unit->now.margin[k]) return 0;
-    return projected(unit, mode, k, p, *t, x);
-  }
-  if (turned) return projected(unit, mode, k, p, *t, x);
-  memcpy(x, q, sizeof q);
-  *t = at;
-  return 0;
+/* Where an input moves surface k, it may have got far beyond the state: by how much of the way that leads back along the
+   flow the state has come since it was inside, at most all of it. */
+static double share_of(const fmu *unit, int k, double t, double at) {
+  const double inside_at = unit->now.inside_at[k];
+  if (!fmu_is_driven(unit, k) || at >= inside_at) return 1.0;
+  return hs_max(0.0, (t - inside_at) / (t - at));
 }
 
+int fmu_take_back(const fmu *unit, int k, const double *p, double r, double *t, double *x) {
+  const hs_mode *mode = fmu_table(unit);
+  double q[PROBLEM_WIDTH + 1], at = *t;
+  memcpy(q, x, sizeof q);
+  const int turned = crossed(mode, k, p, &at, q), near = r <= 2 * unit->now.margin[k];
+  const double share = turned ? 0.0 : share_of(unit, k, *t, at);
+  if (share < 1 && (near || !fmu_is_driven(unit, k))) return projected(unit, mode, k, p, *t, x);
+  for (int s = 0; s < mode->dimension; s++) x[s] = share < 1 ? x[s] + share * (q[s] - x[s]) : q[s];
+  *t = share < 1 ? *t + share * (at - *t) : at;
+  return 0;
+}

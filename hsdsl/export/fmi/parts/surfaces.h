@@ -20,8 +20,11 @@ int fmu_lets_go(const fmu *unit, int k);
 /* Whether a state may be beyond surface k without having crossed it. */
 int fmu_may_be_beyond(const fmu *unit, int k);
 
+/* Whether the state is still on surface k. */
+int fmu_is_on(const fmu *unit, int k);
+
 /* Take a state that is beyond surface k by r back onto it: along the flow, else straight. From a surface that an input
-   moves it may be far, and then stays where it is. */
+   moves it may be far, and then goes back only as far as it has come since it was inside. */
 int fmu_take_back(const fmu *unit, int k, const double *p, double r, double *t, double *x);
 
 #endif
