@@ -132,16 +132,25 @@ class Event:
     def after(self, meaning: Mapping[Any, Any], reached: Reached | None = None) -> Any:
         """1 where the condition holds at new values of states.
 
-        Of the comparisons that stay the one that was ``reached`` holds, and those that counted as reached with it.
+        Of the comparisons that stay the one that was ``reached`` holds while the flow does not lead back, and so do
+        those that counted as reached with it.
         """
 
         def of(part: Reached) -> Any:
             if reached is None or part.residual.xreplace(meaning) != part.residual:
                 return part.holds(meaning)
             turns = part.turns(reached)
-            return part.nearly_holds(self.rate(part.residual), TIME) if turns is None else number(turns, of)
+            rate = self.rate(part.residual)
+            return (
+                part.nearly_holds(rate, TIME) if turns is None else part.holds_next(turns, rate, rate.xreplace(meaning))
+            )
 
         return number(self.event.trigger, of)
+
+    def leaves(self, meaning: Mapping[Any, Any]) -> bool:
+        """Whether new values of states change how its comparisons change along the flow."""
+        rates = (self.rate(c.residual) for c in comparisons(self.event.trigger))
+        return any(rate.xreplace(meaning) != rate for rate in rates)
 
     def rises(self) -> Any:
         """1 where the flow turns the condition true at this instant, else 0."""
