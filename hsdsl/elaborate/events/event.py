@@ -93,6 +93,12 @@ class Event:
         here = self.here({}, {})
         return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
 
+    def goes_before(self, other: Event) -> bool:
+        """Whether it goes before another one, of those that are made at one instant, by M6."""
+        names = [edge.name for edge in self.mode.edges]
+        ranks = [(-each.edge.priority, names.index(each.edge.name)) for each in (self, other)]
+        return ranks[0] < ranks[1]
+
     @property
     def event(self) -> Any:
         assert self.edge.event is not None
