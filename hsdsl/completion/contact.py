@@ -124,11 +124,12 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO
 
 
 def fires(edge: Edge) -> bool:
-    """Whether an edge is no event's, or the one by which an event is made where its condition turns true."""
+    """Whether an edge is no event's, or makes an event where its condition turns true, however others are ranked."""
     if not edge.of_event:
         return True
-    armed = symbol(memory(edge.of_event[0], "armed"))
-    return edge.name == edge.of_event[0] and edge.condition is not None and armed in edge.condition.free_symbols
+    names = {name.name for name in edge.condition.free_symbols} if edge.condition is not None else set[str]()
+    remembered = names - {*without_memory(names)}
+    return edge.name == edge.of_event[0] and remembered == {memory(edge.of_event[0], "armed")}
 
 
 def _constrained(near: Nearby):
