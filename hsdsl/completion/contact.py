@@ -33,7 +33,9 @@ from hsdsl.completion.nearby import (
 )
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.derivatives import derivative, lie_derivative
+from hsdsl.expression.scope import symbol
 from hsdsl.functions import sign
+from hsdsl.names import memory, without_memory
 from hsdsl.system import TIME, Edge, Mode, Surface
 
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
@@ -91,15 +93,16 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO
     ``numbers`` are states that are modes of parts, ``moving`` has the slopes of inputs.
     """
     edge = mode.edges[k]
-    if edge.target != mode.name or edge.target_states != mode.states or mode.derived or edge.of_event:
+    if edge.target != mode.name or edge.target_states != mode.states or mode.derived or not fires(edge):
         return None
-    near = Nearby(mode, edge, mode_of_part(edge, numbers), moving=moving)
+    kept = [i for i, name in enumerate(mode.states) if not without_memory([name])] if edge.of_event else []
+    near = Nearby(mode, edge, mode_of_part(edge, numbers), kept, moving=moving)
     if any(mode.states[i] in numbers for i in near.changed):
         return None
     near = branched(near) if near.changed and near.is_small() else near
     if near is None:
         return None
-    near = near.without(counts) if (counts := counts_of(near)) else near
+    near = near.without(counts) if (counts := (*kept, *counts_of(near))) else near
     constrained = _constrained(near) if near.changed and near.is_small() else None
     if constrained is None:
         return None
@@ -118,6 +121,15 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO
         k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts, kept,
         along,
     )  # fmt: skip
+
+
+def fires(edge: Edge) -> bool:
+    """Whether an edge is no event's, or makes an event where its condition turns true, however others are ranked."""
+    if not edge.of_event:
+        return True
+    names = {name.name for name in edge.condition.free_symbols} if edge.condition is not None else set[str]()
+    remembered = names - {*without_memory(names)}
+    return edge.name == edge.of_event[0] and remembered == {memory(edge.of_event[0], "armed")}
 
 
 def _constrained(near: Nearby):

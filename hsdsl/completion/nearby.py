@@ -60,7 +60,7 @@ class Nearby:
         impact: Point | None = None,
         moving: Slopes = NO_SLOPES,
     ) -> None:
-        self._here, self.mode, self.impact, self._moving = here, mode, impact, moving
+        self._here, self.mode, self.impact, self._moving, self._counts = here, mode, impact, moving, counts
         self.states, self.edge = symbols(mode.states), edge
         self.guard = edge.surface.residual.xreplace(here)
         self._flow = {**mode.vector_field, **moving}
@@ -71,11 +71,11 @@ class Nearby:
 
     def without(self, counts: Sequence[int]) -> Nearby:
         """The same with a reset that leaves some states as they are."""
-        return Nearby(self.mode, self.edge, self._here, counts, self.impact, self._moving)
+        return Nearby(self.mode, self.edge, self._here, (*self._counts, *counts), self.impact, self._moving)
 
     def by(self, edge: Edge, impact: Point) -> Nearby:
         """The same of an edge with another reset, which is that of impacts as at a point."""
-        return Nearby(self.mode, edge, self._here, (), impact, self._moving)
+        return Nearby(self.mode, edge, self._here, self._counts, impact, self._moving)
 
     def flow(self, x: sp.Symbol) -> Any:
         """The rate of time, of a state or of an input."""

@@ -62,6 +62,13 @@ class Reached:
         beyond = _positive(self.residual - self._reach(rate, time))
         return either(beyond, self.nearly_holds(rate, time) * _positive(rate))
 
+    def holds_next(self, turned: bool, before: Any, after: Any) -> Any:
+        """1 where it holds next along the flow on its surface, where it has just turned true or false; 0 elsewhere.
+
+        A reset turns the flow back also where flights are too short to be resolved, and the flow before leads inwards.
+        """
+        return _not_negative(after) * (1 - _positive(-before) * _positive(after)) if turned else _positive(after)
+
     def turns(self, other: Reached) -> bool | None:
         """Whether it turns true where another one does, or false; None where their surfaces are not the same."""
         same = self.residual == other.residual

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Stop
+from hsdsl.names import without_memory
 from hsdsl.program import EdgeProgram, ModeProgram
 from hsdsl.simulate.stops import show
 
@@ -59,7 +60,7 @@ class Diagnostics:
         for other, (place, until, start) in self._moved.items():
             if until >= end - 2 * left:  # meanwhile motion along other guards goes on
                 self._moved[other] = place, end, start
-        counts = ", ".join(edge.target_states[i] for i in edge.counts)
+        counts = ", ".join(without_memory(edge.target_states[i] for i in edge.counts))
         self.departures.append(
             f"Zeno at t = {show(end)}: the transitions of {edge.name} after number {number}, all within {show(left)} "
             f"of each other, are replaced by their limit{f'; {counts} has none and keeps its value' * bool(counts)}"

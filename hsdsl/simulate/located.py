@@ -25,7 +25,7 @@ from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.simulate.surfaces import NONE, Arrival, Crossing, StepFailure, close_bracket
 from hsdsl.simulate.touching import touched
-from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts
+from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts, unresolved
 
 MOST_CORRECTIONS = 8
 
@@ -268,7 +268,10 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
         return entered
     if run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
         return slides(edge.name, here.mode, entered.mode, entered.t)
-    return close_tail(run, entered, crossing.edge)
+    closed = close_tail(run, entered, crossing.edge)
+    if isinstance(closed, Stop) or entered.mode is not here.mode:
+        return closed
+    return unresolved(run, closed, crossing.edge) or closed
 
 
 def still_on(here: ModeState, event: Event) -> Mapping[int, Number]:

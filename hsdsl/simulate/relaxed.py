@@ -26,6 +26,7 @@ from hsdsl.simulate.stall_detection import Patience
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import Arrival, Crossing, StepFailure, Trial
+from hsdsl.simulate.zeno import unresolved
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
 NOT_FINITE, TOO_WRONG, UNSOLVED = StepFailure("not finite"), StepFailure("error"), StepFailure("unsolved")
@@ -177,8 +178,10 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     flowed = run.has_flowed(t)
     after = run.record(here, crossing, resumed, after, event.alternatives)
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, Arrival(reset_at=t))
-    if isinstance(entered, Stop) or not run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
+    if isinstance(entered, Stop):
         return entered
+    if not run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
+        return (entered.mode is here.mode and unresolved(run, entered, crossing.edge)) or entered
     return slides(edge.name, here.mode, entered.mode, entered.t) if moves_on(here, crossing, entered) else entered
 
 

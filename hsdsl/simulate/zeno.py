@@ -39,23 +39,48 @@ MOST_LEAP = 16  # times a step
 
 
 def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
-    """Return the last flight and the largest ratio of the last few of the last edge, if they shrink; else None.
-
-    Other edges that lead back to the same mode may fire meanwhile; :data:`FREE` transitions are looked at.
-    """
-    times: list[Number] = []
-    for one in reversed(made[-FREE:]):
-        if one.source != made[-1].source or one.source != one.target or one.entry:
-            break
-        if one.edge == made[-1].edge:
-            times.append(one.time)
-        if len(times) > LEAST_FLIGHTS:
-            break
-    flights = [a - b for a, b in pairwise(times)][::-1]
-    if len(flights) < LEAST_FLIGHTS or not min(flights) > 0:
+    """Return the last flight and the largest ratio of the last few of the last edge, if they shrink; else None."""
+    flights = last_flights(made)
+    if not flights or not min(flights) > 0:
         return None
     ratio = max(b / a for a, b in pairwise(flights))
     return (flights[-1], ratio) if ratio < 1 else None
+
+
+def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Number]:
+    """The last few flights between transitions of the last edge, in order; none where they are not as many.
+
+    Other edges that lead back to the same mode may fire meanwhile; :data:`FREE` transitions are looked at. Where they
+    are ``of_flow`` time in strips does not count.
+    """
+    times: list[Number] = []
+    waited = made[-1].time * 0
+    for one in reversed(made[-FREE:]):
+        if one.source != made[-1].source or one.source != one.target or one.entry:
+            break
+        if of_flow and times and one.resumed is not None:
+            waited = waited + (one.resumed - one.time)
+        if one.edge == made[-1].edge:
+            times.append(one.time + waited)
+        if len(times) > LEAST_FLIGHTS:
+            break
+    return [a - b for a, b in pairwise(times)][::-1] if len(times) > LEAST_FLIGHTS else []
+
+
+def unresolved(run: Run, here: ModeState, k: int) -> Stop | None:
+    """Stop at the end of a tail of edge k that runs to no limit, where what is left of it is shorter than time can tell.
+
+    The relaxed scheme goes on with all but events, which might not be armed again there.
+    """
+    edge, t = here.mode.edges[k], here.t
+    if run.settings.scheme == "located":
+        follows = edge.contact is not None and run.settings.completion != "none"
+        found = None if follows else contraction(run.recorder.transitions)
+        ends = found is not None and found[0] * found[1] <= run.tie(t) * (1 - found[1])
+    else:
+        flights = last_flights(run.recorder.transitions, of_flow=True) if edge.of_event else []
+        ends = bool(flights) and max(flights) <= run.tie(t)
+    return run.diagnostics.accumulates(edge.name, t, t) if ends else None
 
 
 def flown(made: Sequence[Transition], t: Number) -> Number:

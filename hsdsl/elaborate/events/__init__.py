@@ -17,6 +17,7 @@ from hsdsl.elaborate.events.event import Event, chosen
 from hsdsl.elaborate.events.firing import edges_of, highest_priority
 from hsdsl.elaborate.events.remembering import Memory, all_states, entered, new_values, remembered
 from hsdsl.expression.scope import symbol
+from hsdsl.expression.trigger import comparisons
 from hsdsl.names import SINCE
 from hsdsl.parts import Part
 from hsdsl.system import ONE, TIME, ZERO, Edge, HybridSystem, Initial, Mode, started
@@ -39,13 +40,30 @@ def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
     constants = frozenset(system.parameter_symbols)
     flow = {TIME: ONE} | ({symbol(SINCE): ONE} if timed else {})
     flow |= mode.vector_field
-    drafts = [Event(edge, mode, timed, flow, constants) for edge in mode.edges if edge.event is not None]
+    edges = [_at_once(edge, mode, timed) for edge in mode.edges if edge.event is not None]
+    drafts = [Event(edge, mode, timed, flow, constants) for edge in edges]
     index, jumps = Memory(drafts), set[str]()
     changes = [new_values(edge, timed) for edge in mode.edges if edge.target == mode.name and drafts]
     stored = [event.stored for event in drafts]  # which may be that of a state itself
     for meaning in [*changes, *({symbol(x): symbol(name) for x, name in values.items()} for values in stored)]:
         jumps |= {event.edge.name for event in index.concerned(meaning) if event.touched(meaning)}
     return tuple(replace(e, jumps=not e.event.initially or e.edge.name in jumps) for e in drafts)
+
+
+def _at_once(edge: Edge, mode: Mode, timed: bool) -> Edge:
+    """An edge of an event, without a delay of 0 where no other edge of its mode changes what it reads.
+
+    Then its values and its condition are the same where it is triggered and where it is made.
+    """
+    event = edge.event
+    if event is None or event.delay != 0 or edge.target != mode.name:
+        return edge
+    read = frozenset().union(*(edge.values[x].free_symbols for x in event.given if x in edge.values))
+    read |= frozenset().union(*(c.residual.free_symbols for c in comparisons(event.trigger)))
+    others = (other for other in mode.edges if other is not edge and other.target == mode.name)
+    if any(read & new_values(other, timed).keys() for other in others):
+        return edge
+    return replace(edge, event=replace(event, delay=None, at_execution=False))
 
 
 def _part(part: Part, events: Sequence[Event]) -> Part:
@@ -62,7 +80,7 @@ def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[
     highest = highest_priority(own)
     by_name = {e.edge.name: e for e in own}
     for edge in mode.edges:
-        drafts = [(edge, None, None)] if edge.event is None else edges_of(by_name[edge.name], highest)
+        drafts = [(edge, None, None)] if edge.event is None else edges_of(by_name[edge.name], highest, own)
         made = [remembered(draft, memories, order) for draft in drafts]
         given = () if edge.event is None else (edge.name, edge.event.text, *edge.event.options)
         edges += made if not given else [replace(part, of_event=given) for part in made]

@@ -93,6 +93,12 @@ class Event:
         here = self.here({}, {})
         return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
 
+    def goes_before(self, other: Event) -> bool:
+        """Whether it goes before another one, of those that are made at one instant, by M6."""
+        names = [edge.name for edge in self.mode.edges]
+        ranks = [(-each.edge.priority, names.index(each.edge.name)) for each in (self, other)]
+        return ranks[0] < ranks[1]
+
     @property
     def event(self) -> Any:
         assert self.edge.event is not None
@@ -132,16 +138,25 @@ class Event:
     def after(self, meaning: Mapping[Any, Any], reached: Reached | None = None) -> Any:
         """1 where the condition holds at new values of states.
 
-        Of the comparisons that stay the one that was ``reached`` holds, and those that counted as reached with it.
+        Of the comparisons that stay the one that was ``reached`` holds while the flow does not lead back, and so do
+        those that counted as reached with it.
         """
 
         def of(part: Reached) -> Any:
             if reached is None or part.residual.xreplace(meaning) != part.residual:
                 return part.holds(meaning)
             turns = part.turns(reached)
-            return part.nearly_holds(self.rate(part.residual), TIME) if turns is None else number(turns, of)
+            rate = self.rate(part.residual)
+            return (
+                part.nearly_holds(rate, TIME) if turns is None else part.holds_next(turns, rate, rate.xreplace(meaning))
+            )
 
         return number(self.event.trigger, of)
+
+    def leaves(self, meaning: Mapping[Any, Any]) -> bool:
+        """Whether new values of states change how its comparisons change along the flow."""
+        rates = (self.rate(c.residual) for c in comparisons(self.event.trigger))
+        return any(rate.xreplace(meaning) != rate for rate in rates)
 
     def rises(self) -> Any:
         """1 where the flow turns the condition true at this instant, else 0."""

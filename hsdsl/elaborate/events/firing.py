@@ -26,8 +26,8 @@ def highest_priority(events: Sequence[Event]) -> Any | None:
     return reduce(maximum, (below(event.ready, HALF, least, event.priority) for event in events))
 
 
-def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
-    """The edges of an event: which of them fires it, and the comparison that was reached."""
+def edges_of(event: Event, highest: Any | None, events: Sequence[Event]) -> Iterator[Draft]:
+    """The edges of one of a mode's events: which of them fires it, and the comparison that was reached."""
     edge, trigger, armed = replace(event.edge, event=None), event.event.trigger, event.symbol("armed")
     fires = edge if event.delay is None else staying(event, f"{edge.name} triggers", begins_to_wait(event))
     if event.delay is not None:  # what only remembers goes before anything that changes states
@@ -43,6 +43,10 @@ def edges_of(event: Event, highest: Any | None) -> Iterator[Draft]:
         now = event.symbol("due")
         if highest is not None and event.delay is None:
             now *= below(event.priority - highest, ZERO, ZERO, ONE)
+        for other in events if event.delay is None else ():
+            if other.delay is not None and other.goes_before(event):
+                alike = ONE if highest is None else below(other.priority - event.priority, ZERO, ZERO, ONE)
+                now *= 1 - other.ready * alike
         yield _when_due(fires, event, now), event, None
     if event.delay is not None:
         made = executes(event)

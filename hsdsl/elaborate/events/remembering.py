@@ -95,8 +95,11 @@ def entered(event: Event, meaning: Mapping[Any, Any]) -> Values:
 
 
 def _after_firing(event: Event, meaning: Mapping[Any, Any], reached: Reached | None) -> Values:
-    """The memory after the event fired: at a surface it holds, unless it is changed; where it was due it need not."""
-    known = reached is not None and not event.touched(meaning)
+    """The memory after the event fired: at a surface it holds, unless it is changed or the flow is turned back there.
+
+    Then its condition is false however short the flow goes back for. Where it was due it need not hold.
+    """
+    known = reached is not None and not event.touched(meaning) and not event.leaves(meaning)
     armed = ZERO if known else ONE - event.after(meaning, reached)
     return {event.names["armed"]: armed} | ({event.names["due"]: ZERO} if event.jumps else {})
 

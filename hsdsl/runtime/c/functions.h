@@ -252,6 +252,7 @@ static hs_time flown(const hs_run *run, hs_time t);
 static int of_contacts(hs_run *run);
 static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached);
 static int close_tail(hs_run *run, int k);
+static int unresolved(hs_run *run, int k);
 
 /* moving.c */
 #if defined(HS_MOVES)

@@ -91,6 +91,7 @@ typedef struct {
   int counts;     /* states that it counts with, which motion along its guard leaves as they are */
   const int *count;
   int branched;   /* whether its reset in the mode with motion along guards is a branch of this one, for slow impacts */
+  int of_event;   /* whether it is part of an event */
   int releases;   /* of a mode with motion along guards: the contact that it ends, or -1 */
 } hs_edge;
 

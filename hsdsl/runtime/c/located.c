@@ -403,7 +403,9 @@ static int jump(hs_run *run) {
   copy(run->scale, run->both, edge->target_dimension);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0, t);
   if (entered != GOES_ON) return entered;
-  return returns(run, flowed) ? slides(run, mode, k) : close_tail(run, k);
+  if (returns(run, flowed)) return slides(run, mode, k);
+  const int closed = close_tail(run, k);
+  return closed == GOES_ON && run->here.mode == mode ? unresolved(run, k) : closed;
 }
 
 /* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */

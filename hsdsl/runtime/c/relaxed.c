@@ -213,7 +213,8 @@ static int through_strip(hs_run *run) {
   const hs_mode_state before = run->here;
   const int unknown = before.table->flow(before.p, t, crossing->state, run->source);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0, t);
-  if (entered != GOES_ON || !returns(run, flowed)) return entered;
+  if (entered != GOES_ON) return entered;
+  if (!returns(run, flowed)) return run->here.mode == before.mode ? unresolved(run, k) : GOES_ON;
   return moves_on(run, &before, unknown) ? slides(run, before.mode, k) : GOES_ON;
 }
 

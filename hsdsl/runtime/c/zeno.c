@@ -11,24 +11,34 @@
 /* Transition `back` before the last one. */
 static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
 
-/* Whether the flights of the last edge shrink: the last one, and the largest ratio of the last few. */
-static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) {
+/* The last few flights between transitions of the last edge, the last one first; 0 where they are not as many. Where
+   they are `of_flow`, time in strips does not count. */
+static int last_flights(const hs_run *run, int of_flow, hs_real *flight) {
   const hs_made *const last = made_before(run, 0);
-  hs_time later = last->time;
-  hs_real after = 0.0;
+  hs_time later = last->time, waited = 0.0;
   int flights = 0;
+  if (last->mode != last->target || last->entry) return 0;
   for (int i = 1; i < FREE && i < run->jump && flights < LEAST_FLIGHTS; i++) {
     const hs_made *const made = made_before(run, i);
     if (made->mode != last->mode || made->mode != made->target || made->entry) break;
+    if (of_flow && made->resumed == made->resumed) waited = waited + (made->resumed - made->time);
     if (made->edge != last->edge) continue;
-    const hs_real one = later - made->time;
-    if (!(one > 0)) return 0;
-    if (!flights) *flight = one, *ratio = 0.0;
-    if (flights) *ratio = hs_max(*ratio, after / one);
-    after = one, later = made->time;
-    flights++;
+    flight[flights++] = later - (made->time + waited);
+    later = made->time + waited;
   }
-  return flights == LEAST_FLIGHTS && last->mode == last->target && !last->entry && *ratio < 1;
+  return flights == LEAST_FLIGHTS;
+}
+
+/* Whether the flights of the last edge shrink: the last one, and the largest ratio of the last few. */
+static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) {
+  hs_real flights[LEAST_FLIGHTS];
+  if (!last_flights(run, 0, flights)) return 0;
+  *flight = flights[0], *ratio = 0.0;
+  for (int i = 0; i < LEAST_FLIGHTS; i++) {
+    if (!(flights[i] > 0)) return 0;
+    if (i) *ratio = hs_max(*ratio, flights[i - 1] / flights[i]);
+  }
+  return *ratio < 1;
 }
 
 static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
@@ -309,4 +319,23 @@ static int close_tail(hs_run *run, int k) {
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j] && !run->active_surfaces[j]) run->active_surfaces[j] = 1, here->standing++;
   return GOES_ON;
+}
+
+/* Stop at the end of a tail of edge k that runs to no limit, where what is left of it is shorter than time can tell.
+   The relaxed scheme goes on with all but events, which might not be armed again there. */
+static int unresolved(hs_run *run, int k) {
+  const hs_edge *const edge = &run->here.table->edge[k];
+  const hs_time t = run->here.t;
+  hs_real flights[LEAST_FLIGHTS], flight, ratio;
+  int ends = 0;
+  if (run->task->settings.scheme == HS_LOCATED) {
+    const int follows = edge->contact >= 0 && run->task->settings.contacts;
+    ends = !follows && contraction(run, &flight, &ratio) && flight * ratio <= tie(t) * (1 - ratio);
+  } else if (edge->of_event && last_flights(run, 1, flights)) {
+    ends = 1;
+    for (int i = 0; i < LEAST_FLIGHTS; i++) ends &= flights[i] <= tie(t);
+  }
+  if (!ends) return GOES_ON;
+  note(run, HS_ACCUMULATES, k, 0, t, t);
+  return stopped(run, HS_ACCUMULATED, t);
 }
