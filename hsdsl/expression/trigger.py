@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -12,7 +12,7 @@ import sympy as sp
 from hsdsl.expression import symbolic
 from hsdsl.expression.scope import Scope
 from hsdsl.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
-from hsdsl.functions import absolute, below, maximum, minimum
+from hsdsl.functions import absolute, below
 from hsdsl.names import shown
 
 _OPPOSITE = {">": "<=", ">=": "<", "<": ">=", "<=": ">"}
@@ -60,7 +60,7 @@ class Reached:
     def rises(self, rate: Any, time: Any) -> Any:
         """1 where it holds beyond round-off, or is on its surface and rises; 0 elsewhere."""
         beyond = _positive(self.residual - self._reach(rate, time))
-        return maximum(beyond, minimum(self.nearly_holds(rate, time), _positive(rate)))
+        return _any_of([beyond, self.nearly_holds(rate, time) * _positive(rate)])
 
     def turns(self, other: Reached) -> bool | None:
         """Whether it turns true where another one does, or false; None where their surfaces are not the same."""
@@ -76,6 +76,11 @@ def _positive(value: Any) -> Any:
 def _not_negative(value: Any) -> Any:
     """1 where a number is not negative, 0 elsewhere."""
     return below(value, sp.S.Zero, sp.S.Zero, sp.S.One)
+
+
+def _any_of(truths: Sequence[Any]) -> Any:
+    """1 where one of several truths is, 0 elsewhere; their maximum would have switches, as of time, where they jump."""
+    return sp.S.One - sp.Mul(*(sp.S.One - truth for truth in truths))
 
 
 def without_roundoff(expression: Any) -> Any:
@@ -167,8 +172,5 @@ def number(trigger: Trigger, of: Callable[[Reached], Any]) -> Any:
     """1 where a trigger holds and 0 elsewhere, from that of each comparison."""
     if isinstance(trigger, Joined):
         values = [number(part, of) for part in trigger.parts]
-        value = values[0]
-        for other in values[1:]:
-            value = minimum(value, other) if trigger.word == "and" else maximum(value, other)
-        return value
+        return sp.Mul(*values) if trigger.word == "and" else _any_of(values)
     return of(trigger) if isinstance(trigger, Reached) else sp.Integer(int(trigger))
