@@ -59,7 +59,7 @@ impl<S> Run<'_, S> {
             return None;
         }
         for (k, edge) in self.here().edges.iter().enumerate() {
-            inside[k] = !edge.conditional && values[k] < -self.roundoff(k, t, &self.x, false)?;
+            inside[k] = !edge.conditional && values[k] < -self.roundoff(k, t, &self.x, true)?;
         }
         Some(inside)
     }

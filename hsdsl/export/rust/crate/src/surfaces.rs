@@ -121,12 +121,31 @@ impl<S> Run<'_, S> {
 
     fn stands(&self, k: usize, t: f64, x: &State, since: f64) -> Option<bool> {
         let (r, rate) = (self.surface(k, t, x)?, self.rate(k, t, x)?);
-        let near = size(r) <= max(self.roundoff(k, t, x, false)?, rate * since);
-        if near && self.points_out(k, t, x, rate)? {
+        let noise = self.roundoff(k, t, x, false)?;
+        let near = size(r) <= max(noise, rate * since);
+        if near && self.points_out(k, t, x, rate)? && !self.turns_back(k, t, x, rate, since, noise - r)? {
             self.condition(k, t, x)
         } else {
             Some(false)
         }
+    }
+
+    /// Whether surface k, bending as it does in a time, falls again before it has risen by `room`.
+    fn turns_back(&self, k: usize, t: f64, x: &State, rate: f64, since: f64, room: f64) -> Option<bool> {
+        let (mut slope, mut ahead) = ([0.0; W], *x);
+        if !(since > 0.0) {
+            return Some(false);
+        }
+        if self.flow(t, x, &mut slope) {
+            return None;
+        }
+        for s in 0..self.dimension {
+            ahead[s] = x[s] + since * slope[s];
+        }
+        Some(self.rate(k, t + since, &ahead).map_or(false, |later| {
+            let bend = (rate - later) / since;
+            bend > 0.0 && rate * rate <= 2.0 * bend * room
+        }))
     }
 
     /// Whether the flow points out of surface k, beyond the round-off of its rate.
