@@ -15,6 +15,7 @@ INVISIBLE = re.compile(
 )
 _HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrogate is a byte that is no text
 _MEMORY = "@"  # in no name of a file
+_STORED = re.compile(rf".*{_MEMORY}to\.(.+?)(?:\[\d+\])?")
 _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
 INITIAL = "initial."  # before the name of a state: its initial value
@@ -100,6 +101,12 @@ def _spelled(name: str) -> str:
 def memory(owner: str, part: str) -> str:
     """The name of a state that remembers what an event did: readers see it only where they name it."""
     return f"{owner}{_MEMORY}{part}"
+
+
+def remembered_state(name: str) -> str:
+    """The state whose later value a state of an event's memory is, as x of ``NAME@to.x[2]``; none is ``""``."""
+    found = _STORED.fullmatch(name)
+    return found[1] if found else ""
 
 
 def without_memory(names: Iterable[str]) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 
 import numpy as np
@@ -14,6 +14,7 @@ from hsdsl.integrators.stepper import State
 from hsdsl.program import ModeProgram
 from hsdsl.simulate.surfaces import Surfaces
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
+from hsdsl.simulate.verdict.exact_states import exactly_known
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.simulate.verdict.screen import Screen, screened
@@ -49,10 +50,11 @@ class RunView(RecordedRun):
     def errors(self) -> Errors | None:
         """How wrong the run is, by a shadow or a finer run; None where steps are fixed and no finer one is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
-        known = float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(self.execution.times[-1]))
+        tie = float(self.tie(self.execution.times[-1]))
+        known = float(tolerance or 0), float(self.arithmetic.unit), tie, partial(exactly_known, self)
         if self.by_shadow:
             shadow = self.screen.shadow_errors if self.screen else shadow_errors(self.problem, self.execution)
-            return ErrorsByShadow(self.execution, self.execution, *known, shadow)
+            return ErrorsByShadow(self.execution, self.execution, *known, shadow=shadow)
         if finer is None and tolerance is not None:
             finer = self.execution.finer
         if finer is None or finer.stop.reason == "interrupted":

@@ -1,0 +1,36 @@
+"""States near those of a run, moved along the guard that was crossed, and where transitions take them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hsdsl.execution import Transition
+from hsdsl.integrators.stepper import State
+from hsdsl.names import remembered_state, without_memory
+from hsdsl.simulate.verdict.place import Place
+from hsdsl.simulate.verdict.recorded_run import RecordedRun
+
+LONGEST = 16  # transitions at one instant
+
+
+def landed(run: RecordedRun, chain: Sequence[Transition], x: State) -> Place:
+    """Where a state lands that makes some transitions."""
+    for made in chain:
+        before = run.place(made.source, made.time, x)
+        x = before.kernel.resets[run.before(made)[1]](made.time, *x)
+    return run.place(chain[-1].target, chain[-1].time, x)
+
+
+def landed_nearby(run: RecordedRun, chain: Sequence[Transition], error: State) -> list[Place]:
+    """Where states land that an error moves along the guard of the first of some transitions; none of too many."""
+    before, edge = run.before(chain[0])
+    near = before.moved_by(error) if chain[0].entry else before.along_guard(edge, error)
+    return [landed(run, chain, x) for x in near] if len(chain) <= LONGEST else []
+
+
+def remembered_alike(run: RecordedRun, chain: Sequence[Transition], names: Sequence[str], error: State) -> bool:
+    """Whether some states are memory of events that is the same behind transitions from all states nearby."""
+    if without_memory(names) or any(map(remembered_state, names)):
+        return False
+    near = (dict(zip(at.mode.states, at.x, strict=True)) for at in landed_nearby(run, chain, error))
+    return len({tuple(x[name] for name in names) for x in near}) == 1
