@@ -1,8 +1,9 @@
 """Interval arithmetic for generated routines, many boxes at once: what a formula can be anywhere in a box.
 
-Every result contains every value that the formula takes there, rounding included. Where it has no value somewhere in a
-box the result of `ENCLOSED` is everything, so that nothing is concluded from it. `RESTRICTED` encloses the values that
-there are. A sum or a product of numbers that are nowhere negative is nowhere negative.
+Every result contains every value that the formula takes there, rounding included: of single numbers it is one number
+where nothing is rounded. Where it has no value somewhere in a box the result of `ENCLOSED` is everything, so that
+nothing is concluded from it. `RESTRICTED` encloses the values that there are. A sum or a product of numbers that are
+nowhere negative is nowhere negative.
 """
 
 from __future__ import annotations
@@ -11,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial, reduce
+from math import isfinite
+from operator import add, mul
 from typing import Any
 
 import numpy as np
@@ -40,6 +43,8 @@ class Range:
 
     def __add__(self, other: Any) -> Range:
         other = as_range(other)
+        if (value := _exactly(add, self, other)) is not None:
+            return value
         low, high = self.low + other.low, self.high + other.high
         wide = _outwards(low, high)
         return Range(np.where(low == 0, 0.0, wide.low), np.where(high == 0, 0.0, wide.high))  # a sum of 0 is exact
@@ -49,6 +54,8 @@ class Range:
 
     def __mul__(self, other: Any) -> Range:
         other = as_range(other)
+        if (value := _exactly(mul, self, other)) is not None:
+            return value
         if other is self:
             return _square(self)
         products = [x * y for x in (self.low, self.high) for y in (other.low, other.high)]
@@ -60,10 +67,14 @@ class Range:
         if np.any(low == 0):
             alike = ((self.low >= 0) & (other.low >= 0)) | ((self.high <= 0) & (other.high <= 0))
             least = np.where(alike, np.maximum(least, 0.0), least)
+            nothing = ((self.low == 0) & (self.high == 0)) | ((other.low == 0) & (other.high == 0))
+            least, most = np.where(nothing, 0.0, least), np.where(nothing, 0.0, most)
         return Range(least, most)
 
     def __truediv__(self, other: Any) -> Range:
         other = as_range(other)
+        if (value := _exactly(_quotient, self, other)) is not None:
+            return value
         through_zero = (other.low <= 0) & (other.high >= 0)
         low, high = np.where(through_zero, 1.0, other.low), np.where(through_zero, 1.0, other.high)
         return _unless(through_zero, self * _outwards(1 / high, 1 / low))
@@ -81,6 +92,22 @@ class Range:
 
     def __gt__(self, other: Any) -> bool:
         return as_range(other) < self
+
+
+def _exactly(operation: Callable[[Any, Any], Any], one: Range, other: Range) -> Range | None:
+    """The result of an operation on two numbers that is not rounded; None where it is, or of more than two numbers."""
+    if any(np.ndim(end) for end in (one.low, one.high, other.low, other.high)):
+        return None
+    a, b = float(one.low), float(other.low)
+    if not (a == one.high and b == other.high and isfinite(a) and isfinite(b)) or (operation is _quotient and b == 0):
+        return None
+    value = operation(a, b)
+    exact = isfinite(value) and operation(Fraction(a), Fraction(b)) == Fraction(value)
+    return Range(value, value) if exact else None
+
+
+def _quotient(a: Any, b: Any) -> Any:
+    return a / b
 
 
 def _decided(surely: Any, never: Any) -> bool:

@@ -15,6 +15,7 @@ INVISIBLE = re.compile(
 )
 _HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrogate is a byte that is no text
 _MEMORY = "@"  # in no name of a file
+_STORED = re.compile(rf".*{_MEMORY}to\.(.+?)(?:\[\d+\])?")
 _GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
 SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
 INITIAL = "initial."  # before the name of a state: its initial value
@@ -105,6 +106,12 @@ def memory(owner: str, part: str) -> str:
 def nth_memory(state: str, number: int) -> str:
     """What the state of an execution that waits is called of the one with a number, from 1, in their order."""
     return state if number == 1 else f"{state}[{number}]"
+
+
+def remembered_state(name: str) -> str:
+    """The state whose later value a state of an event's memory is, as x of ``NAME@to.x[2]``; none is ``""``."""
+    found = _STORED.fullmatch(name)
+    return found[1] if found else ""
 
 
 def without_memory(names: Iterable[str]) -> tuple[str, ...]:

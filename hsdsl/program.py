@@ -26,6 +26,7 @@ CURVED = re.compile(r"\w\(|/")
 JUMPS = re.compile(r"\b(?:sign|floor|atan2|select)\(")
 STEEP = ("sqrt", "asin", "acos", "acosh")
 WHOLE = re.compile(r"q_m?\d+_1|\d+")
+NO_FLOW = "q_0_1"
 MOVING = re.compile(r"t|[xv]\d+")
 Hold = Literal["zero", "linear"]
 
@@ -284,6 +285,15 @@ class ModeProgram:
     def jumps(self) -> bool:
         """Whether the flow has `sign`, `floor` or `atan2`, which jump; those of time alone are boundaries of steps."""
         return JUMPS.search(self._flow_source) is not None
+
+    @cached_property
+    def still(self) -> tuple[bool, ...]:
+        """Whether each state has no flow in this mode, whatever its values are."""
+        (returned,) = (
+            node for node in ast.walk(ast.parse(f"def flow({self._flow_source}")) if isinstance(node, ast.Return)
+        )
+        assert isinstance(returned.value, ast.Tuple)
+        return tuple(ast.unparse(value) == NO_FLOW for value in returned.value.elts)
 
     @cached_property
     def steep(self) -> bool:

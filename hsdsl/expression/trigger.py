@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,6 +11,7 @@ import sympy as sp
 
 from hsdsl.expression import symbolic
 from hsdsl.expression.scope import Scope
+from hsdsl.expression.selection import either
 from hsdsl.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
 from hsdsl.functions import absolute, below
 from hsdsl.names import shown
@@ -60,7 +61,7 @@ class Reached:
     def rises(self, rate: Any, time: Any) -> Any:
         """1 where it holds beyond round-off, or is on its surface and rises; 0 elsewhere."""
         beyond = _positive(self.residual - self._reach(rate, time))
-        return either(beyond, self.nearly_holds(rate, time) * _positive(rate))
+        return either([beyond, self.nearly_holds(rate, time) * _positive(rate)])
 
     def holds_next(self, turned: bool, before: Any, after: Any) -> Any:
         """1 where it holds next along the flow on its surface, where it has just turned true or false; 0 elsewhere.
@@ -83,11 +84,6 @@ def _positive(value: Any) -> Any:
 def _not_negative(value: Any) -> Any:
     """1 where a number is not negative, 0 elsewhere."""
     return below(value, sp.S.Zero, sp.S.Zero, sp.S.One)
-
-
-def either(one: Any, other: Any) -> Any:
-    """The truth that one of two truths, 0 or 1, is 1: a polynomial, which has no switches of time as `max` has."""
-    return one + other - one * other
 
 
 def without_roundoff(expression: Any) -> Any:
@@ -179,8 +175,5 @@ def number(trigger: Trigger, of: Callable[[Reached], Any]) -> Any:
     """1 where a trigger holds and 0 elsewhere, from that of each comparison."""
     if isinstance(trigger, Joined):
         values = [number(part, of) for part in trigger.parts]
-        value = values[0]
-        for other in values[1:]:
-            value = value * other if trigger.word == "and" else either(value, other)
-        return value
+        return sp.Mul(*values) if trigger.word == "and" else either(values)
     return of(trigger) if isinstance(trigger, Reached) else sp.Integer(int(trigger))

@@ -189,9 +189,9 @@ class Surfaces:
         return beyond
 
     def inside(self, t: Number, x: State) -> frozenset[int]:
-        """Edges without an `if` whose surfaces the state has not reached."""
+        """Edges without an `if` whose surfaces the state has not reached, to the round-off that counts on entry."""
         values, plain = self.kernel.surfaces(t, *x), [k for k, edge in enumerate(self.edges) if not edge.conditional]
-        return frozenset(k for k in plain if values[k] < -self.roundoff_bound(k, t, x))
+        return frozenset(k for k in plain if values[k] < -self.roundoff_bound(k, t, x, entry=True))
 
     def off(self, t: Number, x: State, surfaces: Collection[int]) -> dict[int, Number]:
         """How far off some surfaces a state is."""
@@ -221,7 +221,7 @@ class Surfaces:
         return self.arithmetic.sqrt(total)
 
     def standing(self, t: Number, x: State, since: Number) -> list[int]:
-        """Edges on whose guards the state is, with the flow pointing out and `if` true.
+        """Edges on whose guards the state is, with the flow pointing out and `if` true, which are not only touched.
 
         On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that.
         """
@@ -231,12 +231,27 @@ class Surfaces:
                 continue
             try:
                 r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
-                near = abs(r) <= max(self.roundoff_bound(k, t, x), rate * since)
-                if near and self._points_out(k, t, x, rate) and self.kernel.conditions[k](t, *x)[0]:
+                noise = self.roundoff_bound(k, t, x)
+                near = abs(r) <= max(noise, rate * since)
+                if not (near and self._points_out(k, t, x, rate)) or self._turns_back(k, t, x, since, noise - r):
+                    continue
+                if self.kernel.conditions[k](t, *x)[0]:
                     found.append(k)
             except DOMAIN_ERRORS:
                 continue
         return found
+
+    def _turns_back(self, k: int, t: Number, x: State, since: Number, room: Number) -> bool:
+        """Whether surface k, bending as it does in the time ``since``, falls again before it has risen by ``room``."""
+        if not since > 0:
+            return False
+        rate, flow = self.kernel.rates[k](t, *x)[0], self.kernel.flow(t, *x)
+        try:
+            later = self.kernel.rates[k](t + since, *(a + since * f for a, f in zip(x, flow, strict=True)))[0]
+        except DOMAIN_ERRORS:
+            return False
+        bend = (rate - later) / since
+        return bend > 0 and rate * rate <= 2 * bend * room
 
     def _points_out(self, k: int, t: Number, x: State, rate: Number) -> bool:
         """Whether the flow points out of surface k, beyond the round-off of its rate."""

@@ -10,7 +10,8 @@ from typing import Any
 
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.selection import is_mode, select, total, whole
-from hsdsl.expression.trigger import Reached, comparisons, either, number, reached
+from hsdsl.expression.selection import either
+from hsdsl.expression.trigger import Reached, comparisons, number, reached
 from hsdsl.functions import below, replaced
 from hsdsl.names import memory
 from hsdsl.system import HALF, ONE, TIME, ZERO, Edge, Mode, Queue, Surface
@@ -89,7 +90,7 @@ class Event:
             ready = below(self.symbol("waiting"), HALF, ZERO, ONE) * reached(TIME, self.at)
         else:
             ready = self.symbol("armed") * self.rises()
-            ready = either(ready, self.symbol("due")) if self.jumps else ready
+            ready = either([ready, self.symbol("due")]) if self.jumps else ready
         here = self.here({}, {})
         return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
 

@@ -117,7 +117,7 @@ static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_
   return 0;
 }
 
-/* Mark the edges without an `if` whose surfaces the state has not reached. */
+/* Mark the edges without an `if` whose surfaces the state has not reached, to the round-off that counts on entry. */
 static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside) {
   const hs_mode *mode = run->here.table;
   if (mode->values(run->here.p, t, x, run->values)) return RAISED;
@@ -126,7 +126,7 @@ static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside) {
     inside[k] = 0;
     if (k >= mode->edges || mode->edge[k].conditional) continue;
     if (raised) return RAISED;
-    inside[k] = run->values[k] < -bound_from(run, run->magnitudes, k, t, x, 0);
+    inside[k] = run->values[k] < -bound_from(run, run->magnitudes, k, t, x, 1);
   }
   return 0;
 }
@@ -184,7 +184,18 @@ static int points_out(hs_run *run, int k, hs_time t, const hs_real *x, hs_real r
   return rate > ROUNDOFF_UNITS * HS_UNIT * size;
 }
 
-/* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true.
+/* Whether surface k, bending as it does in the time `since`, falls again before it has risen by `room`; its rate and
+   the flow, in run->near, are known. */
+static int turns_back(hs_run *run, int k, hs_time t, const hs_real *x, hs_real rate, hs_real since, hs_real room) {
+  hs_real later, bend;
+  if (!(since > 0)) return 0;
+  for (int s = 0; s < run->here.dimension; s++) run->nearby[s] = x[s] + since * run->near[s];
+  if (run->here.table->rates[k](run->here.p, t + since, run->nearby, &later)) return 0;
+  bend = (rate - later) / since;
+  return bend > 0 && rate * rate <= 2 * bend * room;
+}
+
+/* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true, which are not only touched.
    On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. */
 static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found) {
   const hs_mode *const mode = run->here.table;
@@ -197,7 +208,9 @@ static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int
     if (raised || releases(run, k) || mode->rates[k](run->here.p, t, x, &rate)) continue;
     const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
     const int near = fabs(run->values[k]) <= hs_max(noise, rate * since);
-    if (near && points_out(run, k, t, x, rate) && condition(run, k, t, x) == 1) found[k] = 1, count++;
+    if (!near || !points_out(run, k, t, x, rate)) continue;
+    if (turns_back(run, k, t, x, rate, since, noise - run->values[k])) continue;
+    if (condition(run, k, t, x) == 1) found[k] = 1, count++;
   }
   return count;
 }

@@ -19,6 +19,10 @@ allows itself.
 `finding`           one reason; `near_surface` holds margins against errors
 `reliability`       from when on a run cannot be relied on
 `crossings`         is each transition transversal, and its condition the same all around it?
+`entries`           do transitions that fire at once on entry do so all around it?
+`input_jumps`       jumps of inputs that transitions near them do not notice
+`exact_states`      states without an error
+`nearby`            where transitions take states that are moved along the guard
 `landings`          does a reset land within the error of a surface, or jump?
 `misses`            surfaces that are almost reached or passed over; `endings`: what happens at the end
 `tangent`           arcs that leave a surface tangentially, as where sliding ends
@@ -41,7 +45,6 @@ import numpy as np
 from hsdsl.execution import INCOMPLETE, LEFT, Stop, Verdict
 from hsdsl.program import Program
 from hsdsl.simulate.diagnostics import Diagnostics
-from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import together
 from hsdsl.simulate.verdict.crossings import summary
@@ -142,10 +145,3 @@ def _unchecked(run: RunView, stop: Stop) -> Iterator[str]:
         yield "the finer run was interrupted, so no margin can be held against the error"
     elif run.errors is None:
         yield "a fixed step does not say how wrong it is, so no margin can be held against the error (a tolerance does)"
-    if run.execution.enters_beyond:
-        at_once = [t for t in run.transitions if t.entry]
-        first = at_once[0]
-        yield (
-            f"{len(at_once)} transition{'s' * (len(at_once) > 1)} fired at once on entry, the first {first.edge} at "
-            f"t = {show(first.time)}: the state entered {first.source} outside its domain"
-        )

@@ -7,7 +7,7 @@ it is first seen: it never falls again, so a difference that happens to vanish s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hsdsl.bernstein import Array
 from hsdsl.execution import Execution, Transition
+from hsdsl.names import remembered_state
 from hsdsl.simulate.moving import ERROR_UNITS
 
 SAFE = 10  # margins below so many errors are named
@@ -35,6 +36,8 @@ class Errors:
         Unit round-off of the run's numbers.
     tie : float
         Times closer than this are the same instant.
+    known : callable
+        ``known(self, wrong)`` says which states have no error, where the others are ``wrong`` by so much.
     """
 
     run: Execution
@@ -42,15 +45,21 @@ class Errors:
     tolerance: float
     unit: float
     tie: float
+    known: Callable[[Errors, Array], NDArray[np.bool_]] = lambda _, wrong: wrong < 0
 
     @cached_property
     def parted(self) -> float | None:
         """From when on the two runs make other transitions, or stop otherwise; None where they never do."""
         a, b = self.run, self.finer
-        time = _parted(a.transitions, b.transitions, self._slack)
+        time = self._orders[1]
         if time is None and (a.stop.reason, a.final.mode) != (b.stop.reason, b.final.mode):
             time = min(float(a.stop.time), float(b.stop.time))
         return time
+
+    @cached_property
+    def _orders(self) -> tuple[set[int], float | None]:
+        """Behind how many transitions the runs are not alike, for these have other orders; and when they part."""
+        return _orders(self.run.transitions, self.finer.transitions, self._slack)
 
     @property
     def midway(self) -> bool:
@@ -97,7 +106,8 @@ class Errors:
         found = np.zeros(self._values.shape)
         count = len(self.time_errors) if self.parted is None else int(np.searchsorted(self._made_at, self.parted))
         shift = np.array([0.0, *(self._resumed(self.finer, k) - self._resumed(self.run, k) for k in range(count))])
-        rows = np.flatnonzero(self._jumps <= count)
+        apart = self._orders[0]
+        rows = np.flatnonzero((self._jumps <= count) & ~np.isin(self._jumps, [*apart]))
         self._compare(found, rows, self._values[rows], self._times[rows] + shift[self._jumps[rows]])
         if self.midway:
             middles = self._times[rows[:-1]] + np.diff(self._times[rows]) / 2
@@ -105,7 +115,8 @@ class Errors:
             self._compare(found, rows[1:], values, middles + shift[self._jumps[rows[1:]]])
         for k, (one, other) in enumerate(zip(self.run.transitions[:count], self.finer.transitions, strict=False)):
             before, after = np.searchsorted(self._jumps, [k, k + 1], "right") - 1
-            for row, a, b in ((before, one.before, other.before), (after, one.after or {}, other.after or {})):
+            alike = ((before, one.before, other.before), (after, one.after or {}, other.after or {}))
+            for row, a, b in (pair for j, pair in enumerate(alike, k) if j not in apart):
                 for name in a.keys() & b.keys():
                     place = row, self.columns[name]
                     found[place] = np.fmax(found[place], abs(float(a[name] - b[name])))
@@ -121,7 +132,8 @@ class Errors:
         """How wrong each state is; shape (rows, states), nowhere falling, and never below what one step may do."""
         least = max(self.tolerance, ERROR_UNITS * self.unit) * self.sizes
         least[0] = 0.0
-        return np.maximum(self.measured, least)
+        wrong = np.maximum(self.measured, least)
+        return np.where(self.known(self, wrong), 0.0, wrong)
 
     @cached_property
     def columns(self) -> dict[str, int]:
@@ -131,7 +143,11 @@ class Errors:
     @cached_property
     def unreliable(self) -> dict[str, float]:
         """From when on the error of a state exceeds a tenth of its largest size, for those of which it does."""
-        beyond = self.by_row * SAFE > np.nan_to_num(np.abs(self._values)).max(axis=0, initial=0.0)
+        sizes = np.nan_to_num(np.abs(self._values)).max(axis=0, initial=0.0)
+        for name, k in self.columns.items():
+            if (of := remembered_state(name)) in self.columns:  # what an event remembers has the size of what it is for
+                sizes[k] = max(sizes[k], sizes[self.columns[of]])
+        beyond = self.by_row * SAFE > sizes
         return {
             name: float(self._times[int(np.argmax(beyond[:, k]))])
             for name, k in self.columns.items()
@@ -178,9 +194,9 @@ class Errors:
         return there
 
 
-def _parted(one: Sequence[Transition], other: Sequence[Transition], slack: float) -> float | None:
-    """When two sequences of transitions part; orders of those within ``slack`` of each other that meet again do not."""
-    k, most = 0, min(len(one), len(other))
+def _orders(one: Sequence[Transition], other: Sequence[Transition], slack: float) -> tuple[set[int], float | None]:
+    """Where transitions within ``slack`` of each other have other orders and meet again, and when sequences part."""
+    k, most, apart = 0, min(len(one), len(other)), set[int]()
     while k < most:
         if _what(one[k]) == _what(other[k]):
             k += 1
@@ -188,10 +204,11 @@ def _parted(one: Sequence[Transition], other: Sequence[Transition], slack: float
         first = min(float(one[k].time), float(other[k].time))
         met = next((j for j in range(k + 1, most) if one[j].target == other[j].target), None)
         if met is None or max(float(one[met].time), float(other[met].time)) - first > slack:
-            return first
+            return apart, first
+        apart.update(range(k + 1, met + 1))
         k = met + 1
     rest = one[most:] or other[most:]
-    return float(rest[0].time) if rest else None
+    return apart, float(rest[0].time) if rest else None
 
 
 def _what(made: Transition) -> tuple[str, str, str]:

@@ -16,6 +16,8 @@ from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import CROSSING_UNDECIDED
 
+BEYOND = 4  # errors behind a surface, so that no error takes a state back to it
+
 
 def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
     """Findings about every transition that the flow made, and the margins of the others."""
@@ -105,8 +107,30 @@ def _findings(
     if run.errors is None:
         return found
     row = run.row_before(made)
-    if has_condition(place, k) and place.conditions(
-        k, run.safe_error(place, row), run.safe_time_error(place, k, row)
-    ) != {True}:
+    holds = {True}
+    if has_condition(place, k):
+        holds = place.conditions(k, run.safe_error(place, row), run.safe_time_error(place, k, row))
+    if holds != {True} and not _turns_true(run, place, k, row):
         found.append(Finding("condition", "unknown", f"whether the condition of {where} holds is within the error"))
     return found
+
+
+def _turns_true(run: RunView, place: Place, k: int, row: int) -> bool:
+    """Whether comparisons of one event are reached together, behind all of which its condition holds: it fires once."""
+    edges, error = place.mode.edges, run.safe_error(place, row)
+    event, late, ahead = edges[k].of_event, run.safe_time_error(place, k, row), 0 * place.t
+    if not event:
+        return False
+    for j, edge in enumerate(edges):
+        shift = SAFE * run.surface_error(place, j, row) + place.roundoff_bound(j)
+        if edge.of_event != event or edge.name != edges[k].name or abs(place.value(j)) > shift:
+            continue
+        rate = place.rates_within(j, error, late)
+        if not rate.low > 0:
+            return False
+        ahead = max(ahead, BEYOND * shift / float(rate.low))
+    flow = place.kernel.flow(place.t, *place.x)
+    behind = run.place(
+        place.mode.name, place.t + ahead, tuple(x + ahead * f for x, f in zip(place.x, flow, strict=True))
+    )
+    return behind.conditions(k, error, late) == {True}

@@ -11,6 +11,7 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.commutation import commute
 from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.input_jumps import indifferent, jumps_near
 from hsdsl.simulate.verdict.near_surface import has_condition, may_hold, near_surface
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.run_view import RunView
@@ -43,6 +44,9 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
         if finding is None:
             continue
         if crossed is None:
+            jumps = list(jumps_near(run, run.times[arc.last], 0.0)) if k < len(place.mode.edges) else []
+            if jumps and all(indifferent(run, place, k, sides) for sides in jumps):
+                continue
             what = f"an input or function of time jumps at t = {show(place.t)}"
             yield Finding("order", "unknown", f"{what}, within the error of reaching the surface of {place.name(k)}")
         elif k < len(place.mode.edges) and not commute(

@@ -16,6 +16,8 @@ from hsdsl.integrators.stepper import State
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
+from hsdsl.simulate.verdict.input_jumps import indifferent, jumps_near
+from hsdsl.simulate.verdict.nearby import landed, landed_nearby, remembered_alike
 from hsdsl.simulate.verdict.place import ALONG, Place
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import RESET_UNDECIDED
@@ -48,30 +50,42 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
 
 
 def _on(run: RunView, arc: Arc, place: Place, k: int, made: Transition | None) -> Iterator[Finding]:
-    value, rate, noise = place.value(k), place.rate(k), place.roundoff_bound(k)
+    value, noise = place.value(k), place.roundoff_bound(k)
     where = f"the surface of {place.name(k)} at t = {show(place.t)}"
     conditional = k < len(place.mode.edges) and place.mode.edges[k].conditional
     if arc.first == 0:
-        if conditional and place.conditions(k, _soon(run, place, arc.first), float(run.tie(place.t))) == {False}:
-            return
-        if abs(value) <= noise and (conditional or abs(rate) <= place.rate_roundoff(k)):
+        if abs(value) <= noise and not _decided_on(run, place, k, _soon(run, place, arc.first), run.tie(place.t)):
             how = "which has an `if`" if conditional else "to which the flow is tangent"
             yield Finding("start", "unknown", f"the run starts on {where}, {how}")
         return
     assert run.errors is not None
-    shift = run.surface_error(place, k, arc.first)
+    shift, late = run.surface_error(place, k, arc.first), SAFE * run.errors.time_error_at(place.t)
     if made is None or _tied(run, made) or abs(value) > SAFE * shift + noise:
         return
-    if rate > place.rate_roundoff(k) and not conditional:
+    if place.rate(k) > place.rate_roundoff(k) and not conditional:
         return  # it is crossed at once, on either side of it
-    if _keeps(run, made, k, value):
+    error = run.safe_error(place, arc.first)
+    if conditional and place.conditions(k, error, late) == {False}:
         return
-    late = SAFE * run.errors.time_error_at(place.t)
-    if conditional and place.conditions(k, run.safe_error(place, arc.first), late) == {False}:
+    if conditional and place.rates_within(k, error, late).high <= 0:
+        return  # nothing fires, on either side of it
+    if not shift > 0 and _decided_on(run, place, k, error, late):
+        return
+    if _keeps(run, made, k, value):
         return
     on = abs(value) <= noise or not shift > 0
     away = f"on {where}" if on else f"{times(abs(value) / shift)} the error away from {where}"
     yield Finding("landing", "unknown", f"the reset of {made.edge} lands {away}")
+
+
+def _decided_on(run: RunView, place: Place, k: int, error: State, late: Number) -> bool:
+    """Whether it is sure what a state does that is known to be on surface k: fire, leave inwards, or stay."""
+    conditional = k < len(place.mode.edges) and place.mode.edges[k].conditional
+    holds = place.conditions(k, error, float(late)) if conditional else {True}
+    rate = place.rates_within(k, error, float(late))
+    if holds == {False} or rate.high < 0 or rate.low == rate.high == 0:
+        return True
+    return (rate.low > 0 and holds == {True}) or (conditional and rate.high <= 0)
 
 
 def _soon(run: RunView, place: Place, row: int) -> State:
@@ -83,31 +97,25 @@ def _soon(run: RunView, place: Place, row: int) -> State:
 
 def _tied(run: RunView, made: Transition) -> bool:
     """Whether a transition follows, with no flow between, one that others were tied with: `choices` decides these."""
-    following = made
-    for before in reversed(run.transitions[: made.index]):
-        if before.resumed is None or following.time - before.resumed > run.tie(following.time):
-            return False
-        if before.alternatives:
-            return True
-        following = before
-    return False
+    return any(before.alternatives for before in run.cascade(made)[:-1])
 
 
 def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:
-    """Whether states near the one before a transition, moved along its guard, land where surface k has its value."""
-    before, edge = run.before(made)
-    target = before.mode.edges[edge].target
-    if k == edge and target == run.index(made.source) and _untouched(before, edge):
+    """Whether states near the one before a transition, moved along its guard, land where surface k has its value.
+
+    Of transitions without flow between them the first one's guard counts.
+    """
+    chain = run.cascade(made)
+    before, edge = run.before(chain[0])
+    if len(chain) == 1 and k == edge and made.target == made.source and _untouched(before, edge):
         return True
-    for moved in before.along_guard(edge, run.safe_error(before, run.row_before(made))):
-        landed = run.landed(made, run.tails_before(made).copy(), moved)
-        after = run.place(target, made.time, landed)
-        here = run.landed(made, run.tails_before(made).copy())
+    here = landed(run, chain, before.x)
+    for after in (near := landed_nearby(run, chain, run.safe_error(before, run.row_before(chain[0])))):
         slopes = after.kernel.gradients[k](after.t, *after.x)[1:]
-        change = sum((abs(g * (a - b)) for g, a, b in zip(slopes, landed, here, strict=True)), run.arithmetic.zero)
+        change = sum((abs(g * (a - b)) for g, a, b in zip(slopes, after.x, here.x, strict=True)), run.arithmetic.zero)
         if abs(after.value(k) - value) > ALONG * change + run.roundoff(after, k, run.row_before(made)):
             return False
-    return True
+    return bool(near)
 
 
 def _untouched(place: Place, edge: int) -> bool:
@@ -123,10 +131,18 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
     place, k = run.before(made)
     where = f"{made.edge} at t = {show(made.time)}"
     late = SAFE * run.errors.time_error_at(made.time)
-    if any(jump and abs(time - float(made.time)) <= late for time, jump in _samples_near(run, made.time)):
+    if any(not indifferent(run, place, k, sides, made) for sides in jumps_near(run, made.time, late)):
         yield Finding("input", "unknown", f"an input or function of time jumps within the error of the time of {where}")
+    yield from smooth_reset(run, made)
+
+
+def smooth_reset(run: RunView, made: Transition) -> Iterator[Finding]:
+    """Whether the reset of a transition is continuous around it."""
+    assert run.errors is not None
+    place, k = run.before(made)
     if made.after is None or not place.mode.curved[k]:
         return
+    late = SAFE * run.errors.time_error_at(made.time)
     error = run.safe_error(place, run.row_before(made))
     narrow, wide = (_spread(run, place, k, [n * e for e in error], n * late) for n in (1, WIDER))
     noise = _noise(run, place, k)
@@ -134,7 +150,12 @@ def _continuous(run: RunView, made: Transition) -> Iterator[Finding]:
         max(UNITS * float(run.arithmetic.unit) * abs(float(v)), n)
         for v, n in zip(made.after.values(), noise, strict=True)
     ]
-    if any(not isfinite(a) or (a > b and c < a * WIDER / 2) for a, b, c in zip(narrow, least, wide, strict=True)):
+    names = zip(made.after, narrow, least, wide, strict=True)
+    jump = [name for name, a, b, c in names if not isfinite(a) or (a > b and c < a * WIDER / 2)]
+    chain = run.cascade(made)
+    first = run.safe_error(run.before(chain[0])[0], run.row_before(chain[0]))
+    if jump and not remembered_alike(run, chain, jump, first):
+        where = f"{made.edge} at t = {show(made.time)}"
         yield Finding("reset", "unknown", f"the reset of {where} jumps within the error")
 
 
@@ -146,14 +167,6 @@ def _noise(run: RunView, place: Place, k: int) -> list[float]:
     results = zip(*(place.kernel.resets[k](place.t, *x) for x in moved), strict=True)
     apart = [max(r) - min(r) <= 4 * units * abs(size) for r, size in zip(results, sizes, strict=True)]
     return [2 * w if little else 0.0 for w, little in zip(wide, apart, strict=True)]
-
-
-def _samples_near(run: RunView, t: Number) -> Iterator[tuple[float, bool]]:
-    """The boundaries of the input segments on either side of a time, and whether an input jumps there."""
-    segment = run.problem.timeline.at(t)
-    yield float(segment.start), segment.jump
-    if run.problem.timeline.goes_on(segment):
-        yield float(segment.end), run.problem.timeline.at(segment.end).jump
 
 
 def _spread(run: RunView, place: Place, k: int, error: list[float], late: float) -> list[float]:

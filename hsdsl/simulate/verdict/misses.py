@@ -22,7 +22,15 @@ from hsdsl.simulate.verdict.near_surface import has_condition, may_hold, near_su
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 from hsdsl.simulate.verdict.tangent import leaves_along
-from hsdsl.simulate.verdict.transparent import Passed, almost_left, passed_at, reached, shares_between, transparent
+from hsdsl.simulate.verdict.transparent import (
+    Passed,
+    almost_left,
+    begins_beyond,
+    passed_at,
+    reached,
+    shares_between,
+    transparent,
+)
 
 HALVINGS = 20
 MOST_TURNING_POINTS = 256  # turning points, one by one
@@ -104,7 +112,8 @@ def _turning(run: RunView, steps: Parts) -> list[Open]:
         for k in range(count):
             if open_[:, k].any():
                 (rate,) = kernel.rates[k](t, *x)
-                open_[:, k] &= ~((low(rate, n) > 0) | (high(rate, n) < 0))
+                least, most = low(rate, n), high(rate, n)
+                open_[:, k] &= ~((least > 0) | (most < 0) | ((least == 0) & (most == 0)))  # it rises, falls or stays
         return open_
 
     with np.errstate(all="ignore"):
@@ -115,7 +124,10 @@ def _turning(run: RunView, steps: Parts) -> list[Open]:
 
 
 def _begun_beyond(run: RunView, steps: Parts) -> NDArray[np.bool_]:
-    """Whether steps begin beyond the surfaces of edges with an `if`: these may be left and reached again."""
+    """Whether steps begin beyond the surfaces of edges with an `if`: these may be left and reached again.
+
+    Where that is for round-off alone, and falls, it is left as the step begins.
+    """
     edges = run.problem.program.modes[steps.mode].edges
     found = np.zeros((len(steps), len(edges)), dtype=bool)
     if any(edge.conditional for edge in edges):
@@ -123,6 +135,8 @@ def _begun_beyond(run: RunView, steps: Parts) -> NDArray[np.bool_]:
             values = steps.bound(run).surfaces(*steps.ends()[0])
         for k, edge in enumerate(edges):
             found[:, k] = edge.conditional & (low(values[k], len(steps)) > 0)
+            for i in np.flatnonzero(found[:, k]).tolist():
+                found[i, k] = begins_beyond(run.at_row(run.arc_of(int(steps.row[i])), int(steps.row[i])), k)
     return found
 
 
@@ -141,8 +155,8 @@ def _joined(parts: Parts, which: NDArray[np.int64], surface: int) -> list[Open]:
 def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | None:
     """Decide a surface on parts of a step that the enclosures leave open, by its values there."""
     k, last = each.surface, each.row + 1 == arc.last
-    if last and run.crossed.get(arc.last) == k and each.end >= 1:
-        return None  # `crossings` decides it
+    if last and each.end >= 1 and k in run.tied_at_end(arc):
+        return None  # `crossings` and `choices` decide it
     along = run.dense_output(arc, each.row)
     if run.followed and each.row == arc.first and not each.start and leaves_along(run, arc, k):
         return None
@@ -150,8 +164,7 @@ def _turned(run: RunView, arc: Arc, each: Open, passed: Passed) -> Finding | Non
         places = [along(run.arithmetic.zero + s) for s in shares_between(each.start, each.end)]
         place = max(places, key=lambda place: place.value(k))
         if has_condition(place, k):
-            start = along(run.arithmetic.zero)
-            beyond = start.value(k) > start.roundoff_bound(k) or (start.value(k) > 0 and start.rate(k) > 0)
+            beyond = begins_beyond(along(run.arithmetic.zero), k)
             if beyond or place.value(k) > place.roundoff_bound(k):
                 finding = reached(
                     run, k, (arc, each.row), {*shares_between(0.0, 1.0), *shares_between(each.start, each.end)}, passed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
 from hsdsl.enclosures import Range, Undecided, as_range
@@ -82,13 +82,23 @@ class Place:
         times = (self.t - late, self.t, self.t + late)
         found = {bool(self.kernel.conditions[k](t, *x)[0]) for x in self.moved_by(error) for t in times}
         if len(found) == 1 and (late or any(error)):
-            span = Range(float(times[0]), float(times[2]))
-            box = [Range(float(x - e), float(x + e)) for x, e in zip(self.x, error, strict=True)]
             try:
-                found |= {bool(self.enclosing().conditions[k](span, *box)[0])}
+                found |= {bool(self.enclosing().conditions[k](*self.box(error, late))[0])}
             except (Undecided, *DOMAIN_ERRORS):
                 found = {True, False}
         return found
+
+    def box(self, error: State, late: float) -> list[Range]:
+        """Time and states as far away as an error moves them."""
+        span = Range(float(self.t - late), float(self.t + late))
+        return [span, *(Range(float(x - e), float(x + e)) for x, e in zip(self.x, error, strict=True))]
+
+    def rates_within(self, k: int, error: State, late: float) -> Range:
+        """How fast surface k may rise anywhere in the box of the error; everything where that has no value."""
+        try:
+            return as_range(self.enclosing().rates[k](*self.box(error, late))[0])
+        except (Undecided, *DOMAIN_ERRORS):
+            return Range(-inf, inf)
 
     def outranks(self, j: int, k: int, error: State) -> bool:
         """Whether edge j goes before edge k by priority wherever either may be reached: they have one surface."""

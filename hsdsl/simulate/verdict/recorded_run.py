@@ -15,6 +15,7 @@ from hsdsl.execution import Arc, Execution, Stop, Transition
 from hsdsl.integrators.stepper import Polynomial, State
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.surfaces import Surfaces, at
 from hsdsl.simulate.verdict.place import Place
 
@@ -25,6 +26,9 @@ class RecordedRun:
 
     problem: Problem
     execution: Execution
+
+    def __post_init__(self) -> None:
+        self._tails = 0, Tails(self.problem.waits)
 
     @property
     def transitions(self) -> Sequence[Transition]:
@@ -72,10 +76,6 @@ class RecordedRun:
         """The arc of the step that begins at a row."""
         return self.flows[bisect_right(self.flows, row, key=lambda arc: arc.first) - 1]
 
-    def edges(self, mode: str) -> list[str]:
-        """The names of a mode's edges."""
-        return [edge.name for edge in self.problem.program.modes[self.index(mode)].edges]
-
     def index(self, mode: str) -> int:
         """The number of a mode."""
         return self._indices[mode]
@@ -108,12 +108,16 @@ class RecordedRun:
     def before(self, made: Transition) -> tuple[Place, int]:
         """The state that a transition was made from, and the surface that it crossed."""
         place = self.place(made.source, made.time, tuple(made.before.values()))
-        return place, self.edge_at(place, made.edge)
+        return place, self.edge_at(place, made.edge, made.entry)
 
-    def edge_at(self, place: Place, name: str) -> int:
-        """The edge of a name at a place; of several in a system of parts the one that is closest to its guard."""
-        found = [k for k, edge in enumerate(self.edges(place.mode.name)) if edge == name]
-        return found[0] if len(found) == 1 else min(found, key=lambda k: abs(place.value(k)))
+    def edge_at(self, place: Place, name: str, entry: bool = False) -> int:
+        """The edge of a name at a place; of several the closest to its guard, on ``entry`` the furthest beyond."""
+        found = [k for k, edge in enumerate(place.mode.edges) if edge.name == name]
+        if len(found) == 1:
+            return found[0]
+        if entry:
+            return max((k for k in found if not place.mode.edges[k].conditional), key=place.value)
+        return min(found, key=lambda k: abs(place.value(k)))
 
     def state(self, arc: Arc, row: int) -> State:
         """The state at a row."""
@@ -144,6 +148,46 @@ class RecordedRun:
         """The last row before a transition."""
         arc = self.execution.arcs[int(np.searchsorted(self.execution.arc_table.jump, made.index, "right")) - 1]
         return arc.last
+
+    def tails_before(self, made: Transition) -> Tails:
+        """What waits behind the first of each queue where a transition begins."""
+        index, tails = self._tails
+        if index > made.index:
+            index, tails = 0, Tails(self.problem.waits)
+        for earlier in self.transitions[index : made.index] if self.problem.program.queues else ():
+            self.landed(earlier, tails)
+        self._tails = made.index, tails
+        return tails
+
+    def landed(self, made: Transition, tails: Tails, x: State | None = None) -> State:
+        """Where a transition leads from its state or another one, while executions wait."""
+        place, k = self.before(made)
+        x, target = place.x if x is None else x, self.problem.program.modes[place.mode.edges[k].target]
+        return tails.advance(place.mode, x, target, place.kernel.resets[k](place.t, *x))
+
+    def cascade(self, made: Transition) -> list[Transition]:
+        """The transitions up to one that follow each other with no flow between."""
+        chain = [made]
+        for k in range(made.index - 1, -1, -1):
+            before = self.transitions[k]
+            if before.resumed is None or chain[-1].time - before.resumed > self.tie(chain[-1].time):
+                break
+            chain.append(before)
+        return chain[::-1]
+
+    def tied_at_end(self, arc: Arc) -> set[int]:
+        """The edge whose transition ends an arc, and those that were tied with it."""
+        if arc.last not in self.crossed:
+            return set()
+        place = self.before(self.transitions[arc.jump])[0]
+        names = {self.transitions[arc.jump].edge, *self.transitions[arc.jump].alternatives}
+        tied = (k for k, edge in enumerate(place.mode.edges) if edge.name in names)
+        return {self.crossed[arc.last], *(k for k in tied if k != self.crossed[arc.last] and self.is_on(place, k))}
+
+    def is_on(self, place: Place, k: int) -> bool:
+        """Whether a state is on surface k, to round-off or what that changes by in a tie."""
+        near = max(place.roundoff_bound(k), abs(place.rate(k)) * 2 * self.tie(place.t))
+        return bool(abs(place.value(k)) <= near)
 
     def tie(self, t: Number) -> Number:
         """Times closer than this are not told apart; none is known better than the end of the run."""

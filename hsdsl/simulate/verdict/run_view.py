@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 
 import numpy as np
@@ -12,9 +12,9 @@ from hsdsl.arithmetic import Number
 from hsdsl.execution import Arc, Execution, Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.program import ModeProgram
-from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.surfaces import Surfaces
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
+from hsdsl.simulate.verdict.exact_states import exactly_known
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.simulate.verdict.screen import Screen, screened
@@ -46,17 +46,15 @@ class RunView(RecordedRun):
     by_shadow: bool = False
     screen_made: Screen | None = None
 
-    def __post_init__(self) -> None:
-        self._tails = 0, Tails(self.problem.waits)
-
     @cached_property
     def errors(self) -> Errors | None:
         """How wrong the run is, by a shadow or a finer run; None where steps are fixed and no finer one is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
-        known = float(tolerance or 0), float(self.arithmetic.unit), float(self.tie(self.execution.times[-1]))
+        tie = float(self.tie(self.execution.times[-1]))
+        known = float(tolerance or 0), float(self.arithmetic.unit), tie, partial(exactly_known, self)
         if self.by_shadow:
             shadow = self.screen.shadow_errors if self.screen else shadow_errors(self.problem, self.execution)
-            return ErrorsByShadow(self.execution, self.execution, *known, shadow)
+            return ErrorsByShadow(self.execution, self.execution, *known, shadow=shadow)
         if finer is None and tolerance is not None:
             finer = self.execution.finer
         if finer is None or finer.stop.reason == "interrupted":
@@ -89,22 +87,6 @@ class RunView(RecordedRun):
             return self.reliable_transitions
         marked = np.flatnonzero(self.screen.marked("crossing") & mark).tolist()
         return [self.transitions[index] for index in marked]
-
-    def tails_before(self, made: Transition) -> Tails:
-        """What waits behind the first of each queue where a transition begins."""
-        index, tails = self._tails
-        if index > made.index:
-            index, tails = 0, Tails(self.problem.waits)
-        for earlier in self.transitions[index : made.index] if self.problem.program.queues else ():
-            self.landed(earlier, tails)
-        self._tails = made.index, tails
-        return tails
-
-    def landed(self, made: Transition, tails: Tails, x: State | None = None) -> State:
-        """Where a transition leads from its state or another one, while executions wait."""
-        place, k = self.before(made)
-        x, target = place.x if x is None else x, self.problem.program.modes[place.mode.edges[k].target]
-        return tails.advance(place.mode, x, target, place.kernel.resets[k](place.t, *x))
 
     @property
     def reliable_flows(self) -> list[Arc]:

@@ -20,7 +20,7 @@ is reached.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -59,7 +59,7 @@ class ShadowErrors:
 class ErrorsByShadow(Errors):
     """What a shadow run shows of a run."""
 
-    shadow: ShadowErrors
+    shadow: ShadowErrors = field(kw_only=True)
 
     @cached_property
     def parted(self) -> float | None:

@@ -38,7 +38,7 @@ def transparent(run: RunView, steps: Parts, passed: Passed) -> Iterator[Finding]
         for i in np.flatnonzero(rising).tolist():
             row = int(steps.row[i])
             arc = run.arc_of(row)
-            if run.crossed.get(arc.last) == k and row + 1 == arc.last:
+            if row + 1 == arc.last and k in run.tied_at_end(arc):
                 continue
             place = rising_zero(run.dense_output(arc, row), lambda place: place.value(k))  # noqa: B023
             level = SAFE * run.surface_error(place, k, row + 1) + place.roundoff_bound(k)
@@ -70,8 +70,8 @@ def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], pa
     if values[0] <= start.roundoff_bound(k) and not start.rate(k) > 0:
         values[0] = run.arithmetic.zero
     seen = values[0] <= 0 < values[-1]  # by `transparent`
-    if run.crossed.get(arc.last) == k and row + 1 == arc.last:
-        del shares[-1]  # `crossings` decides the end
+    if row + 1 == arc.last and k in run.tied_at_end(arc):
+        del shares[-1]  # `crossings` and `choices` decide the end
     for (a, before), (b, after) in pairwise(zip(shares, values, strict=False)):
         if not before <= 0 < after:
             continue
@@ -82,6 +82,11 @@ def reached(run: RunView, k: int, step: tuple[Arc, int], at: Iterable[float], pa
         if finding := undecided_condition(run, place, k, row + 1, {} if seen or noted else passed):
             return finding
     return None
+
+
+def begins_beyond(start: Place, k: int) -> bool:
+    """Whether a step begins beyond surface k, by more than round-off unless it rises there."""
+    return start.value(k) > start.roundoff_bound(k) or (start.value(k) > 0 and start.rate(k) > 0)
 
 
 def almost_left(run: RunView, k: int, row: int, places: Sequence[Place]) -> Finding | None:

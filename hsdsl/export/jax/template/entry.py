@@ -35,7 +35,8 @@ def boundary(model, config, p, lane, here, held):
     """
     mask, still = lane.phase == BOUNDARY, frozen(lane)
     bound = Bound(model, frozen(p), lane.segment)
-    noise, values = noise_of(here, still.t, still.x, scaled(model, still)), bound.surfaces(still.mode, still.t, still.x)
+    sizes = jnp.maximum(scaled(model, still), still.scale)  # as on entry
+    noise, values = noise_of(here, still.t, still.x, sizes), bound.surfaces(still.mode, still.t, still.x)
     plain = model.of(model.is_edge, lane.mode) & ~model.of(model.conditional, lane.mode) & ~held
     touches = TOUCH if config.scheme == "located" and model.holds else STEP
     jump = lane._replace(

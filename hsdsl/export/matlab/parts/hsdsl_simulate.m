@@ -285,11 +285,22 @@ function found = on_guard(w, here, t, x, since)
   values = w.m.surfaces{q}(t, x, w.p, d);
   for k = 1:numel(w.m.edge_target{q})
     rate = w.m.rate{q}{k}(t, x, w.p, d);
-    near = max(roundoff(w, q, k, t, x, d, scale_of(w, here, k)), rate * since);
-    if abs(values(k)) <= near && rate > 0 && ~lets_go(w, here, k) && points_out(w, q, k, t, x, rate, d) ...
+    noise = roundoff(w, q, k, t, x, d, scale_of(w, here, k));
+    if abs(values(k)) <= max(noise, rate * since) && rate > 0 && ~lets_go(w, here, k) ...
+       && points_out(w, q, k, t, x, rate, d) && ~turns_back(w, q, k, t, x, rate, since, noise - values(k), d) ...
        && holds(w, q, k, t, x, d)
       found(end + 1) = k;
     end
+  end
+end
+
+function yes = turns_back(w, q, k, t, x, rate, since, room, d)
+% Whether surface k, bending as it does in a time, falls again before it has risen by room.
+  yes = false;
+  if since > 0
+    later = w.m.rate{q}{k}(t + since, x + since * slope(w, q, t, x, d), w.p, d);
+    bend = (rate - later) / since;
+    yes = bend > 0 && rate * rate <= 2 * bend * room;
   end
 end
 
@@ -493,7 +504,7 @@ function [w, here, event, done] = boundary(w, here)
     inside = [];
     for k = 1:numel(w.m.edge_target{q})
       plain = ~w.m.edge_conditional{q}(k);
-      if plain && values(k) < -roundoff(w, q, k, t, x, d, scale_of(w, here, k))
+      if plain && values(k) < -roundoff(w, q, k, t, x, d, max(scale_of(w, here, k), here.scale))
         inside(end + 1) = k;
       end
     end
