@@ -99,7 +99,7 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     yield "outputs", values({name: value for name, value in final.outputs.items() if value == value}, digits)
     if left_out is not None:
         yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
-    yield from (("warning", each.message) for each in execution.warnings)
+    yield from (("warning", each) for each in condensed([warning.message for warning in execution.warnings]))
     yield "verdict", conclusion(execution)
     if conclusion(execution) != ": ".join((execution.verdict.theorem, *reasons(execution))):
         yield from (("reason", each) for each in reasons(execution))

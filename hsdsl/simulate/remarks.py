@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from hsdsl.arithmetic import Number
 from hsdsl.execution import Execution, RunWarning, Stop
-from hsdsl.program import ModeProgram, Program
+from hsdsl.program import EdgeProgram, ModeProgram, Program
 from hsdsl.simulate.stops import show
 
 if TYPE_CHECKING:
@@ -88,6 +88,14 @@ def noted(program: Program, diagnostics: Diagnostics, execution: Execution) -> s
 def codes_of(kinds: Iterable[str]) -> str:
     """The codes of kinds of remarks, with a space between two."""
     return " ".join(sorted({SENTENCES[kind][0] for kind in kinds}))
+
+
+def may_be_passed(program: Program, edge: EdgeProgram) -> bool:
+    """Whether a surface that is passed while its `if` is false is remarked.
+
+    An event fires when it turns true on any of its surfaces, and beginning to slide is no transition of the file.
+    """
+    return edge.conditional and not edge.of_event and not program.modes[edge.target].slides
 
 
 def wall_of(mode: ModeProgram, k: int) -> str:

@@ -13,7 +13,7 @@ from hsdsl.arithmetic import DOMAIN_ERRORS
 from hsdsl.execution import Execution, RunWarning
 from hsdsl.program import Program
 from hsdsl.simulate.diagnostics import Diagnostics
-from hsdsl.simulate.remarks import Remark, loop_remarks, wall_of, warnings_of
+from hsdsl.simulate.remarks import Remark, loop_remarks, may_be_passed, wall_of, warnings_of
 from hsdsl.simulate.verdict.accumulation import sliding_spans
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.simulate.verdict.run_view import RunView
@@ -23,14 +23,18 @@ BEYOND = 4  # times its round-off: a wall that does not hold
 
 def remarked(run: RunView, diagnostics: Diagnostics) -> tuple[RunWarning, ...]:
     """The warnings of a run."""
-    found = [*loop_remarks(run.problem.program, diagnostics, run.stop), *_slidings(run)]
-    if run.remarks is None:
+    program = run.problem.program
+    found = [*loop_remarks(program, diagnostics, run.stop), *_slidings(run)]
+    looked, walls = run.remarks is not None, any(mode.walls for mode in program.modes)
+    found += run.remarks or ()
+    if (walls and (not looked or run.problem.settings.scheme == "relaxed")) or (
+        not looked and any(may_be_passed(program, edge) for edge in program.edges)
+    ):
         from hsdsl.simulate.verdict.passings import passings  # most runs need none
 
-        found += passings(run)
-    else:
-        found += run.remarks
-    return warnings_of([*found, *_final(run)], run.problem.program)
+        known = {remark.of for remark in found if remark.kind == "beyond"}
+        found += (one for one in passings(run, walls_alone=looked) if one.kind != "beyond" or one.of not in known)
+    return warnings_of([*found, *_final(run)], program)
 
 
 def ends_beyond(run: RecordedRun) -> tuple[RunWarning, ...]:
