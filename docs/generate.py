@@ -24,6 +24,7 @@ PAGES: dict[str, Callable[[], str]] = {
     "command-line.md": command_line.command_line,
     "python.md": python_api.python_api,
     "errors.md": codes.error_codes,
+    "warnings.md": codes.warning_codes,
     "rules.md": codes.rule_index,
     **{
         f"rules/{name}.md": partial(codes.rule_family, name)

@@ -234,5 +234,16 @@ CODES: dict[str, str] = {
     "HS334": "a part of an SBML model that no model of this language can keep",
 }
 
+# One line a code of the warnings of runs, as for errors. Their pages are in hsdsl/lint/warnings.md.
+WARNINGS: dict[str, str] = {
+    "HS701": "a surface that was passed while the `if` of its transition was false",
+    "HS702": "a wall that the run did not check",
+    "HS703": "motion along a guard, or rest on it, that goes on where transitions accumulate",
+    "HS704": "transitions that accumulate, replaced by their limit",
+    "HS705": "sliding on the surface between two modes",
+    "HS706": "transitions that crowd together, and wait in strips",
+    "HS707": "an assumption of the model, such as one that an import made",
+}
+
 TOO_LONG = "HS122"
 STEP_AND_TOLERANCE = "HS320"  # wrong usage rather than a wrong model: the command line exits with 2

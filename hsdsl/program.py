@@ -347,6 +347,7 @@ class Program:
     order ``initial_values`` has a routine of the parameters and ``initial_states`` for each.
 
     ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.
+    ``assumptions`` are sentences that every run tells.
     """
 
     path: str
@@ -371,6 +372,7 @@ class Program:
     initial_values: Routines = NOTHING
     contacts: tuple[ModeProgram, ...] = ()
     parts: tuple[Part, ...] = ()
+    assumptions: tuple[str, ...] = ()
 
     @property
     def flows(self) -> tuple[ModeProgram, ...]:

@@ -389,6 +389,7 @@ class HybridSystem:
     definitions: tuple[Definition, ...] = ()  # for people: they are substituted everywhere
     functions: tuple[FunctionText, ...] = ()
     unknowns: tuple[str, ...] = ()  # of linear equations: their solutions are substituted everywhere
+    assumptions: tuple[str, ...] = ()  # sentences that every run tells
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

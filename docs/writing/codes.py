@@ -1,17 +1,29 @@
-"""The pages of error codes and lint rules, from their Markdown files."""
+"""The pages of errors, warnings of runs and lint rules, from their Markdown files."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 from writing.markdown import lowered, table
 
 from hsdsl import errors
-from hsdsl.lint.pages import error_pages, rule_pages, titles
+from hsdsl.lint.pages import error_pages, rule_pages, titles, warning_pages
 from hsdsl.lint.rules import FAMILIES, RULES, family
 
 ERROR_CODES = """# Error codes
 
 A code keeps its meaning for ever; a retired one is not used again. `hsdsl explain CODE` prints this text.
 Examples may leave out the keys that every model has.
+
+"""
+
+WARNING_CODES = """# Warnings of runs
+
+What a run tells first: each is a line `warning` of its summary, an entry of `warnings` in `--json` (code, time, edge,
+message) and of `run.warnings` in Python, and a code in the column `warnings` of ensembles and sweeps. A run with
+warnings may be right, and its verdict may be `holds`: they are about what its author may not have meant.
+Several of one code about one transition are one line, with the first time and how often. Codes keep their meaning.
+`hsdsl explain CODE` prints this text.
 
 """
 
@@ -26,9 +38,18 @@ LINT_RULES = """# Lint rules
 
 def error_codes() -> str:
     """Document every code of an error."""
-    rows = [(f"[`{code}`](#{code.lower()})", text) for code, text in sorted(errors.CODES.items())]
-    parts = [f"## {code}\n\n{lowered(page)}\n\n" for code, page in error_pages().items()]
-    return ERROR_CODES + table(("code", "about"), rows) + "".join(parts)
+    return _listed(ERROR_CODES, errors.CODES, error_pages())
+
+
+def warning_codes() -> str:
+    """Document every code of a warning."""
+    return _listed(WARNING_CODES, errors.WARNINGS, warning_pages())
+
+
+def _listed(head: str, titles: Mapping[str, str], pages: Mapping[str, str]) -> str:
+    rows = [(f"[`{code}`](#{code.lower()})", text) for code, text in sorted(titles.items())]
+    parts = [f"## {code}\n\n{lowered(page)}\n\n" for code, page in pages.items()]
+    return head + table(("code", "about"), rows) + "".join(parts)
 
 
 def rule_index() -> str:

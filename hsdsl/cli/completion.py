@@ -7,7 +7,7 @@ from pathlib import Path
 
 from typer import Context
 
-from hsdsl.errors import CODES, ModelError, UsageError
+from hsdsl.errors import CODES, WARNINGS, ModelError, UsageError
 from hsdsl.names import without_memory
 
 SUFFIXES = (".yaml", ".yml")
@@ -52,11 +52,11 @@ def _names(path: Path) -> Iterator[str]:
 def rule_codes(incomplete: str) -> list[tuple[str, str]]:
     """Codes of lint rules with their titles, after the last comma."""
     listed, comma, _ = incomplete.rpartition(",")
-    return [(f"{listed}{comma}{code}", title) for code, title in codes() if code not in CODES]
+    return [(f"{listed}{comma}{code}", title) for code, title in codes() if code not in {*CODES, *WARNINGS}]
 
 
 def codes() -> list[tuple[str, str]]:
-    """Codes of errors and lint rules with their titles."""
+    """Codes of errors, warnings of runs and lint rules with their titles."""
     from hsdsl.lint.pages import titles
 
     return list(titles().items())

@@ -1,4 +1,4 @@
-"""``hsdsl explain``: the page of an error or of a lint rule."""
+"""``hsdsl explain``: the page of an error, a warning of runs or a lint rule."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CODE = "A code such as HS111, or the name of a lint rule."
 def explain(
     code: Annotated[str, Argument(metavar="CODE", help=CODE, autocompletion=codes)], json: Json = False
 ) -> None:
-    """Explain an error or a finding: its meaning, its reason, and what to write instead."""
+    """Explain an error, a warning of a run or a finding: its meaning, its reason, and what to write instead."""
     from hsdsl.lint import RULES
     from hsdsl.lint.pages import pages, titles
 

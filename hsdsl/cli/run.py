@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 STOPPED = 3
 PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
+EXPLAIN = "Give every reason of the verdict, not the conclusion alone."
 ESTIMATE = "Run again, finer, and give the distance of the runs."
 SAMPLES = "Rows of tables: every=TIME or count=N; jumps are always written. Else the file's, or the integrator's."
 EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
@@ -54,6 +56,7 @@ def run(
     phase: Phases = None,
     animate: Annotated[Path | None, option("FILE", FILM)] = None,
     speed: Annotated[float | None, option("X", SPEED)] = None,
+    explain: Annotated[bool, Option("--explain", help=EXPLAIN)] = False,
     answer: Answer,
 ) -> None:
     """Simulate a model and summarise what happened."""
@@ -79,7 +82,7 @@ def run(
                 settings = {name: value for name, value in settings.items() if value is not None}
                 result = loaded.stream(out, every=every, columns=names, **settings)
         if every is None:
-            _answer(loaded, result, shown, estimate, out, plot, settings["parameters"], answer)
+            _answer(loaded, result, shown, estimate, explain, out, plot, settings["parameters"], answer)
             if animate is not None:
                 write_film(loaded, animate, speed, settings, answer.hidden)
         else:
@@ -109,6 +112,7 @@ def _answer(
     execution: Execution,
     shown: dict[str, Any],
     estimate: bool,
+    explain: bool,
     out: Path | None,
     plot: Path | None,
     parameters: dict[str, str],
@@ -125,13 +129,13 @@ def _answer(
     if plot is not None:
         model.plot(execution, plot, parameters, **shown)
         say(f"wrote {plot}")
-    answer.give(lambda: _record(execution, names, estimated), lambda: _text(execution, estimated))
+    answer.give(lambda: _record(execution, names, estimated), lambda: _text(execution, estimated, explain))
 
 
-def _text(execution: Execution, estimated: Any) -> str:
+def _text(execution: Execution, estimated: Any, explain: bool) -> str:
     from hsdsl.report.summary import summary
 
-    return summary(execution) + ("" if estimated is None else f"\n{estimated.sentence}")
+    return summary(execution, explain=explain) + ("" if estimated is None else f"\n{estimated.sentence}")
 
 
 def _record(execution: Execution, names: list[str] | None, estimated: Any) -> dict[str, Any]:
@@ -161,6 +165,7 @@ def _answer_streamed(run: Streamed, model: Path, answer: Answer) -> None:
         lambda: (
             f"{run.rows} of {run.steps} rows written to {visible(str(run.path))}\n"
             f"stop      {run.stop.reason}: {run.stop.message}\ntransitions {run.transitions}"
+            + "".join(f"\nwarning   {visible(each.message)}" for each in run.warnings)
         ),
     )
 
@@ -176,6 +181,7 @@ def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
         "overrides": run.overrides,
         "stop": {"reason": run.stop.reason, "time": run.stop.time, "message": run.stop.message},
         "transition_count": run.transitions,
+        "warnings": [asdict(each) for each in run.warnings],
         "out": {"file": str(run.path), "rows": run.rows, "steps": run.steps},
         "final": {
             "time": float(final.time[0]),

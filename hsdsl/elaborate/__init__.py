@@ -165,6 +165,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         definitions=tuple(substituted_definitions(document)),
         functions=functions,
         unknowns=_unknowns(document),
+        assumptions=tuple(filter(None, map(symbols.text, document.assumptions))),
     )
 
 

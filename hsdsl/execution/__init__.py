@@ -24,13 +24,25 @@ Numbers are float64, or objects (mpmath) for a run at higher precision.
 """
 
 from hsdsl.execution.ensemble import Ensemble, Failure, TransitionTable
-from hsdsl.execution.parts import COMPLETE, INCOMPLETE, LEFT, REASONS, Arc, Kind, Point, Stop, Transition, Verdict
+from hsdsl.execution.parts import (
+    COMPLETE,
+    INCOMPLETE,
+    LEFT,
+    REASONS,
+    Arc,
+    Kind,
+    Point,
+    RunWarning,
+    Stop,
+    Transition,
+    Verdict,
+)
 from hsdsl.execution.run import Execution, OutputFunction
 from hsdsl.execution.samples import HYBRID_TIME, Array, Samples
 from hsdsl.execution.sampling import Evaluated, Sampler, Side
 
 __all__ = [
     "COMPLETE", "HYBRID_TIME", "INCOMPLETE", "LEFT", "REASONS", "Arc", "Array", "Ensemble", "Evaluated", "Execution",
-    "Failure", "Kind", "OutputFunction", "Point", "Sampler", "Samples", "Side", "Stop", "Transition", "TransitionTable",
-    "Verdict",
+    "Failure", "Kind", "OutputFunction", "Point", "RunWarning", "Sampler", "Samples", "Side", "Stop", "Transition",
+    "TransitionTable", "Verdict",
 ]  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -74,6 +75,10 @@ class Ensemble:
         Values at the end by name, not-a-number where the mode lacks the state.
     transitions : array of int
         How many were made.
+    warnings : array of str
+        Codes of what the runs themselves noted (`hsdsl.errors.WARNINGS`), with a space between two; empty where nothing
+        was: walls followed roughly, motion along guards, limits of accumulating transitions, sliding, strips. The other
+        codes take a verdict: ``ensemble.run(...).warnings``.
     transition_times : array, shape (..., n)
         Times of the first n transitions, for a positive n; not-a-number where fewer were made.
     sample_times : array, shape (..., n)
@@ -96,6 +101,7 @@ class Ensemble:
     state: dict[str, Array]
     outputs: dict[str, Array]
     transitions: Array
+    warnings: Array
     transition_times: Array
     sample_times: Array
     samples: dict[str, Array]
@@ -122,8 +128,9 @@ class Ensemble:
         Parameters
         ----------
         what : {"runs", "samples", "transitions"}
-            ``runs``: what was varied, ``stop``, ``time``, ``mode``, final states and outputs, ``transitions``, and
-            ``transition_0``, ... where times were kept. ``samples``: what was varied, ``time``, and values then.
+            ``runs``: what was varied, ``stop``, ``time``, ``mode``, final states and outputs, ``transitions``,
+            ``warnings``, and ``transition_0``, ... where times were kept. ``samples``: what was varied, ``time``, and
+            values then.
             ``transitions``: what was varied, ``time``, ``edge``, and ``before.NAME`` and ``after.NAME`` of each state.
             A state or output of the name of another column is ``state.NAME`` or ``output.NAME``.
 
@@ -143,6 +150,11 @@ class Ensemble:
         """How many instances ended for which reason."""
         found, counts = np.unique(self.stop, return_counts=True)
         return dict(zip(found.tolist(), counts.tolist(), strict=True))
+
+    @property
+    def warning_counts(self) -> dict[str, int]:
+        """How many instances have which code of :attr:`warnings`."""
+        return dict(sorted(Counter(" ".join(self.warnings.ravel().tolist()).split()).items()))
 
     @property
     def failed(self) -> Array:

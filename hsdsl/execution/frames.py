@@ -52,7 +52,7 @@ def _seen(columns: dict[str, Array]) -> list[tuple[str, Array]]:
 def _runs(ensemble: Ensemble) -> tuple[Array, dict[str, Array]]:
     instances = np.arange(ensemble.stop.size)
     times = ensemble.transition_times.reshape(len(instances), -1)
-    known = {"stop": ensemble.stop, "time": ensemble.time, "mode": ensemble.mode, "transitions": ensemble.transitions}
+    known = {name: getattr(ensemble, name) for name in ("stop", "time", "mode", "transitions", "warnings")}
     columns = _varied(ensemble, instances) | {name: values.ravel() for name, values in known.items()}
     columns |= {f"transition_{k}": times[:, k] for k in range(times.shape[1])}
     ends = {name: values.ravel() for name, values in (ensemble.state | ensemble.outputs).items()}

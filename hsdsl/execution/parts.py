@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from hsdsl.execution.records import Deferred
@@ -76,11 +76,37 @@ REASONS = (*COMPLETE, *LEFT, *INCOMPLETE)
 
 
 @dataclass(frozen=True)
+class RunWarning:
+    """Something about a run that its reader should know first.
+
+    Attributes
+    ----------
+    code : str
+        One of `hsdsl.errors.WARNINGS`; `hsdsl explain CODE` prints its page.
+    time : number or None
+        When it was first so.
+    edge : str or None
+        The transition that it is about.
+    message : str
+        A sentence for a person.
+    """
+
+    code: str
+    time: Any | None
+    edge: str | None
+    message: str
+
+
+@dataclass(frozen=True)
 class Verdict(Deferred):
-    """What can be said about the theorem's hypotheses for this run: ``holds``, ``left`` or ``unknown``."""
+    """What can be said about the theorem's hypotheses for this run: ``holds``, ``left`` or ``unknown``.
+
+    ``reasons`` are all of them; ``warnings`` are what the look at the run has found besides.
+    """
 
     theorem: Literal["holds", "left", "unknown"]
     reasons: tuple[str, ...]
+    warnings: tuple[RunWarning, ...] = field(default_factory=tuple[RunWarning, ...])
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from hsdsl.calls import checks_methods
 from hsdsl.errors import UsageError
-from hsdsl.execution.parts import REASONS, Arc, Point, Stop, Transition, Verdict
+from hsdsl.execution.parts import REASONS, Arc, Point, RunWarning, Stop, Transition, Verdict
 from hsdsl.execution.records import Deferred, same
 from hsdsl.execution.samples import Array, Samples
 from hsdsl.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
@@ -80,6 +80,8 @@ class Execution(Deferred):
         ``differentiation(wrt) -> Sensitivity``: its derivatives.
     compiled : CompiledRecord or None
         Of a run made in C: what its loop wrote, sooner known than the transitions.
+    noted : callable or None
+        ``noted(execution) -> str``: codes of what the Python loop itself noted, without a verdict.
     look : callable or None
         ``look() -> dict``: what a picture shows of its model, as options of `hsdsl.plot.View`.
     """
@@ -110,6 +112,7 @@ class Execution(Deferred):
     assessment: Assessment | None = field(default=None, compare=False)
     repetition: Callable[[Execution], Execution] | None = field(default=None, compare=False)
     differentiation: Callable[[Any], Any] | None = field(default=None, compare=False)
+    noted: Callable[[Execution], str] | None = field(default=None, compare=False)
     look: Callable[[], dict[str, Any]] | None = field(default=None, compare=False)
     compiled: CompiledRecord | None = field(default=None, compare=False)
 
@@ -195,6 +198,13 @@ class Execution(Deferred):
     def view(self) -> dict[str, Any]:
         """Return what a picture shows of the model: units, levels of guards; nothing for a run read from a file."""
         return {} if self.look is None else self.look()
+
+    @property
+    def warnings(self) -> tuple[RunWarning, ...]:
+        """What a reader should know first: surfaces passed while an `if` was false, walls that were not checked, motion
+        that completes the run, assumptions of the file. They are found with the verdict.
+        """
+        return self.verdict.warnings
 
     @property
     def made(self) -> int:

@@ -1,12 +1,13 @@
-"""Pages of errors and rules in Markdown: for `hsdsl explain`, SARIF and the documentation."""
+"""Pages of errors, warnings of runs and rules in Markdown: for `hsdsl explain`, SARIF and the documentation."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 
-from hsdsl.errors import CODES
+from hsdsl.errors import CODES, WARNINGS
 from hsdsl.lint.rules import FAMILIES, RULES
 
 _WRONG = re.compile(r"(```yaml\n.*?)(?=```yaml)", re.DOTALL)
@@ -14,12 +15,12 @@ _WRONG = re.compile(r"(```yaml\n.*?)(?=```yaml)", re.DOTALL)
 
 def titles() -> dict[str, str]:
     """One line about every code."""
-    return {**CODES, **{code: rule_pages()[code].partition("\n")[0].rstrip(".") for code in RULES}}
+    return {**CODES, **WARNINGS, **{code: rule_pages()[code].partition("\n")[0].rstrip(".") for code in RULES}}
 
 
 def pages() -> dict[str, str]:
     """The page of every code."""
-    return {**error_pages(), **rule_pages()}
+    return {**error_pages(), **warning_pages(), **rule_pages()}
 
 
 @cache
@@ -30,10 +31,17 @@ def rule_pages() -> dict[str, str]:
 
 def error_pages() -> dict[str, str]:
     """The pages of errors, with their titles. The first example of a page is wrong, the second right."""
-    pages = {
-        code: _WRONG.sub(r"## Example\n\n\1## Use instead\n\n", page) for code, page in _pages("errors.md").items()
-    }
-    return {code: f"{CODES[code][0].upper()}{CODES[code][1:]}.\n\n{page}" for code, page in pages.items()}
+    return _titled("errors.md", CODES)
+
+
+def warning_pages() -> dict[str, str]:
+    """The pages of warnings of runs, in the same form."""
+    return _titled("warnings.md", WARNINGS)
+
+
+def _titled(file: str, titles: Mapping[str, str]) -> dict[str, str]:
+    pages = {code: _WRONG.sub(r"## Example\n\n\1## Use instead\n\n", page) for code, page in _pages(file).items()}
+    return {code: f"{titles[code][0].upper()}{titles[code][1:]}.\n\n{page}" for code, page in pages.items()}
 
 
 def _pages(file: str) -> dict[str, str]:

@@ -97,6 +97,7 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
         scaled_states=tuple(name for name, _ in experiment.scale),
         initial_order=initial_order(system),
         initial_values=print_routines(initial_values(system, names), ()),
+        assumptions=system.assumptions,
     )
 
 

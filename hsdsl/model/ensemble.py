@@ -126,6 +126,7 @@ class PreparedEnsemble:
             state=columns(zip(self.names, final.T, strict=True)),
             outputs=columns((name, kept.outputs[:, i]) for i, name in enumerate(program.outputs)),
             transitions=placed(kept.transitions, 0),
+            warnings=placed(kept.noted.astype(str), ""),
             transition_times=placed(kept.crossed, math.nan),
             sample_times=placed(self.instances.time, math.nan),
             samples=columns(sampled if self.instances.time.shape[1] else ()),

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.errors import UsageError
-from hsdsl.execution import Array, Samples, Stop
+from hsdsl.execution import Array, RunWarning, Samples, Stop
 from hsdsl.execution.samples import split
 from hsdsl.execution.sampling import columns_by_name
 from hsdsl.model.options import check_arguments
@@ -21,6 +21,7 @@ from hsdsl.model.settings import whole
 from hsdsl.names import without_memory
 from hsdsl.program import Program
 from hsdsl.simulate.plan import Prepared, Watch
+from hsdsl.simulate.remarks import loop_remarks, warnings_of
 from hsdsl.simulate.state_layouts import StateLayouts
 from hsdsl.store.sidecar import forget_sidecar
 from hsdsl.store.table import write_csv
@@ -31,13 +32,17 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Streamed:
-    """A run whose rows are in a file: the rows written, all steps, the number of transitions, and the last row."""
+    """A run whose rows are in a file: the rows written, all steps, the number of transitions, and the last row.
+
+    ``warnings`` are those that take no verdict.
+    """
 
     path: Path
     rows: int
     steps: int
     transitions: int
     stop: Stop
+    warnings: tuple[RunWarning, ...]
     final: Samples
     engine: str
     scheme: str
@@ -141,7 +146,7 @@ def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | 
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
         try:
             rows = Rows(prepared.program, prepared.states, every, columns, lambda text: _write_all(file, text))
-            stop, made, rest = prepared.stream(rows.take, watch)
+            stop, run, rest = prepared.stream(rows.take, watch)
             final = rows.take(rest, at_end=True)
         finally:
             os.close(file)
@@ -152,8 +157,9 @@ def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | 
         path=path,
         rows=rows.written,
         steps=rows.steps,
-        transitions=made,
+        transitions=run.made,
         stop=stop,
+        warnings=warnings_of(loop_remarks(prepared.program, run.diagnostics, stop), prepared.program),
         final=final,
         engine="c",
         scheme=settings.scheme,

@@ -44,6 +44,7 @@ def visible_run(run: Execution, prepared: Prepared) -> Execution:
         output_function=None if run.output_function is None else view.output_values,
         assessment=view.assessment,
         repetition=view.repetition,
+        noted=run.noted and partial(_noted, run),
         sampler=None,
         _made=run.made,
     )
@@ -59,6 +60,10 @@ def with_output_function(run: Execution, prepared: Prepared) -> Execution:
 
 def _same(run: Execution, name: str, _: Any) -> Any:
     return getattr(run, name)
+
+
+def _noted(run: Execution, _: Execution) -> str:
+    return run.noted(run) if run.noted else ""
 
 
 class _View:

@@ -92,6 +92,7 @@ class ArrayRecorder:
         n, end = len(last.states), execution.times[-1]
         kept.stop[i] = execution.stop.reason
         modes = self.program.mode_names
+        kept.noted[i] = execution.noted(execution) if execution.noted else ""
         kept.mode[i] = modes.index(last.mode)
         kept.kind[i] = self.kinds.index(last.states)
         kept.transitions[i] = len(execution.transitions)

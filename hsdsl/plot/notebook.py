@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsdsl.errors import WARNINGS
 from hsdsl.execution import Array, Ensemble, Execution
 from hsdsl.names import called, visible, visible_lines, without_memory
 from hsdsl.plot.style import ALARM, INK, styled, write_figure
@@ -41,6 +42,7 @@ def ensemble_html(ensemble: Ensemble) -> str:
     rows = [("runs", f"{count:,}, shape {ensemble.shape}")]
     rows += [(f"varied {name}", _range(values)) for name, values in ensemble.varied.items()]
     rows += [("stops", ", ".join(f"{number:,} {reason}" for reason, number in ensemble.reasons.items()) or "none")]
+    rows += [("warnings", f"{number:,} {code}: {WARNINGS[code]}") for code, number in ensemble.warning_counts.items()]
     rows += [("transitions", _range(ensemble.transitions))] if count else []
     rows += [(f"final {name}", _range(ensemble.state[name])) for name in without_memory(ensemble.state)]
     rows += [("seconds", ", ".join(f"{name} {value:.3g}" for name, value in ensemble.seconds.items()))]

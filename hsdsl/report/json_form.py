@@ -28,7 +28,8 @@ def as_json(execution: Execution) -> dict[str, Any]:
     """Return the object of `run --json`, of values that JSON has.
 
     Its keys, in this order: ``model``, ``engine``, ``scheme``, ``method``, ``settings``, ``overrides``, ``stop``,
-    ``transitions``, ``final``, ``verdict``, ``seconds``, and ``left_out`` where states were not integrated.
+    ``transitions``, ``final``, ``warnings``, ``verdict``, ``seconds``, and ``left_out`` where states were not
+    integrated.
     """
     return plain(record(execution))
 
@@ -47,6 +48,7 @@ def record(execution: Execution) -> dict[str, Any]:
         "stop": _named(execution.stop, "reason", "time", "message"),
         "transitions": [_transition(transition) for transition in execution.transitions],
         "final": final,
+        "warnings": [_named(each, "code", "time", "edge", "message") for each in execution.warnings],
         "verdict": _named(execution.verdict, "theorem", "reasons"),
         "seconds": {stage: execution.seconds.get(stage) for stage in STAGES},
     }

@@ -13,8 +13,8 @@ WIDTH = 100
 INDENT = 10  # columns of the labels below the table
 
 
-def summary(execution: Execution, *, limit: int = 60, width: int | None = None) -> str:
-    """Sum a run up in lines: title, settings, transitions, stop, final state, verdict, seconds.
+def summary(execution: Execution, *, limit: int = 60, width: int | None = None, explain: bool = False) -> str:
+    """Sum a run up in lines: title, settings, transitions, stop, final state, warnings, verdict, seconds.
 
     Parameters
     ----------
@@ -22,6 +22,8 @@ def summary(execution: Execution, *, limit: int = 60, width: int | None = None) 
         The most transitions; a longer list is cut in the middle, with a count.
     width : int, optional
         Columns, 100 by default; at least 40.
+    explain : bool
+        Whether every reason of the verdict is given, not the conclusion alone.
     """
     columns = max(40, WIDTH if width is None else width)
     paragraphs = [words.heading(execution)]
@@ -34,10 +36,19 @@ def summary(execution: Execution, *, limit: int = 60, width: int | None = None) 
         paragraphs.append(f"method auto is {execution.settings['method_chosen']}")
     lines = [line for text in paragraphs for line in _wrapped(text, columns)]
     lines += ["", *_transitions(execution, limit, columns), ""]
-    for label, text in words.facts(execution):
+    for label, text in _facts(execution, explain):
         first = "" if label in ("state", "outputs") else label
         lines += _wrapped(text, columns, first.ljust(INDENT), " " * INDENT)
     return "\n".join(lines)
+
+
+def _facts(execution: Execution, explain: bool) -> list[tuple[str, str]]:
+    """The facts; without reasons the verdict says where these are."""
+    facts = list(words.facts(execution))
+    if explain or "reason" not in dict(facts):
+        return facts
+    more = {"verdict": " (--explain)"}
+    return [(label, text + more.get(label, "")) for label, text in facts if label != "reason"]
 
 
 def _wrapped(text: str, columns: int, first: str = "", rest: str = "") -> list[str]:

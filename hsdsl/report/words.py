@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -17,6 +18,8 @@ from hsdsl.report.alike import condensed
 
 DIGITS = 10  # of a run without a tolerance, whose error nothing says
 _LEAST_DIGITS, _MOST_DIGITS = 3, 16
+MOST_WORDS = 25  # of a sentence
+_CLAUSE = re.compile(r"[:;,] ")
 COLUMNS = ("#", "time", "delay", "edge", "from -> to", "state")
 
 
@@ -85,7 +88,7 @@ def overrides(execution: Execution) -> str:
 
 
 def facts(execution: Execution) -> Iterator[tuple[str, str]]:
-    """Labels and texts of the end of a run, its verdict and its seconds."""
+    """Labels and texts of the end of a run: warnings, verdict, its reasons where it has more to say, and seconds."""
     final, left_out = execution.final, execution.settings.get("left_out")
     count = f"{final.jump} transition{'' if final.jump == 1 else 's'}"
     waiting = ", waiting in a strip" if final.kind == "strip" else ""
@@ -96,11 +99,25 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     yield "outputs", values({name: value for name, value in final.outputs.items() if value == value}, digits)
     if left_out is not None:
         yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
-    yield "verdict", ": ".join(filter(None, (execution.verdict.theorem, "; ".join(_reasons(execution)))))
+    yield from (("warning", each) for each in condensed([warning.message for warning in execution.warnings]))
+    yield "verdict", conclusion(execution)
+    if conclusion(execution) != ": ".join((execution.verdict.theorem, *reasons(execution))):
+        yield from (("reason", each) for each in reasons(execution))
     yield "time", ", ".join(f"{stage} {value:.3g} s" for stage, value in execution.seconds.items())
 
 
-def _reasons(execution: Execution) -> list[str]:
+def conclusion(execution: Execution) -> str:
+    """The verdict with its first reason, as many clauses of that as make one short sentence."""
+    theorem, first = execution.verdict.theorem, next(iter(reasons(execution)), "")
+    if not first:
+        return theorem
+    most = MOST_WORDS - 2  # the theorem, and where to read more
+    clauses = [first[: place.start()] for place in _CLAUSE.finditer(first)]
+    fitting = [clause for clause in (*clauses, first) if len(clause.split()) <= most]
+    return f"{theorem}: {fitting[-1] if fitting else ' '.join(first.split()[:most])}"
+
+
+def reasons(execution: Execution) -> list[str]:
     """The reasons of the verdict; a stop that the lines above describe is only named."""
     reason, message = execution.stop.reason, execution.stop.message
     stops = f"the run stops ({reason})"

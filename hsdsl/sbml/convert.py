@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from hsdsl.sbml.mathml import Node, NotExpressible
 
 NOTHING = "a value that nothing gives"
 FIRST = 10**8  # the priority of what switches a condition inside a formula
+MOST_LISTED = 3  # lines of constraints
 LONGEST = 100_000  # characters of an initial value that is written out
 _NAME = re.compile(r"[A-Za-z_]\w*")
 Document = dict[str, Any]
@@ -209,8 +210,10 @@ class Converter(Facts):
         }
         solve = {"solve": {"unknowns": list(map(self.spelled, self.unknowns)), "equations": equations}}
         mode = {"flow": flow | dict.fromkeys(chosen, "0"), "transitions": [*switches, *transitions]}
+        assumptions = list(self.assumptions())
         return {
             "hsdsl": "1",
+            **({"assumptions": assumptions} if assumptions else {}),
             "parameters": parameters,
             "functions": functions,
             "let": self.sorted_lets(let),
@@ -286,6 +289,21 @@ class Converter(Facts):
             whole = re.fullmatch(r"\(?(-?\d{1,9})\)?", text)
             transition["priority"] = whole[1] if whole else text
         return transition
+
+    def assumptions(self) -> Iterator[str]:
+        """Sentences on what the model takes for granted."""
+        lines = [str(one.line) for one in self.model.constraints]
+        if lines:
+            where = f"of line {', '.join(lines[:MOST_LISTED])}" + " and others" * (len(lines) > MOST_LISTED)
+            yield f"the SBML constraints {where} are not checked: write them under `domain` to stop a run there"
+        alike: dict[str, list[str]] = {}
+        for event in self.model.events:
+            if event.priority is not None:
+                alike.setdefault(self.running.number(self.whole(event.priority)), []).append(event.name)
+        for first, other, *_ in (names for names in alike.values() if len(names) > 1):
+            yield (
+                f"{first} and {other} have one priority: where SBML chooses at random, the first in the file goes first"
+            )
 
     def depends_on_others(self, event: Event) -> bool:
         """Whether what an event assigns uses what another event changes."""

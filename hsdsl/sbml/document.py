@@ -88,6 +88,7 @@ class SbmlModel:
     equations: list[Node] = field(default_factory=list[Node])
     reactions: dict[str, Reaction] = field(default_factory=dict[str, Reaction])
     events: list[Event] = field(default_factory=list[Event])
+    constraints: list[Element] = field(default_factory=list[Element])
     units: dict[str, Element] = field(default_factory=dict[str, Element])
 
 
@@ -148,6 +149,7 @@ class _Reader:
             reaction = self.reaction(one)
             self.model.reactions[reaction.name] = reaction
         self.rules(element)
+        self.model.constraints = self.listed(element, "Constraints")
         events = enumerate(self.listed(element, "Events"))
         self.model.events = [event for i, one in events if (event := self.event(i, one)) is not None]
 

@@ -335,6 +335,10 @@ class ModelDocument(Document):
     hsdsl: Version = required("The version of the language.", 1)
     title: Text = optional("What the model is, in a few words.", "Bouncing ball")
     source: Text = optional("Where the model comes from.", "Burden et al. 2013, Fig. 1")
+    assumptions: Items[Text] = items(
+        "Sentences on what the model takes for granted, as an import does: each run gives them as warnings.",
+        ["the constraint S <= 2 of the file is not checked"],
+    )
     parameters: Table[Parameter] = mapping(
         "Name: number, expression of earlier parameters, or a mapping with its value.",
         {"g": "9.81", "e": {"value": "0.8", "min": 0, "max": 1}},

@@ -12,7 +12,7 @@ from hsdsl.names import closest, is_identifier, shown
 from hsdsl.source import Key, Mapping, Node, Scalar, child, children, keys
 
 _WORD = re.compile(r"[^\W\d]\w*")
-_FOR_PEOPLE = ("title", "source", "units")
+_FOR_PEOPLE = ("title", "source", "units", "assumptions")
 _OF_STATES = (
     *("modes", "initial", "experiment", "outputs", "scene", "units", "reference"),
     *("flow", "transitions", "reset"),

@@ -11,6 +11,7 @@ from hsdsl.arithmetic import Number
 from hsdsl.execution import Stop
 from hsdsl.names import without_memory
 from hsdsl.program import EdgeProgram, ModeProgram
+from hsdsl.simulate.remarks import Remark, of_edge
 from hsdsl.simulate.stops import show
 
 FREE = 16  # transitions within the relaxation that cost no time; so many are remembered
@@ -25,9 +26,15 @@ TWO_STEP = (
 
 @dataclass
 class Diagnostics:
-    """What a run says of itself besides its transitions; of one kind only the first is kept."""
+    """What a run says of itself besides its transitions; of one kind only the first is kept.
+
+    ``remarks`` are what is to be told first, by the place of the departure that each is about; ``rough`` are surfaces,
+    by mode and number, that are followed roughly from a time on.
+    """
 
     departures: list[str] = field(default_factory=list[str])
+    remarks: dict[int, Remark] = field(default_factory=dict[int, Remark])
+    rough: dict[tuple[str, int], Number] = field(default_factory=dict[tuple[str, int], Number])
     undecided: list[str] = field(default_factory=list[str])
     _noted: set[object] = field(default_factory=set[object])
     _moved: dict[str, tuple[int, Number, Number]] = field(default_factory=dict[str, tuple[int, Number, Number]])
@@ -36,6 +43,7 @@ class Diagnostics:
         """More transitions than cost no time fell within the relaxation."""
         if "crowded" not in self._noted:
             self._noted.add("crowded")
+            self.remarks[len(self.departures)] = Remark("crowded", "", t)
             self.departures.append(
                 f"more than {FREE} transitions within the relaxation, from t = {show(t)} on in strips"
             )
@@ -51,6 +59,7 @@ class Diagnostics:
         before = self._moved.pop(edge, None)
         if before is not None and not still and before[1] == start:
             place, start = before[0], before[2]
+        self.remarks[place] = of_edge("held", edge, start, end)
         self.departures[place : place + 1] = [f"{how} the guard of {edge} from t = {show(start)} to t = {show(end)}"]
         if not still:
             self._moved[edge] = place, end, start
@@ -61,6 +70,7 @@ class Diagnostics:
             if until >= end - 2 * left:  # meanwhile motion along other guards goes on
                 self._moved[other] = place, end, start
         counts = ", ".join(without_memory(edge.target_states[i] for i in edge.counts))
+        self.remarks[len(self.departures)] = of_edge("replaced", edge.name, end)
         self.departures.append(
             f"Zeno at t = {show(end)}: the transitions of {edge.name} after number {number}, all within {show(left)} "
             f"of each other, are replaced by their limit{f'; {counts} has none and keeps its value' * bool(counts)}"
@@ -86,8 +96,8 @@ class Diagnostics:
 
     def unsettled(self, mode: str, k: int, t: Number) -> None:
         """A crossing was found on a piece of a surface that is no polynomial."""
-        if (mode, k) not in self._noted:
-            self._noted.add((mode, k))
+        if (mode, k) not in self.rough:
+            self.rough[mode, k] = t
             self.undecided.append(f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}")
 
 

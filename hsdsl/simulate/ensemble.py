@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,15 @@ from hsdsl.execution import REASONS, Array
 from hsdsl.runtime import structures
 from hsdsl.simulate.compiled import CompiledPlan, task_settings
 from hsdsl.simulate.input_segments import Timeline
+from hsdsl.simulate.remarks import codes_of
 from hsdsl.simulate.settings import Settings
 from hsdsl.simulate.state_layouts import StateLayouts
 
 TIMELINE = np.dtype([("segments", "i8"), ("start", "u8"), ("end", "u8"), ("jump", "u8"), ("data", "u8")])
 LONGEST = f"U{max(map(len, REASONS))}"
+NOTICED = {"in contact": "held", "replaced": "replaced", "unsettled": "rough", "crowded": "crowded"}
+SLID = 16  # the bit of `HS_SLID`
+KINDS_OF_NOTICES = [(SLID, "sliding"), *((structures.NOTICES.index(word), kind) for word, kind in NOTICED.items())]
 LOG_ROOM = 4096  # transitions that a thread keeps before it hands them over
 Logged = tuple[Array, Array, Array]  # transitions as `hs_transition`, and the states before and after each
 
@@ -48,6 +53,8 @@ class Kept:
         self.reason = np.full(instances, -1, np.int32)  # as the compiled loop says it; -1 where it was not run
         self.mode = np.full(instances, -1, np.int32)
         self.kind = np.zeros(instances, np.int32)  # of the last arc's states
+        self.notices = np.zeros(instances, np.int32)  # kinds of them, as the compiled loop says it: a bit each
+        self.noted = np.full(instances, "", object)  # their codes
         self.transitions = np.zeros(instances, np.int64)
         self.ended = np.full(instances, nan)
         self.final = np.full((instances, width), nan)
@@ -64,7 +71,19 @@ class Kept:
         return first, second, third
 
 
-BY_INSTANCE = ("reason", "mode", "kind", "transitions", "ended", "final", "outputs", "crossed", "states", "results")
+BY_INSTANCE = (
+    "reason",
+    "mode",
+    "kind",
+    "notices",
+    "transitions",
+    "ended",
+    "final",
+    "outputs",
+    "crossed",
+    "states",
+    "results",
+)
 
 
 class CompiledEnsemble:
@@ -79,6 +98,8 @@ class CompiledEnsemble:
         )
         self._timelines, self._numbers = _timelines(instances.timelines)
         self._names, self._layouts = names, plan.layouts
+        modes = plan.problem.program.modes
+        self._slides = np.array([bool(mode.slides) for mode in modes] * any(mode.slides for mode in modes), np.int32)
         self._stop = np.zeros(1, np.int32)
 
     @property
@@ -101,7 +122,7 @@ class CompiledEnsemble:
             _row(self._time, first),
         )
         table.settings = ctypes.addressof(self._settings) + first * ctypes.sizeof(structures.Settings)
-        table.stop = self._stop.ctypes.data
+        table.stop, table.slides = self._stop.ctypes.data, self._slides.ctypes.data if len(self._slides) else None
         for name in BY_INSTANCE:
             setattr(table, name, _row(getattr(kept, name), first))
         place.workspace.run_ensemble(table)
@@ -109,6 +130,7 @@ class CompiledEnsemble:
             raise place.workspace.failed[0]
         known = np.array([*structures.STOPPED, "interrupted"], LONGEST)
         kept.stop[first:last] = known[kept.reason[first:last]]
+        kept.noted[first:last] = [_codes(notices) for notices in kept.notices[first:last].tolist()]
         if kept.logs:
             kept.log[first] = place.logged(int(kept.transitions[first:last].sum()))
 
@@ -167,6 +189,12 @@ class ThreadWorkspace:
         first, second, third = (np.concatenate(column)[:count] for column in zip(*self._full, strict=True))
         self._full.clear()
         return first, second, third
+
+
+@cache
+def _codes(notices: int) -> str:
+    """The codes of notices, a bit each."""
+    return codes_of(kind for bit, kind in KINDS_OF_NOTICES if notices >> bit & 1)
 
 
 def _row(array: Any, row: int) -> int:

@@ -102,17 +102,17 @@ class Prepared(Problem):
         self.judges.clear()
         return execution
 
-    def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Stop, int, dict[str, Array]]:
+    def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Stop, CompiledRun, dict[str, Array]]:
         """Run the compiled loop to the end and hand over what it writes, chunk by chunk.
 
-        Returns why it stopped, how many transitions it made, and the last chunk. Raises BecomesStiff: by the judge.
+        Returns why it stopped, the run with what it has noted, and the last chunk. Raises BecomesStiff: by the judge.
         """
         assert self.plan is not None
         under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), self._review())
         if watch is not None:
             watch(under_way)
         stop, rest = under_way.stream(sink)
-        return stop, under_way.made, rest
+        return stop, under_way, rest
 
     def again(self, execution: Execution) -> Execution:
         """Make the same run finer."""

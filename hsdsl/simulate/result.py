@@ -18,6 +18,7 @@ from hsdsl.simulate.compiled import CompiledRun
 from hsdsl.simulate.diagnostics import LEFT_OUT, TWO_STEP, Diagnostics
 from hsdsl.simulate.output_buffers import arcs_of, last_arc, transitions_of
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.remarks import noted, warnings_of
 from hsdsl.simulate.run import Run
 from hsdsl.simulate.settings import Settings
 
@@ -34,6 +35,7 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Repeti
         stop=stop,
         seconds=seconds,
         assessment=partial(_assessment, run, lambda: run.diagnostics),
+        noted=partial(noted, run.program, run.diagnostics),
         repetition=again,
         settings=described(run.settings, run.program.left_out),
         transitions=transitions,
@@ -218,7 +220,7 @@ def _assessment(
     followed: bool = False,
 ) -> Verdict:
     if problem.settings.one_stop is not None:
-        return Verdict("unknown", TWO_STEP)
+        return Verdict("unknown", TWO_STEP, warnings_of((), problem.program))
     from hsdsl.simulate.verdict import RunView, assess  # not every run needs one
 
     return assess(RunView(problem, execution, finer, followed=followed), notes())

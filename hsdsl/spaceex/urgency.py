@@ -25,6 +25,8 @@ from hsdsl.spaceex.formula import Relation, renamed, within
 from hsdsl.spaceex.product import Arrow
 
 STRICT = "<>"
+INWARD = "SpaceEx may also jump where the flow leads back inside; this does not"
+LATER = "SpaceEx may jump later: made as soon as the guard holds"
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class Judge:
         self.conditions(draft, source, leaving)
         self.landing(draft, source, target, [*leaving, *guard])
         if not decide([*on, *guard, negative(rate)]).never:
-            draft.comments.append("SpaceEx may also jump where the flow leads back inside; this does not")
+            draft.comments.append(INWARD)
         return draft
 
     def facet(self, arrow: Arrow, source: ModeDraft, guard: list[Constraint]) -> tuple[Facet | None, Answer | None]:
@@ -80,7 +82,7 @@ class Judge:
             self.refuse(arrow, message, "write a guard with one inequality that the invariant does not imply")
             return None
         draft = TransitionDraft(arrow, open_[0], [], guard, None, [])
-        draft.comments.append("SpaceEx may jump later: made as soon as the guard holds")
+        draft.comments.append(LATER)
         self.landing(draft, source, target, [*source.inside, *guard])
         return draft
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import textwrap
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from hsdsl import __version__
-from hsdsl.names import visible
+from hsdsl.names import counted, visible
 from hsdsl.spaceex.drafts import ModeDraft, TransitionDraft
 from hsdsl.spaceex.formula import renamed, within
 from hsdsl.spaceex.product import Key
 from hsdsl.spaceex.start import Start
+from hsdsl.spaceex.urgency import INWARD, LATER
 
 _WIDTH = 116
 
@@ -28,7 +29,9 @@ def written(
     until: str,
 ) -> str:
     """The model's text."""
-    lines = ["hsdsl: 1", f"title: {_quoted(title)}", f"source: {_quoted(source)}", ""]
+    lines = ["hsdsl: 1", f"title: {_quoted(title)}", f"source: {_quoted(source)}"]
+    assumed = list(_assumed([t for leaving in transitions.values() for t in leaving]))
+    lines += [*(["assumptions:", *(f"  - {_quoted(text)}" for text in assumed)] if assumed else []), ""]
     lines += _comment([f"Imported by hsdsl {__version__}: each transition is made where its guard is reached.", *notes])
     lines += _section("parameters", begin.constants)
     lines += ["", "modes:"]
@@ -38,6 +41,15 @@ def written(
     lines += ["", "initial:", f"  mode: {_plain(drafts[first].place.name)}", *_indented(_entries(states))]
     lines += ["", "experiment:", f"  until: {_plain(until)}"]
     return "\n".join(lines) + "\n"
+
+
+def _assumed(transitions: Sequence[TransitionDraft]) -> Iterator[str]:
+    """Sentences on the choices that every run makes, where SpaceEx has others too."""
+    inward, later = (sum(text in t.comments for t in transitions) for text in (INWARD, LATER))
+    if inward:
+        yield f"{counted(inward, 'transition')} may also be made in SpaceEx where the flow leads back inside, not here"
+    if later:
+        yield f"{counted(later, 'transition')} may be made later in SpaceEx, here as soon as the guard holds"
 
 
 def _mode(draft: ModeDraft, transitions: Sequence[TransitionDraft], drafts: Mapping[Key, ModeDraft]) -> list[str]:

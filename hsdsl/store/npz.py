@@ -21,7 +21,7 @@ import numpy as np
 from hsdsl import decimals
 from hsdsl.calls import checks_arguments
 from hsdsl.errors import UsageError
-from hsdsl.execution import Arc, Array, Execution, Kind, Point, Stop, Transition, Verdict
+from hsdsl.execution import Arc, Array, Execution, Kind, Point, RunWarning, Stop, Transition, Verdict
 from hsdsl.files import open_regular
 from hsdsl.store.lossless import Lossless, numbers
 
@@ -31,6 +31,7 @@ COLUMNS = {"times": 1, "values": 2, "outputs": 2, "depth": 1, "coefficients": 3}
 INTEGERS = tuple(field.name for field in fields(Arc) if field.type == "int")
 KINDS: tuple[Kind, ...] = ("flow", "strip")
 _TEXTS = ("model", "digest", "engine", "scheme", "method", "settings", "seconds", "digits", "title", "output_names")
+_OF_VERDICT = ("theorem", "reasons")  # its warnings are beside it
 _BEGINNING = b"PK\x03\x04"
 _DAMAGED = "it is damaged, or not an execution that hsdsl saved"
 
@@ -38,7 +39,8 @@ _DAMAGED = "it is damaged, or not an execution that hsdsl saved"
 def save_npz(execution: Execution, file: BinaryIO) -> None:
     """Write an execution, everything but its ``output_function``."""
     columns = {name: getattr(execution, name) for name in COLUMNS}
-    records = [asdict(record) for record in (execution.final, execution.stop, *execution.transitions)]
+    told = execution.warnings
+    records = [asdict(record) for record in (execution.final, execution.stop, *execution.transitions, *told)]
     loose = numbers([records, execution.settings, execution.overrides])
     packed = (x for column in columns.values() if column.dtype == object for x in column.ravel())
     form = Lossless(max(decimals.bits(packed), decimals.bits(loose)), execution.digits)
@@ -54,7 +56,8 @@ def save_npz(execution: Execution, file: BinaryIO) -> None:
         "overrides": form.pack(execution.overrides),
         "stop": form.pack_fields(execution.stop),
         "final": form.pack_fields(execution.final),
-        "verdict": form.pack_fields(execution.verdict),
+        "verdict": {name: form.pack(getattr(execution.verdict, name)) for name in _OF_VERDICT},
+        "warnings": [form.pack_fields(warning) for warning in told],
         "transitions": [form.pack_fields(transition) for transition in execution.transitions],
     }
     text = np.frombuffer(json.dumps(header, allow_nan=False).encode(), dtype=np.uint8)
@@ -121,7 +124,7 @@ def _read(archive: Mapping[str, Array]) -> Execution:
     execution = Execution(
         stop=Stop(**form.unpack(header["stop"])),
         final=Point(**form.unpack(header["final"])),
-        verdict=Verdict(**form.unpack(header["verdict"])),
+        verdict=Verdict(**form.unpack(header["verdict"]) | {"warnings": _warnings(header, form)}),
         transitions=tuple(Transition(**form.unpack(record)) for record in header["transitions"]),
         arcs=arcs,
         **fields,
@@ -130,10 +133,17 @@ def _read(archive: Mapping[str, Array]) -> Execution:
     return execution
 
 
+def _warnings(header: Mapping[str, Any], form: Lossless) -> tuple[RunWarning, ...]:
+    """The warnings; files of earlier versions have none."""
+    return tuple(RunWarning(**form.unpack(record)) for record in header.get("warnings", ()))
+
+
 def _check(execution: Execution) -> None:
     """Check the declared types, which an execution does not check itself; TypeError where a part has another."""
     _check_fields(execution, {*_TEXTS})
-    for record in (execution.stop, execution.final, execution.verdict, *execution.transitions, *execution.arcs):
+    _check_fields(execution.verdict, _OF_VERDICT)
+    records = execution.stop, execution.final, *execution.transitions, *execution.arcs, *execution.warnings
+    for record in records:
         _check_fields(record, {field.name for field in fields(record)})
     for name, dimensions in COLUMNS.items():
         column: Array = getattr(execution, name)

@@ -117,6 +117,16 @@ class Sweep:
             counts.update(table.column(0).to_pylist())
         return dict(counts.most_common())
 
+    @cached_property
+    def warning_counts(self) -> dict[str, int]:
+        """How many runs have which warning, by its code."""
+        counts = Counter[str]()
+        for table in self.batches(["warnings"] if "warnings" in self.columns else []):
+            counts.update(
+                code for codes in table.columns for text in codes.to_pylist() for code in (text or "").split()
+            )
+        return dict(counts.most_common())
+
     def plot(
         self, path: str | os.PathLike[str], of: str | None = None, *, tail: float = 0.5, over: str | None = None
     ) -> None:

@@ -24,12 +24,16 @@ EXAMPLE = "for example --record final,transitions,outputs:every=0.1"
 
 @dataclass(frozen=True)
 class Recording:
-    """What is kept: ``samples`` is a number of samples, the time between them, or None."""
+    """What is kept: ``samples`` is a number of samples, the time between them, or None.
+
+    ``warnings`` are always kept; datasets of earlier versions have none.
+    """
 
     final: bool = False
     transitions: bool = False
     samples: int | str | None = None
     verdict: bool = False
+    warnings: bool = False
 
     def plain(self) -> dict[str, Any]:
         """As in a manifest."""
@@ -42,7 +46,7 @@ def read(given: str | Sequence[str]) -> Recording:
     Raises UsageError: an unknown word, or samples without their number.
     """
     parts = given.split(",") if isinstance(given, str) else given
-    found: dict[str, Any] = {}
+    found: dict[str, Any] = {"warnings": True}
     for part in (part.strip() for part in parts):
         word, colon, how = part.partition(":")
         if word not in WORDS or (word == "outputs") != bool(colon):

@@ -6,6 +6,8 @@
 a varied name                           its value; ``parameter.stop`` for a parameter with the name of a column
 ``stop``, ``message``                   why it ended, a sentence where it did not get to where it was going
 ``verdict``                             whether the theorem holds; null where that was not looked at
+``warnings``                            codes of `hsdsl.errors.WARNINGS`, with a space between two: what the run itself
+                                        noted, and with verdicts all of its warnings, but for those of the file alone
 ``time``, ``mode``, ``transitions``     when and where it ended, and how many transitions it made
 ``final.x``                             states and outputs at the end
 ``transition.time``, ``.name``          lists: every transition, and the states ``before.x`` and ``after.x``
@@ -29,7 +31,7 @@ from hsdsl.execution.samples import optional
 from hsdsl.simulate.stops import limit
 from hsdsl.sweep.manifest import Manifest
 
-FIXED = ("row", "stop", "message", "verdict", "time", "mode", "transitions")
+FIXED = ("row", "stop", "message", "verdict", "warnings", "time", "mode", "transitions")
 TAG = b"hsdsl.sweep"
 LISTS = ("transition", "before", "after", "sample")
 
@@ -50,7 +52,9 @@ def schema(manifest: Manifest) -> Any:
     number, text, recording = arrow.float64(), arrow.string(), manifest.recording
     columns: list[tuple[str, Any]] = [("row", arrow.int64())]
     columns += [(column_of(name), number) for name in manifest.variation.names]
-    columns += [("stop", text), ("message", text), ("verdict", text), ("time", number), ("mode", text)]
+    columns += [("stop", text), ("message", text), ("verdict", text)]
+    columns += [("warnings", text)] if recording.warnings else []
+    columns += [("time", number), ("mode", text)]
     columns += [("transitions", arrow.int64())]
     names = (*manifest.states, *manifest.outputs)
     if recording.final:
@@ -125,6 +129,8 @@ def _words(manifest: Manifest, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
     """Messages of failures, and verdicts."""
     count, judged = ensemble.stop.size, manifest.recording.verdict
     messages, verdicts, reasons = (np.full(count, None, object) for _ in range(3))
+    warnings = ensemble.warnings.astype(object)
+    warnings[np.isin(ensemble.stop, ("refused", "interrupted"))] = None
     verdicts[np.isin(ensemble.stop, LEFT)] = "left"
     for k in range(count) if judged else np.flatnonzero(ensemble.failed).tolist():
         reason = str(ensemble.stop[k])
@@ -137,8 +143,10 @@ def _words(manifest: Manifest, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
             messages[k] = None if run.stop.complete else run.stop.message
             if judged:
                 verdicts[k], reasons[k] = run.verdict.theorem, run.verdict.reasons
+                warnings[k] = " ".join(sorted({each.code for each in run.warnings if each.time is not None}))
     yield "message", messages
     yield "verdict", verdicts
+    yield "warnings", warnings
     yield "verdict.reasons", reasons
 
 

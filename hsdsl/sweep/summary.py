@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsdsl.errors import WARNINGS
 from hsdsl.execution import Array
 from hsdsl.names import called, counted, visible
 from hsdsl.sweep.manifest import Manifest
@@ -22,7 +23,7 @@ def as_json(sweep: Sweep) -> dict[str, Any]:
     """The numbers of a sweep, and where it is."""
     described = sweep.manifest.plain()
     vary = [{key: value for key, value in item.items() if key != "values"} | _span(item) for item in described["vary"]]
-    counts = {"done": sweep.done, "complete": sweep.complete, "stops": sweep.reasons}
+    counts = {"done": sweep.done, "complete": sweep.complete, "stops": sweep.reasons, "warnings": sweep.warning_counts}
     return {"folder": str(sweep.folder)} | {key: described[key] for key in KEPT} | {"vary": vary} | counts
 
 
@@ -39,7 +40,7 @@ def summary(sweep: Sweep) -> str:
     stops = "stops  " + ", ".join(f"{count:,} {reason}" for reason, count in sweep.reasons.items())
     title = visible(called(manifest.title, manifest.model))
     described = (f"  {text}" for text in _described(manifest))
-    return "\n".join([title, *described, share, stops, *_failures(sweep), *_ranges(sweep)])
+    return "\n".join([title, *described, share, stops, *_failures(sweep), *_warnings(sweep), *_ranges(sweep)])
 
 
 def _described(manifest: Manifest) -> Iterator[str]:
@@ -62,6 +63,12 @@ def _failures(sweep: Sweep) -> Iterator[str]:
     for reason, message in messages.items():
         more = ", the first of them" if sweep.reasons[reason] > 1 else ""
         yield f"  {reason}{more}: {visible(message)}"
+
+
+def _warnings(sweep: Sweep) -> Iterator[str]:
+    """How many runs have which warning."""
+    for code, count in sweep.warning_counts.items():
+        yield f"  {code} in {counted(count, 'row')}: {WARNINGS.get(code, 'of another version')}"
 
 
 def _ranges(sweep: Sweep) -> Iterator[str]:

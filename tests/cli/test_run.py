@@ -28,8 +28,8 @@ initial: {mode: fall, h: 1, v: 0}
 experiment: {until: 1.5, tolerance: 1e-9}
 """
 KEYS = [
-    "model", "engine", "scheme", "method", "settings", "overrides", "stop", "transitions", "final", "verdict",
-    "seconds",
+    "model", "engine", "scheme", "method", "settings", "overrides", "stop", "transitions", "final", "warnings",
+    "verdict", "seconds",
 ]  # fmt: skip
 TRANSITION = ["index", "time", "resumed", "edge", "from", "to", "before", "after", "alternatives"]
 

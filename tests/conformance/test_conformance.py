@@ -15,6 +15,7 @@ stop                      reason, time, within, message (words it must contain)
 final                     mode, state (all of it), outputs, within
 grid                      every row's time is a multiple of the step
 rows                      times that must be rows
+warnings                  all of them, in order: code, ``edge``, ``at`` and how ``often`` (1); unchecked when left out
 ========================= ==========================================================================================
 
 Expectations are arithmetic over ``eps`` (the relaxation), ``h`` (the step, 0 for an adaptive method), ``u`` (unit
@@ -110,6 +111,16 @@ class Final:
 
 
 @dataclass(frozen=True)
+class Warned:
+    """One expected warning."""
+
+    code: str
+    edge: str | None = None
+    at: str | None = None
+    often: str = "1"
+
+
+@dataclass(frozen=True)
 class Run:
     """One entry of a case's ``runs``."""
 
@@ -123,12 +134,14 @@ class Run:
     final: Final | None
     grid: bool
     rows: list[str]
+    warnings: list[Warned] | None
 
     @classmethod
     def of(cls, raw: dict[str, Any]) -> Run:
         """From a file's mapping; raises on keys that mean nothing."""
         raw = dict(raw)
         transitions, final = raw.pop("transitions", None), raw.pop("final", None)
+        warned = raw.pop("warnings", None)
         run = cls(
             stop=Stop(**raw.pop("stop")),
             arguments=raw.pop("with", {}),
@@ -140,6 +153,7 @@ class Run:
             final=final and Final(**final),
             grid=raw.pop("grid", "false") == "true",
             rows=raw.pop("rows", []),
+            warnings=None if warned is None else [Warned(**one) for one in warned],
         )
         if raw or (run.transitions is None) == (run.count is None):
             raise ValueError(f"unknown keys {list(raw)}, or not exactly one of transitions and count")
@@ -256,6 +270,15 @@ class Comparison:
             for name, right in run.final.outputs.items():
                 self.same(final.outputs[name], right, f"final output {name}", run.final.within)
 
+    def warnings(self, expected: list[Warned]) -> None:
+        """Assert what the run tells first."""
+        told = self.execution.warnings
+        assert [(one.code, one.edge) for one in told] == [(one.code, one.edge) for one in expected], told
+        for actual, one in zip(told, expected, strict=True):
+            if one.at is not None:
+                self.same(actual.time, one.at, f"time of {one.code}", "2e-13")  # it is found in floats
+            assert (f" {one.often} times, first " in actual.message) == (one.often != "1"), actual.message
+
     def rows(self, run: Run, scheme: str) -> None:
         """Assert what the run says of the times of its rows."""
         times = [mp.mpf(t) for t in self.execution.times]
@@ -317,6 +340,8 @@ def test_conformance(name: str, run: Run, setting: str, scheme: str, engine: str
         assert run.transitions is None or len(edges) == len(run.transitions), edges
         comparison.end(run)
         comparison.rows(run, scheme)
+        if run.warnings is not None:
+            comparison.warnings(run.warnings)
 
 
 def test_every_model_has_expectations() -> None:

@@ -4,9 +4,9 @@ import pytest
 from lint.fragments import blocks, completed
 
 from hsdsl.elaborate import elaborate
-from hsdsl.errors import CODES, ModelError
+from hsdsl.errors import CODES, WARNINGS, ModelError
 from hsdsl.lint import RULES
-from hsdsl.lint.pages import error_pages, pages, rule_pages, titles
+from hsdsl.lint.pages import error_pages, pages, rule_pages, titles, warning_pages
 
 # not UTF-8; large files, mappings, expressions and nests; a minute of work
 WITHOUT_EXAMPLE = {"HS001", "HS003", "HS015", "HS016", "HS110", "HS122", "HS123"}
@@ -28,7 +28,8 @@ def codes_found(page, heading, folder):
 def test_every_code_has_a_page_and_a_title():
     assert list(error_pages()) == list(CODES)
     assert list(rule_pages()) == list(RULES)
-    assert set(pages()) == set(titles()) == {*CODES, *RULES}
+    assert list(warning_pages()) == list(WARNINGS)
+    assert set(pages()) == set(titles()) == {*CODES, *WARNINGS, *RULES}
 
 
 @pytest.mark.parametrize("code", [code for code in CODES if code not in WITHOUT_EXAMPLE])
@@ -38,7 +39,7 @@ def test_examples(code, tmp_path):
     assert codes_found(page, "Use instead", tmp_path) == set()
 
 
-@pytest.mark.parametrize("code", CODES)
+@pytest.mark.parametrize("code", [*CODES, *WARNINGS])
 def test_a_page_says_something_beside_its_examples(code):
-    title, text, *_ = error_pages()[code].split("\n\n")
+    title, text, *_ = pages()[code].split("\n\n")
     assert title.endswith(".") and text.endswith(".") and not text.startswith("#")

@@ -78,6 +78,12 @@ class Surface:
             yield 0.0
         yield from (s for s in roots(self.along) if polyval(s, polyder(self.along)) > 0)
 
+    def passings(self) -> list[float]:
+        """When it is crossed while its `if` is false."""
+        if self.margin is None:
+            return []
+        return [s for s in self.crossings() if polyval(s, self.margin) < 0]
+
     def fires(self) -> float | None:
         """When it fires."""
         for s in self.crossings():
@@ -117,9 +123,13 @@ def surface(rng: random.Random, x: Poly, y: Poly) -> Surface:
     return Surface(f"{text} >= {level}", along, condition, margin if conditional else None)
 
 
-def draw(rng: random.Random, modes: int = 4) -> tuple[str, list[tuple[str, float]]]:
-    """A chain of modes, and the edges that fire with the times since their modes were entered."""
+def draw(rng: random.Random, modes: int = 4) -> tuple[str, list[tuple[str, float]], dict[str, list[float]]]:
+    """A chain of modes, the edges that fire with the times since their modes were entered, and when others are passed.
+
+    These are surfaces that are crossed while their `if` is false.
+    """
     text, expected, stays = "hsdsl: 1\nmodes:\n", list[tuple[str, float]](), False
+    passed: dict[str, list[float]] = {}
     starts = [[fraction(rng) for _ in range(2)] for _ in range(modes + 1)]
     for i in range(modes):
         (ax, bx), (ay, by) = ((fraction(rng) if rng.random() < 0.8 else Fraction(0), fraction(rng)) for _ in range(2))
@@ -136,16 +146,26 @@ def draw(rng: random.Random, modes: int = 4) -> tuple[str, list[tuple[str, float
         fired = sorted(one for one in firsts if one[0] < LAST)
         if any(b[0] - a[0] < APART for a, b in pairwise(fired)) or any(abs(s - LAST) < APART for s, _ in firsts):
             raise TooClose
+        entered, left = sum(s for _, s in expected), fired[0][0] if fired else float(LAST)
+        for k, one in enumerate(surfaces):
+            if times := [s for s in one.passings() if s < left]:
+                passed[f"e{i}{k}"] = [entered + s for s in times]
+            if any(abs(s - left) < APART for s in one.passings()):
+                raise TooClose
         if fired:
             expected.append((fired[0][1], fired[0][0]))
         stays = not fired
     text += f"  m{modes}: {{flow: {{x: 0, y: 0, s: 1}}}}\n"
     end = sum(s for _, s in expected) + LAST
     first = f"x: {starts[0][0]}, y: {starts[0][1]}, s: 0"
-    return text + f"initial: {{mode: m0, {first}}}\nexperiment: {{until: {end!r}, relaxation: 1e-6}}\n", expected
+    return (
+        text + f"initial: {{mode: m0, {first}}}\nexperiment: {{until: {end!r}, relaxation: 1e-6}}\n",
+        expected,
+        passed,
+    )
 
 
-def drawn(seed: int) -> tuple[str, list[tuple[str, float]]]:
+def drawn(seed: int) -> tuple[str, list[tuple[str, float]], dict[str, list[float]]]:
     rng = random.Random(seed)
     while True:
         try:
@@ -155,7 +175,7 @@ def drawn(seed: int) -> tuple[str, list[tuple[str, float]]]:
 
 
 def check(seed: int, settings: Any, engines: Any) -> int:
-    text, expected = drawn(seed)
+    text, expected, passed = drawn(seed)
     model = Model(elaborate("random.yaml", text=text.encode()))
     for scheme, arguments in settings:
         for engine in engines:
@@ -166,6 +186,12 @@ def check(seed: int, settings: Any, engines: Any) -> int:
             for made, (_, exact) in zip(run.transitions, expected, strict=True):
                 assert made.time - entered == pytest.approx(exact, abs=1e-7 if exact else TANGENTIAL), what
                 entered = made.resumed
+            told = {w.edge: w for w in run.warnings if w.code == "HS701"}
+            assert told.keys() == passed.keys(), (what, told, passed)
+            for edge, times in passed.items():
+                sharp = scheme == "located" and min(times) > 0  # else late by strips, or within round-off for a while
+                assert told[edge].time == pytest.approx(min(times), abs=1e-7 if sharp else 10 * TANGENTIAL), what
+                assert (f" {len(times)} times," in told[edge].message) == (len(times) > 1), what
     return len(expected)
 
 

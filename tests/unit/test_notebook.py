@@ -178,7 +178,7 @@ def test_an_ensemble_shows_what_varied_and_how_it_ended(ensemble, ball):
 def test_runs_of_an_ensemble_are_a_table(ensemble):
     frame = ensemble.to_pandas()
     assert frame.index.names == ["instance_0", "instance_1"] and len(frame) == 8
-    names = ["e", "initial.h", "stop", "time", "mode", "transitions", "transition_0", "transition_1"]
+    names = ["e", "initial.h", "stop", "time", "mode", "transitions", "warnings", "transition_0", "transition_1"]
     assert list(frame.columns) == [*names, "h", "v", "energy"]
     row = frame.loc[(2, 1)]
     run: Execution = ensemble.run(2, 1)

@@ -47,12 +47,13 @@ def test_json_has_the_keys_of_the_contract_in_order():
             }
         ],
         "final": {"time": 4.125, "mode": "fly", "state": {"h": 0.0, "v": -1.0}, "outputs": {"energy": 0.5}},
+        "warnings": [],
         "verdict": {"theorem": "unknown", "reasons": ["nothing checks the hypotheses yet"]},
         "seconds": {"load": 0.25, "compile": 0.01, "simulate": 0.5},
     }
     assert list(run) == [
-        "model", "engine", "scheme", "method", "settings", "overrides", "stop", "transitions", "final", "verdict",
-        "seconds",
+        "model", "engine", "scheme", "method", "settings", "overrides", "stop", "transitions", "final", "warnings",
+        "verdict", "seconds",
     ]  # fmt: skip
     assert list(run["transitions"][0]) == [
         "index", "time", "resumed", "edge", "from", "to", "before", "after", "alternatives",

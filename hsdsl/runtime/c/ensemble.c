@@ -56,11 +56,41 @@ static void note_transitions(hs_ensemble *e) {
   e->made += chunk->transitions;
 }
 
+/* Whether two times are one as people are shown them: see `in_contact` in hsdsl/simulate/diagnostics.py. */
+static int shown_alike(hs_time a, hs_time b) {
+  char one[32], other[32];
+  snprintf(one, sizeof one, "%.10g", (double)a);
+  snprintf(other, sizeof other, "%.10g", (double)b);
+  return !strcmp(one, other);
+}
+
+/* Which kinds of notices the chunk has, and whether it slides; a wall that ends the run was not followed roughly. */
+static void keep_notices(hs_ensemble *e, int ended) {
+  const hs_chunk *chunk = &e->task.chunk;
+  int32_t *notices = &e->notices[e->done];
+  for (int64_t i = 0; i < chunk->notes; i++) {
+    const hs_note *note = &chunk->note[i];
+    if (note->kind == HS_IN_CONTACT && shown_alike(note->time, note->other)) continue;
+    if (note->kind == HS_UNSETTLED &&
+        (note->surface < e->task.model->mode[note->mode].edges ||
+         (ended && e->task.stop.reason == HS_LEFT && e->task.stop.time == note->time)))
+      continue;
+    *notices |= 1 << note->kind;
+  }
+  for (int64_t k = 0; e->slides && k < chunk->arcs; k++) {
+    const int64_t first = chunk->arc[k].first - e->base;
+    const int64_t end = k + 1 < chunk->arcs ? chunk->arc[k + 1].first - e->base : chunk->rows;
+    if (e->slides[chunk->arc[k].mode] && end > first && chunk->times[end - 1] > chunk->times[first > 0 ? first : 0])
+      *notices |= HS_SLID;
+  }
+}
+
 /* Let go of all rows of a full chunk but the last one, which the next piece begins at. */
 static int let_go(hs_task *task) {
   hs_ensemble *e = (hs_ensemble *)task;
   hs_chunk *chunk = &task->chunk;
   const int64_t last = chunk->rows - 1, w = task->model->width, m = task->model->outputs;
+  keep_notices(e, 0);
   if (last >= 0) {
     int64_t kept = chunk->arcs - 1;
     sample_chunk(e, 0);
@@ -86,6 +116,7 @@ static void keep(hs_ensemble *e) {
   const hs_chunk *chunk = &e->task.chunk;
   const int64_t i = e->done, last = chunk->rows - 1, w = e->task.model->width, m = e->task.model->outputs;
   int64_t arc = chunk->arcs - 1;
+  keep_notices(e, 1);
   sample_chunk(e, 1);
   note_transitions(e);
   while (arc > 0 && chunk->arc[arc].first > e->base + last) arc--;

@@ -103,6 +103,8 @@ typedef struct {
 
 typedef enum { HS_CROWDED, HS_IN_CONTACT, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES, HS_COUPLED } hs_notice;
 
+#define HS_SLID (1 << 16) /* beside the bits of notices: the run slid between two modes */
+
 /* A diagnostic: see hsdsl/simulate/diagnostics.py. `surface` is an edge, but for HS_UNSETTLED. */
 typedef struct {
   int32_t kind;
@@ -280,6 +282,8 @@ typedef struct hs_ensemble {
   const int32_t *stop;         /* not 0: end as soon as possible */
   int32_t *reason, *mode;      /* (instances) */
   int32_t *kind;               /* (instances): layout of the last arc */
+  const int32_t *slides;       /* (modes): whether one is motion between two modes; 0 where none is */
+  int32_t *notices;            /* (instances): kinds of notices, a bit each, and HS_SLID */
   int64_t *transitions;        /* (instances): how many were made */
   double *ended;               /* (instances): the last time */
   double *final;               /* (instances, width) */

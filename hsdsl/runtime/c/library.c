@@ -1,5 +1,7 @@
 /* The runtime as this package loads it: also whole runs as one array, many runs at once, and the screen of verdicts. */
 
+#include <stdio.h>
+
 #define HS_MOVES /* exported programs have no verdict, so none of their runs is moved */
 #include "hs.c"
 

@@ -26,6 +26,7 @@ allows itself.
 `landings`          does a reset land within the error of a surface, or jump?
 `misses`            surfaces that are almost reached or passed over; `endings`: what happens at the end
 `tangent`           arcs that leave a surface tangentially, as where sliding ends
+`remarked`          what a run tells first, whatever its verdict; `passings`: by its rows
 `transparent`       surfaces that are passed where their condition is false
 `flows`             does the flow vary unseen, jump, or have a slope without bound?
 `expansions`        operations along parts of steps, and what they leave unresolved; `expanded`: functions of these
@@ -49,6 +50,7 @@ from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import together
 from hsdsl.simulate.verdict.crossings import summary
 from hsdsl.simulate.verdict.finding import Finding
+from hsdsl.simulate.verdict.remarked import remarked
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import Margins
 from hsdsl.simulate.verdict.shadow import has_shadow, is_compiled
@@ -70,18 +72,24 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
+    verdict, looked_at = _judged(run, diagnostics)
+    return Verdict(verdict.theorem, verdict.reasons, remarked(looked_at, diagnostics))
+
+
+def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
+    """The verdict, and the view that it is of."""
     if run.stop.reason == "interrupted":  # nobody waits for what could not decide it
         if diagnostics.departures:
-            return Verdict("left", _once(diagnostics.departures))
-        return Verdict("unknown", _once(diagnostics.undecided, [_incomplete(run.stop)]))
+            return Verdict("left", _once(diagnostics.departures)), run
+        return Verdict("unknown", _once(diagnostics.undecided, [_incomplete(run.stop)])), run
     noted = diagnostics.departures or diagnostics.undecided
     if not (noted or run.against or run.followed) and has_shadow(run.problem, run.execution):
         by_shadow = replace(run, by_shadow=True)
         if by_shadow.screen is not None or not is_compiled(run.execution):
             found = _assessed(by_shadow, diagnostics)
             if found.theorem == "holds":
-                return found
-    return _assessed(run, diagnostics)
+                return found, by_shadow
+    return _assessed(run, diagnostics), run
 
 
 def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
@@ -91,6 +99,7 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
     screen = run.screen
     entered_inside = run.by_shadow or not run.execution.enters_beyond
     if not unknown and screen is not None and not screen.undecided() and entered_inside:
+        run.remarks = []
         return Verdict("holds", margins_of(run.problem.program, run.execution.made, screen.margins, screen.commuting))
     from hsdsl.simulate.verdict.findings import findings_of  # of a run that the screen leaves undecided
 

@@ -17,6 +17,12 @@ from hsdsl.simulate.verdict.run_view import RunView
 
 def slidings(run: RunView) -> Iterator[str]:
     """Say where the run slid on a surface that two modes press on: the theorem knows no such motion."""
+    for modes, start, end in sliding_spans(run):
+        yield f"sliding between {' and '.join(modes)} from t = {show(start)} to t = {show(end)}"
+
+
+def sliding_spans(run: RunView) -> Iterator[tuple[tuple[str, ...], Number, Number]]:
+    """Give the modes between which the run slid, and from when to when."""
     modes = {mode.name: mode.slides for mode in run.problem.program.modes if mode.slides}
     spans: list[tuple[str, Number, Number]] = []
     for arc in run.flows if modes else ():
@@ -25,8 +31,7 @@ def slidings(run: RunView) -> Iterator[str]:
             if spans and spans[-1][::2] == (arc.mode, start):  # a jump or a kink of an input ended the arc before
                 start = spans.pop()[1]
             spans.append((arc.mode, start, end))
-    for mode, start, end in spans:
-        yield f"sliding between {' and '.join(modes[mode])} from t = {show(start)} to t = {show(end)}"
+    yield from ((modes[mode], start, end) for mode, start, end in spans)
 
 
 def accumulations(run: RunView) -> Iterator[str]:

@@ -6,7 +6,10 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.execution import Execution, Verdict
+from hsdsl.program import Program
 from hsdsl.simulate.verdict import RunView, assess, margins_of
+from hsdsl.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.simulate.verdict.remarked import ends_beyond, may_end_beyond
 from hsdsl.simulate.verdict.screen import screens_of
 
 if TYPE_CHECKING:
@@ -24,7 +27,13 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
         return assess(RunView(problem, execution, screen_made=screen), under_way.diagnostics)
     shown = problem.program, compiled.made, screen.margins, screen.commuting
     screens.leave(screen)
-    return Verdict.deferred(_LATER, theorem="holds", _shown=shown)
+    warnings = ends_beyond(RecordedRun(problem, execution)) if _has_more(problem.program, execution) else ()
+    return Verdict.deferred(_LATER, theorem="holds", warnings=warnings, _shown=shown)
+
+
+def _has_more(program: Program, execution: Execution) -> bool:
+    """Whether a run may have warnings though nothing is undecided."""
+    return bool(program.assumptions) or may_end_beyond(execution, program)
 
 
 _LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: margins_of(*verdict._shown)}

@@ -20,11 +20,14 @@ class Finding:
         What it makes of the verdict.
     sentence : str
         For a person.
+    wall : tuple of str and number, or None
+        A wall that the run was beyond, and when.
     """
 
     kind: str
     theorem: Literal["left", "unknown"]
     sentence: str
+    wall: tuple[str, Number] | None = None
 
 
 MOST_NAMED = 10**6

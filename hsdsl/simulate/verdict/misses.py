@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from hsdsl.arithmetic import DOMAIN_ERRORS, NOTHING, Number
 from hsdsl.execution import Arc
+from hsdsl.simulate.remarks import Remark, of_edge
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.endings import at_its_end, at_the_end
@@ -82,6 +83,8 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
             found.append(Finding("no value", "unknown", sentence))
     margins = _margins(run, nearest) if not found else []
     ended = at_the_end(run) if run.undecided("ending") else ()
+    run.remarks = [of_edge("passed", name, time) for name, times in passed.items() for time in times]
+    run.remarks += [Remark("beyond", *each.wall) for each in found if each.wall is not None]
     return [*found, *ended], [*margins, *(passed_at(name, at) for name, at in passed.items())]
 
 

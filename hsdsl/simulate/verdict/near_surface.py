@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hsdsl.arithmetic import Number
+from hsdsl.simulate.remarks import wall_of
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
@@ -40,7 +41,8 @@ def near_surface(run: RunView, place: Place, k: int, row: int, how: str) -> Find
 def passed_over(place: Place, k: int) -> Finding:
     """The finding that a step was beyond a surface."""
     sentence = f"inside a step, at t = {show(place.t)}, the run is beyond the surface of {place.name(k)}"
-    return Finding("passed over", "unknown", f"{sentence}: transitions were passed over")
+    wall = (wall_of(place.mode, k), place.t) if k >= len(place.mode.edges) else None
+    return Finding("passed over", "unknown", f"{sentence}: transitions were passed over", wall)
 
 
 def _level(run: RunView, place: Place, k: int) -> Number:

@@ -11,6 +11,7 @@ from hsdsl.enclosures import Range, Undecided, as_range
 from hsdsl.integrators.stepper import State
 from hsdsl.kernel import ModeKernel
 from hsdsl.program import ModeProgram
+from hsdsl.simulate.remarks import wall_of
 from hsdsl.simulate.surfaces import Surfaces
 
 ALONG = 1e-3  # of what a surface may change by: less is along it
@@ -114,4 +115,4 @@ class Place:
     def name(self, k: int) -> str:
         """Surface k for a person."""
         edges = self.mode.edges
-        return edges[k].name if k < len(edges) else f"the wall {self.mode.walls[k - len(edges)]} of {self.mode.name}"
+        return edges[k].name if k < len(edges) else f"the wall {wall_of(self.mode, k)}"

@@ -12,6 +12,7 @@ from hsdsl.arithmetic import Number
 from hsdsl.execution import Arc, Execution, Transition
 from hsdsl.integrators.stepper import State
 from hsdsl.program import ModeProgram
+from hsdsl.simulate.remarks import Remark
 from hsdsl.simulate.surfaces import Surfaces
 from hsdsl.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.simulate.verdict.exact_states import exactly_known
@@ -38,6 +39,8 @@ class RunView(RecordedRun):
         Whether errors are those that a shadow run shows, not a finer run.
     screen_made : Screen or None
         The screen of a run with a shadow run, where it was made already.
+    remarks : list of Remark or None
+        What the look along its steps remarks of surfaces that were passed; None where nothing has looked along them.
     """
 
     against: Execution | None = None
@@ -45,6 +48,7 @@ class RunView(RecordedRun):
     followed: bool = False
     by_shadow: bool = False
     screen_made: Screen | None = None
+    remarks: list[Remark] | None = None
 
     @cached_property
     def errors(self) -> Errors | None:

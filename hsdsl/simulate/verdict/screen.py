@@ -19,6 +19,7 @@ from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import runtime
 from hsdsl.simulate.columns import Columns
 from hsdsl.simulate.problem import Problem
+from hsdsl.simulate.remarks import wall_of
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.correction import INSIDE, POLE, correction
 from hsdsl.simulate.verdict.finding import times
@@ -54,7 +55,7 @@ class Margins(NamedTuple):
             return []
         mode, k = modes[self.mode], self.surface
         edges = mode.edges
-        name = edges[k].name if k < len(edges) else f"the wall {mode.walls[k - len(edges)]} of {mode.name}"
+        name = edges[k].name if k < len(edges) else f"the wall {wall_of(mode, k)}"
         return [f"the nearest miss is of {name} at t = {show(self.missed)}, by {times(self.margin)} the error"]
 
 

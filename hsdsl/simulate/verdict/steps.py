@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from hsdsl.bernstein import Array, around_middle, from_powers, halving
 from hsdsl.enclosures import Range, as_range
+from hsdsl.execution import Execution
 from hsdsl.kernel import ModeKernel
 from hsdsl.simulate.verdict.expansions import Expansion, line, polynomial
+from hsdsl.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.simulate.verdict.run_view import RunView
 
 MOST_PARTS = 1 << 15  # enclosed together
@@ -123,36 +125,49 @@ def steps_of(run: RunView, places: int | None = None, marked: str = "") -> Itera
     if marks is not None and not marks.any():
         return
     times = np.asarray(run.execution.times, dtype=float)
-    ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
-    for (mode, states), arcs in groupby(ordered, key=lambda arc: (run.index(arc.mode), arc.states)):
-        if states != run.problem.program.modes[mode].states:
-            continue  # a final mode flows as the one before it
-        rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
-        rows = rows[(times[rows + 1] > times[rows]) & (times[rows] <= run.reliable_until)]
+    for mode, states, rows in rows_by_mode(run):
+        rows = rows[times[rows] <= run.reliable_until]
         rows = rows if marks is None else rows[marks[rows] != 0]
         rows = rows[:: max(1, len(rows) // places)] if places else rows
         for first in range(0, len(rows), MOST_PARTS):
             yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
 
 
+def rows_by_mode(run: RecordedRun) -> Iterator[tuple[int, tuple[str, ...], NDArray[np.int64]]]:
+    """Give modes and states of all arcs of flow, with the rows at which their steps begin."""
+    times = np.asarray(run.execution.times, dtype=float)
+    ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
+    for (mode, states), arcs in groupby(ordered, key=lambda arc: (run.index(arc.mode), arc.states)):
+        if states == run.problem.program.modes[mode].states:  # a final mode flows as the one before it
+            rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
+            yield mode, states, rows[times[rows + 1] > times[rows]]
+
+
 def _steps(run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int64]) -> Parts:
     execution, n, errors = run.execution, len(states), run.errors
     times = np.asarray(execution.times, dtype=float)
-    values = np.asarray(execution.values[rows, :n], dtype=float)
-    powers = np.asarray(execution.coefficients[rows, :, :n], dtype=float)
-    if powers.shape[1] == 0:
-        powers = (np.asarray(execution.values[rows + 1, :n], dtype=float) - values)[:, None, :]
-    whole = np.concatenate([values[:, None, :], np.nan_to_num(powers)], axis=1).transpose(0, 2, 1)
+    values, powers = pieces_at(execution, rows, n)
+    whole = np.concatenate([values[:, None, :], powers], axis=1).transpose(0, 2, 1)
     error = np.zeros((len(rows), n))
     if errors is not None:
         error = errors.by_row[rows + 1][:, [errors.columns[name] for name in states]]
     one = np.ones(len(rows))
-    data = _data(run, times[rows])
+    data = data_at(run, times[rows])
     length = times[rows + 1] - times[rows]
     return Parts(mode, rows, 0 * one, one, times[rows], length, whole @ from_powers(whole.shape[2] - 1), error, data)
 
 
-def _data(run: RunView, times: Array) -> Array:
+def pieces_at(execution: Execution, rows: NDArray[np.int64], n: int) -> tuple[Array, Array]:
+    """The states at rows, and the coefficients of the pieces that leave them, straight ones where there are none."""
+    values = np.asarray(execution.values[rows, :n], dtype=float)
+    powers = np.asarray(execution.coefficients[rows, :, :n], dtype=float)
+    if powers.shape[1] == 0:
+        powers = (np.asarray(execution.values[rows + 1, :n], dtype=float) - values)[:, None, :]
+    return values, np.nan_to_num(powers)
+
+
+def data_at(run: RecordedRun, times: Array) -> Array:
+    """Parameters and input segments at times, one row where they are the same for all."""
     segments = run.problem.timeline.segments
     if len(segments) == 1:
         return np.array([segments[0].data], dtype=float)

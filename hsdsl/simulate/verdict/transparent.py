@@ -10,6 +10,7 @@ import numpy as np
 from hsdsl.arithmetic import Number
 from hsdsl.enclosures import Range
 from hsdsl.execution import Arc
+from hsdsl.simulate.remarks import may_be_passed
 from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.agreement import SAFE
 from hsdsl.simulate.verdict.finding import Finding, times
@@ -103,7 +104,8 @@ def almost_left(run: RunView, k: int, row: int, places: Sequence[Place]) -> Find
 def undecided_condition(run: RunView, place: Place, k: int, row: int, passed: Passed) -> Finding | None:
     """Note that a surface is passed at a place where its condition does not hold, or say that it might."""
     if place.conditions(k, run.safe_error(place, row), run.safe_time_error(place, k, row)) == {False}:
-        if not place.mode.edges[k].of_event:  # an event fires when it turns true on any of its surfaces
+        left = row in run.crossed and run.times[row] - place.t <= run.tie(place.t)  # the mode, at that very instant
+        if not left and may_be_passed(run.problem.program, place.mode.edges[k]):
             passed.setdefault(place.name(k), []).append(place.t)
         return None
     where = f"{place.name(k)} at t = {show(place.t)}"

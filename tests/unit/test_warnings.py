@@ -1,0 +1,185 @@
+"""What a run tells first: in text, JSON, HTML, files, tables of many runs, and what the verdict says in short."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from engines import ENGINES
+from lint.fragments import blocks
+
+import hsdsl
+from hsdsl.errors import WARNINGS
+from hsdsl.lint.pages import warning_pages
+from hsdsl.report import as_json, dumps
+from hsdsl.report.html import html
+from hsdsl.report.summary import summary
+from hsdsl.report.words import MOST_WORDS, conclusion
+from hsdsl.store import load
+
+# A foot over ground that swings through it while x < 2 a second in: z = 1 - 4 t**2, and at t = 1 it lands where it may.
+FOOT = """
+hsdsl: 1
+parameters: {ready: 2, kick: 0}
+modes:
+  swing:
+    flow: {x: 1, z: v, v: -8}
+    transitions: [{name: touchdown, when: z <= 0, if: x >= ready, to: swing, reset: {v: -v}}]
+initial: {mode: swing, x: 0, z: 1, v: 0}
+experiment: {until: 3, tolerance: 1e-9}
+"""
+BALL = """
+hsdsl: 1
+assumptions: [the floor does not move]
+modes:
+  air: {flow: {h: v, v: -2}, transitions: [{name: hit, when: h <= 0, to: air, reset: {v: -v/2}}]}
+initial: {mode: air, h: 1, v: 0}
+experiment: {until: 4}
+"""
+SLIDER = """
+hsdsl: 1
+modes:
+  right: {flow: {x: -1}, transitions: [{when: x <= 0, to: left}]}
+  left: {flow: {x: 2}, transitions: [{when: x >= 0, to: right}]}
+initial: {mode: right, x: 1}
+experiment: {until: 2, completion: auto}
+"""
+WAVES = """
+hsdsl: 1
+modes:
+  a:
+    flow: {s: 1}
+    transitions: [{name: level, when: sin(s) >= 1/2, if: s <= 0, to: b}]
+  b: {flow: {s: 1}}
+initial: {mode: a, s: 0}
+experiment: {until: 40, tolerance: 1e-9}
+"""
+
+
+def codes(run):
+    return [warning.code for warning in run.warnings]
+
+
+def test_a_foot_that_swings_through_the_ground_says_so_before_a_verdict_that_holds(tmp_path):
+    run = hsdsl.loads(FOOT).simulate()
+    (warning,) = run.warnings
+    assert (warning.code, warning.edge) == ("HS701", "touchdown")
+    assert warning.time == pytest.approx(0.5, abs=1e-9)
+    assert run.verdict.theorem == "holds" and run.final.state["z"] == pytest.approx(-35)
+    lines = summary(run).splitlines()
+    labels = [line[:10].strip() for line in lines]
+    assert labels.index("warning") < labels.index("verdict")
+    assert as_json(run)["warnings"] == [
+        {"code": "HS701", "time": warning.time, "edge": "touchdown", "message": warning.message}
+    ]
+    assert json.loads(dumps(as_json(run)))["warnings"][0]["edge"] == "touchdown"
+    assert "was passed at t = 0.5 while its `if` was false" in html(run)
+    run.save(tmp_path / "foot.npz")
+    again = load(tmp_path / "foot.npz")
+    assert again == run and again.warnings == run.warnings
+    assert summary(again) == summary(run)
+    assert codes(hsdsl.loads(FOOT).simulate(parameters={"ready": 0})) == []
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    "settings",
+    [{}, {"method": "dop853"}, {"method": "rk4", "step": 0.05, "tolerance": None},
+     {"precision": 30, "engine": "python"}, {"scheme": "relaxed", "relaxation": 1e-6}],
+)  # fmt: skip
+def test_several_passes_of_one_transition_are_one_warning(engine, settings):
+    run = hsdsl.loads(WAVES).simulate(**{"engine": engine} | settings)
+    (warning,) = run.warnings
+    assert float(warning.time) == pytest.approx(np.pi / 6, abs=1e-4)
+    assert f"passed {sum(np.arange(7) * 2 * np.pi + np.pi / 6 < 40)} times, first at t = 0.52" in warning.message
+
+
+def test_a_run_without_anything_to_tell_has_an_empty_list():
+    run = hsdsl.loads(FOOT).simulate(until=0.4)
+    assert run.warnings == () and as_json(run)["warnings"] == []
+    assert "warning" not in summary(run) and "warning" not in html(run)
+
+
+def test_an_assumption_of_the_file_is_told_by_every_run():
+    model = hsdsl.loads(BALL)
+    for until, settings in ((0.5, {}), (0.5, {"method": "euler", "step": 0.01}), (4, {})):
+        last = model.simulate(until=until, **settings).warnings[-1]
+        assert (last.code, last.time, last.edge) == ("HS707", None, None)
+        assert last.message == "the floor does not move (hsdsl explain HS707)"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_ensembles_have_the_codes_that_single_runs_note_without_a_verdict(engine):
+    ball = hsdsl.loads(BALL).ensemble(initial={"h": np.array([[1.0, 4.0], [0.0, 0.25]])}, engine=engine)
+    assert ball.warnings.tolist() == [["HS703 HS704", ""], ["HS703", "HS703 HS704"]]
+    assert ball.warning_counts == {"HS703": 3, "HS704": 2}
+    for place in np.ndindex(ball.shape):
+        assert ball.warnings[place].split() == codes(ball.run(*place))[:-1]  # but for the assumption
+    assert ball.to_pandas().warnings.tolist() == ["HS703 HS704", "", "HS703", "HS703 HS704"]
+    assert "2 HS704: transitions that accumulate" in ball._repr_html_()
+    slider = hsdsl.loads(SLIDER).ensemble(initial={"x": np.array([1.0, 3.0])}, engine=engine)
+    assert slider.warnings.tolist() == ["HS705", ""]
+
+
+def test_long_ensembles_keep_what_was_noted_in_full_chunks():
+    model = hsdsl.loads(SLIDER)
+    ensemble = model.ensemble(initial={"x": np.array([1.0])}, until=400, method="rk4", step=0.01)
+    assert ensemble.warnings.tolist() == ["HS705"]
+
+
+def test_sweeps_have_a_column_of_codes_and_count_them(tmp_path):
+    foot = hsdsl.loads(FOOT)
+    judged = foot.sweep({"ready": [0, 2]}, tmp_path / "judged", record="final,verdict")
+    assert judged["warnings"].tolist() == ["", "HS701"]
+    plain = hsdsl.loads(BALL).sweep({"initial.h": [1, 4]}, tmp_path / "plain")
+    assert plain["warnings"].tolist() == ["HS703 HS704", ""]
+    assert plain.warning_counts == {"HS703": 1, "HS704": 1}
+    assert "HS703 in 1 row: motion along a guard" in plain.summary and plain.as_json()["warnings"]["HS704"] == 1
+
+
+def test_a_dataset_of_an_earlier_version_has_no_such_column(tmp_path):
+    hsdsl.loads(BALL).sweep({"initial.h": [1, 4]}, tmp_path / "old")
+    manifest = tmp_path / "old" / "_sweep.json"
+    content = json.loads(manifest.read_text())
+    del content["record"]["warnings"]
+    manifest.write_text(json.dumps(content))
+    old = hsdsl.sweep.load(tmp_path / "old")
+    assert "warnings" not in old.columns and old.warning_counts == {} and "in 1 row" not in old.summary
+
+
+def test_streamed_runs_tell_what_takes_no_verdict(tmp_path):
+    run = hsdsl.loads(BALL).stream(tmp_path / "rows.csv", every=10)
+    assert [one.code for one in run.warnings] == ["HS703", "HS704", "HS707"]
+
+
+@pytest.mark.parametrize("code", WARNINGS)
+def test_the_run_of_a_pages_first_example_has_the_warning_and_that_of_the_second_has_not(code):
+    page = warning_pages()[code]
+    bad, good = (
+        [text for language, text in blocks(page, heading) if language == "yaml"]
+        for heading in ("Example", "Use instead")
+    )
+    assert code in codes(hsdsl.loads(bad[0]).simulate())
+    assert code not in codes(hsdsl.loads(good[0]).simulate())
+
+
+@pytest.mark.parametrize("text", [FOOT, BALL, SLIDER, WAVES])
+def test_what_is_told_is_short_and_says_where_to_read_more(text):
+    run = hsdsl.loads(text).simulate()
+    for warning in run.warnings:
+        assert len(warning.message.split()) <= MOST_WORDS, warning.message
+        assert warning.message.endswith(f"(hsdsl explain {warning.code})")
+    assert len(conclusion(run).split()) <= MOST_WORDS
+
+
+def test_the_summary_concludes_and_gives_all_reasons_on_request():
+    run = hsdsl.loads(BALL).simulate()
+    short, long = summary(run), summary(run, explain=True)
+    assert re.search(r"^verdict   left: Zeno at t = 3", short, re.MULTILINE) and "(--explain)" in short
+    assert long.count("\nreason    ") == len(run.verdict.reasons) > 1
+    assert "\nreason" not in short and "--explain" not in long
+    assert all(reason in html(run) for reason in run.verdict.reasons)
+    holds = hsdsl.loads(BALL).simulate(until=0.5)
+    assert "verdict   holds: no transition\n" in summary(holds)
