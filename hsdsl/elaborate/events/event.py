@@ -9,8 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from hsdsl.expression.scope import symbol
-from hsdsl.expression.selection import is_mode, select, total, whole
-from hsdsl.expression.selection import either
+from hsdsl.expression.selection import either, is_mode, select, total, whole
 from hsdsl.expression.trigger import Reached, comparisons, number, reached
 from hsdsl.functions import below, replaced
 from hsdsl.names import memory
