@@ -118,7 +118,7 @@ function [w, here] = enter(w, q, x, t, scale, arrival)
     k = firing(best);
     w = limited(w, t);
     if isempty(w.stop)
-      [w, after, scale] = reset(w, here, k, t, x, max(abs(x), scale));
+      [w, after, scale] = reset(w, here, k, t, x, scale);
     end
     if ~isempty(w.stop)
       return
@@ -138,10 +138,6 @@ function [w, after, scale] = reset(w, here, k, t, x, sizes)
   scale = w.m.spread{q}{k}(t, x, w.p, d, sizes);
   if ~all(isfinite(scale))
     scale = abs(after);
-  elseif w.m.edge_target{q}(k) == q % resets that lose energy add round-off up, they do not magnify it
-    changes = w.m.edge_changes{q}{k};
-    had = w.sizes(w.m.state_index{q}(changes));
-    scale(changes) = min(scale(changes), (w.count + 1) * max(abs(after(changes)), had));
   end
   if ~all(isfinite(after))
     w = ended(w, 'not_finite', sprintf('the reset of %s has no value at t = %.10g', w.m.edge_names{q}{k}, t));
@@ -170,11 +166,16 @@ function w = limited(w, t)
   end
 end
 
-function sizes = sizes_along(here, x, z)
-% The sizes of the numbers that a point of a step is computed from; a state that has not moved has those it came with.
-  sizes = max(abs(x), abs(z));
-  still = z == here.entered;
-  sizes(still) = max(sizes(still), here.scale(still));
+function sizes = sizes_along(here, x, z, stays)
+% The sizes of the numbers that a point of a step is computed from. A state that has not moved has those it came with;
+% so have all of one that stays on a guard that it has not left.
+  sizes = joined(here.scale .* (z == here.entered | stays), max(abs(x), abs(z)));
+end
+
+function scale = joined(scale, sizes)
+% The sizes of numbers of two sizes. The first are negative where a reset's terms gave them: the next reset reads no more
+% than the value of such a state, and no size multiplies.
+  scale = max(abs(scale), sizes) .* (1 - 2 * (scale < 0));
 end
 
 function w = row(w, t, q, x)
@@ -230,7 +231,7 @@ end
 
 function sizes = sizes_here(w, here)
 % The sizes that states have had, or those of the numbers that they were computed from on entry.
-  sizes = max(w.sizes(w.m.state_index{here.q}), here.scale);
+  sizes = max(w.sizes(w.m.state_index{here.q}), abs(here.scale));
 end
 
 function contact = releases(w, here, k)
@@ -474,7 +475,7 @@ function [w, here, event, done] = boundary(w, here)
     if ~isempty(found)
       [unused, best] = max(w.m.edge_priority{q}(found));
       if ~relaxed
-        event = event_of(found, best, t, x, sizes_along(here, x, x));
+        event = event_of(found, best, t, x, sizes_along(here, x, x, false));
         return
       end
       w = limited(w, t);
@@ -578,7 +579,7 @@ function [w, here, event] = follow(w, here)
           w = underflow(w, here, good);
         else
           [unused, best] = max(w.m.edge_priority{q}(found));
-          event = event_of(found, best, t, x, sizes_along(here, x, x));
+          event = event_of(found, best, t, x, sizes_along(here, x, x, false));
         end
         return
       end
@@ -681,12 +682,9 @@ function event = first_crossing(w, here, t, h, x, k1, z, C, ends_at, d)
     [unused, best] = max(w.m.edge_priority{q}(fires));
     k = fires(best);
   end
-  sizes = sizes_along(here, x, y);
+  sizes = sizes_along(here, x, y, stands(w, here, k, time, y, d));
   if share > 0
-    sizes = max(max(sizes, abs(z)), max(abs(C), [], 2));
-  end
-  if stands(w, here, k, time, y, d)
-    sizes = max(sizes, here.scale);
+    sizes = joined(sizes, max(abs(z), max(abs(C), [], 2)));
   end
   if ~isempty(here.touched)
     sizes = max(sizes, w.sizes(w.m.state_index{q}));
@@ -852,7 +850,7 @@ function [w, here] = jump(w, here, event)
     w = ended(w, 'until', sprintf('reached t = %.10g in the strip of %s', w.s.until, w.m.edge_names{q}{k}));
     return
   end
-  [w, after, scale] = reset(w, here, k, event.t, event.x, max(abs(event.x), event.sizes));
+  [w, after, scale] = reset(w, here, k, event.t, event.x, event.sizes);
   if ~isempty(w.stop)
     return
   end
@@ -1528,7 +1526,7 @@ function [w, event] = stuck(w, here, wall)
   found = on_guard(w, here, here.t, here.x, tie(here.t));
   if ~isempty(found)
     [unused, best] = max(w.m.edge_priority{here.q}(found));
-    event = event_of(found, best, here.t, here.x, strip_sizes(here, here.x, here.x, found(best)));
+    event = event_of(found, best, here.t, here.x, sizes_along(here, here.x, here.x, here.active(found(best))));
   elseif wall > 0
     w = left(w, here.q, wall, here.t);
   else
@@ -1548,14 +1546,6 @@ function w = underflow(w, here, finite)
   end
 end
 
-function sizes = strip_sizes(here, x, z, k)
-% Those of a point on the guard of edge k: one that the state has not left it is off by the round-off of what it came with.
-  sizes = sizes_along(here, x, z);
-  if here.active(k)
-    sizes = max(sizes, here.scale);
-  end
-end
-
 function event = choose(w, here, found, t1, z)
 % Of several crossings the earliest; of tied ones the highest priority, then the file's order.
   [time, first] = min([found.t]);
@@ -1572,7 +1562,7 @@ function event = choose(w, here, found, t1, z)
     z = here.x;
   end
   event = struct('k', k, 't', time, 'x', found(first).x, 'depth', depth, 't1', t1, ...
-                 'sizes', strip_sizes(here, here.x, z, k));
+                 'sizes', sizes_along(here, here.x, z, here.active(k)));
 end
 
 function [inside, found, wall] = judge(w, here, t, h, t1, x, k1, z, K, d)

@@ -124,13 +124,9 @@ impl<S: Sink> Run<'_, S> {
             if self.limit_reached() {
                 return Err(self.stop(StopReason::TransitionLimit, t));
             }
-            let mut sizes = [0.0; W];
-            for s in 0..n {
-                sizes[s] = max(size(x[s]), self.scale[s]);
-            }
             fires[k] = false;
             let crossing = Crossing { edge: k, theta: 0.0, time: t, state: x, depth: 0.0 };
-            let (after, scale) = match self.reset(&crossing, &sizes) {
+            let (after, scale) = match self.reset(&crossing, &self.scale) {
                 Some(found) => found,
                 None => return Err(self.stop(StopReason::NotFinite, t)),
             };

@@ -90,7 +90,7 @@ impl<S: Sink> Run<'_, S> {
             if found.count > 0 || !self.trial.ends {
                 let (crossing, tied) = self.choose(&found.crossings[..found.count]);
                 let end = if crossing.theta > 0.0 { self.z } else { self.x };
-                let sizes = self.sizes(&self.x, &end, crossing.edge);
+                let sizes = self.sizes(&self.x, &end, self.active[crossing.edge]);
                 return Ok(Outcome::Landed(Event { crossing, tied, t1, sizes }));
             }
             if halvings > 0 || !(t1 > self.t) {
@@ -156,12 +156,13 @@ impl<S: Sink> Run<'_, S> {
         }
     }
 
-    /// The sizes of the numbers that a point between x and z, on the guard of edge k, is computed from.
-    fn sizes(&self, x: &State, z: &State, k: usize) -> State {
+    /// The sizes of the numbers that a point between x and z, which may stay on a guard, is computed from.
+    fn sizes(&self, x: &State, z: &State, stays: bool) -> State {
         let mut found = [0.0; W];
         for s in 0..self.dimension {
-            let still = if self.active[k] || z[s] == self.entered[s] { self.scale[s] } else { size(z[s]) };
-            found[s] = max(max(size(x[s]), size(z[s])), still);
+            let kept = if stays || z[s] == self.entered[s] { self.scale[s] } else { 0.0 };
+            let moved = max(size(x[s]), size(z[s]));
+            found[s] = if kept < 0.0 { -max(-kept, moved) } else { max(kept, moved) };
         }
         found
     }
@@ -185,7 +186,7 @@ impl<S: Sink> Run<'_, S> {
         let (crossings, count) = self.standing_on();
         if may && count > 0 {
             let (crossing, tied) = self.choose(&crossings[..count]);
-            let sizes = self.sizes(&self.x, &self.x, crossing.edge);
+            let sizes = self.sizes(&self.x, &self.x, self.active[crossing.edge]);
             return Ok(Event { crossing, tied, t1: self.t, sizes });
         }
         let instant = crate::math::root(crate::run::UNIT) * self.t;

@@ -1,7 +1,7 @@
 //! A run under way: entering a mode, choosing among crossings, resets.
 
 use crate::kernel::{bound, Edge, Mode, Settings, Sink, State, Stop, StopReason, Transition};
-use crate::math::{finite, max, min, root, size};
+use crate::math::{finite, max, root, size};
 use crate::model::{D, E, JACOBIAN, JACOBIAN_PLACES, M, MODES, P, SEGMENTS, STAGES, STATES, W};
 use crate::table::Piece;
 
@@ -283,11 +283,6 @@ impl<S> Run<'_, S> {
         if bad || !spread[..to].iter().all(|v| finite(*v)) {
             for i in 0..to {
                 spread[i] = size(after[i]);
-            }
-        } else if self.returns(edge) {
-            for &s in edge.changes {
-                // resets that lose energy add round-off up, they do not magnify it
-                spread[s] = min(spread[s], (self.made as f64 + 1.0) * max(size(after[s]), self.scale_of(s)));
             }
         }
         Some((after, spread))

@@ -89,7 +89,7 @@ impl<S> Run<'_, S> {
                 total += size(g[0]) * size(t);
                 let scaled = entry || self.active[k];
                 for s in 0..n {
-                    total += size(g[s + 1]) * max(size(x[s]), if scaled { self.scale[s] } else { 0.0 });
+                    total += size(g[s + 1]) * max(size(x[s]), if scaled { size(self.scale[s]) } else { 0.0 });
                 }
             }
         }
@@ -398,7 +398,7 @@ impl<S> Run<'_, S> {
         }
         for &s in edge.changes {
             if slope[s] != 0.0 {
-                let sized = max(self.scale_of(s), self.scale[s]);
+                let sized = max(self.scale_of(s), size(self.scale[s]));
                 after = max(after, ZERO_UNITS * UNIT * sized / size(slope[s]));
             }
         }
