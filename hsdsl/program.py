@@ -216,8 +216,9 @@ class ModeProgram:
     rate_K         one value, L_f r = dr/dt + grad r . f of surface K
     condition_K_I  one boolean, part I of the `if` of edge K, which holds where all its parts do
     reset_K        values of those target states that edge K ``changes``
-    spread_K       the size max(|R_i|, sum |dR_i/dx_k| s_k) of the numbers each of these is
-                   computed from, called ``spread_K(t, x..., s...)`` with the sizes s of the source's
+    spread_K       the sizes of the numbers each of these is computed from, called ``spread_K(t, x..., s...)``
+                   with those of the source's: s_k where x_k is copied, else the bound of the terms with
+                   max(|x_k|, s_k) in them, as a negative number, which no terms read again
     ============== =========================================================================
 
     ``jacobian`` gives the derivatives of the flow by the states; only implicit methods need it.

@@ -151,16 +151,17 @@ class LoweredMode:
             condition = sp.true if edge.condition is None else edge.condition
             for i, part in enumerate(condition.args if isinstance(condition, sp.And) else (condition,)):
                 yield self._few(f"condition_{k}_{i}", self.place([part]))
-        scales = dict(zip(self.states, self._sizes, strict=True))
+        kept = dict(zip(self.states, self._sizes, strict=True))
+        read = {x: maximum(absolute(x), s) for x, s in kept.items()}
         for k, edge in enumerate(mode.edges):
             changed = changed_by(edge, mode)
-            own = [i for i in changed if i < len(edge.reset) - edge.derived]
             reset = self.place(edge.reset[i] for i in changed)
             yield self._few(f"reset_{k}", reset)
-            changes = Gradient(reset[: len(own)], self.states)
-            spreads = tuple(_spread(r, row, scales) for r, row in zip(reset, changes.sparse, strict=False))
-            spreads += tuple(map(absolute, reset[len(own) :]))
-            yield Definition(f"spread_{k}", (), spreads, changes.statements, self._given)
+            own = sum(i < len(edge.reset) - edge.derived for i in changed)
+            terms = Terms(reset[:own], read)
+            spreads = tuple(kept.get(r, -bound) for r, bound in zip(reset, terms.bounds, strict=False))
+            spreads += tuple(map(absolute, reset[own:]))
+            yield Definition(f"spread_{k}", (), spreads, terms.statements, self._given)
 
     def _few(self, name: str, results, statements=()) -> Definition:
         """A routine that names the few arguments it uses."""
@@ -211,8 +212,3 @@ def _every_choice(expr: sp.Basic) -> sp.Basic:
     if isinstance(expr, below):
         return sp.Add(*(sp.Dummy() * _every_choice(choice) for choice in expr.args[2:]))
     return rebuilt(expr, tuple(map(_every_choice, expr.args)))
-
-
-def _spread(value: sp.Expr, slopes, scales):
-    parts = sp.Add(*(absolute(slope) * scales[state] for state, slope in slopes.items()))
-    return parts if value in scales else maximum(absolute(value), parts)

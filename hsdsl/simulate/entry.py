@@ -59,7 +59,7 @@ def enter(
             return stop
         zero = run.arithmetic.zero
         chosen, alternatives = choose_entry(edges, [Crossing(k, zero, t, x, zero) for k in beyond])
-        outcome = reset(here, chosen, tuple(max(abs(a), s) for a, s in zip(x, scale, strict=True)), run)
+        outcome = reset(here, chosen, scale, run)
         if isinstance(outcome, Stop):
             return outcome
         edge, scale = edges[chosen.edge], outcome[1]

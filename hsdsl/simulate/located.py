@@ -23,7 +23,7 @@ from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
-from hsdsl.simulate.surfaces import NONE, Arrival, Crossing, StepFailure, close_bracket
+from hsdsl.simulate.surfaces import NONE, Arrival, Crossing, StepFailure, close_bracket, joined
 from hsdsl.simulate.touching import touched
 from hsdsl.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts, unresolved
 
@@ -129,11 +129,10 @@ def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> E
 
 def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing) -> State:
     """The sizes of the numbers behind a crossing's state: the terms of its step and of the one before."""
-    found = tuple(map(max, sizes(span.x, crossing.state, here), span.sizes(crossing.theta)))
+    stays = stands(here, crossing)  # off that surface by as much as the state was that it came from
+    found = tuple(map(joined, sizes(span.x, crossing.state, here, stays), span.sizes(crossing.theta)))
     if before is not None:
-        found = tuple(map(max, found, before.sizes(before.h * 0 + 1)))
-    if stands(here, crossing):  # it is off that surface by as much as the state was that it came from
-        found = tuple(map(max, found, here.surfaces.scale))
+        found = tuple(map(joined, found, before.sizes(before.h * 0 + 1)))
     if here.surfaces.touched:  # it is off the guards that hold it by as much as it has ever been computed from
         found = tuple(map(max, found, here.arc.scales))
     return found

@@ -25,7 +25,7 @@ from hsdsl.simulate.scales import error_ratio
 from hsdsl.simulate.stall_detection import Patience
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import reached, reached_in_strip
-from hsdsl.simulate.surfaces import Arrival, Crossing, StepFailure, Trial
+from hsdsl.simulate.surfaces import Arrival, Crossing, StepFailure, Trial, joined
 from hsdsl.simulate.zeno import unresolved
 
 ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
@@ -101,7 +101,8 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
             control.accept(h, ratio)
         if found or end is None:
             crossing, alternatives = choose(here, found, run)
-            return Event(crossing, alternatives, t1, sizes(x, z if crossing.theta > 0 else x, here, crossing.edge))
+            last = z if crossing.theta > 0 else x
+            return Event(crossing, alternatives, t1, sizes(x, last, here, crossing.edge in active))
         if (halvings or not t1 > t) and (given_up := patience.ends(here, halvings, control.h, failure, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
         if estimate and chatter.across(here.kernel.flow, t, x, slope, t1, z, end):
@@ -238,16 +239,16 @@ def stuck(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Even
     shrunk = failure.kind in ("wall", "deep", "flat", "inward", "not finite", "unsolved")
     if shrunk and (standing := standing_on(run, here)):
         chosen, alternatives = choose(here, standing, run)
-        return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here, chosen.edge))
+        return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here, chosen.edge in here.surfaces.active))
     return standstill(run, here).stuck(failure, slope)
 
 
-def sizes(x: State, z: State, here: ModeState, k: int | None = None) -> State:
+def sizes(x: State, z: State, here: ModeState, stays: bool = False) -> State:
     """Return the sizes of the numbers that a point between x and z is computed from.
 
-    A state that has not moved since the mode was entered still carries the sizes that it came in with. So does one on
-    the guard of edge k that it has not left: it is off that by the round-off of these.
+    A state that has not moved since the mode was entered still carries the sizes that it came in with. So does one that
+    ``stays`` on a guard, which it has not left: it is off that by the round-off of these.
     """
-    entered, stays = zip(here.arc.values[0], here.surfaces.scale, strict=True), k in here.surfaces.active
-    still = [s if stays or b == first else abs(b) for b, (first, s) in zip(z, entered, strict=True)]
-    return tuple(max(abs(a), abs(b), s) for a, b, s in zip(x, z, still, strict=True))
+    entered = zip(here.arc.values[0], here.surfaces.scale, strict=True)
+    kept = (s if stays or b == first else b * 0 for b, (first, s) in zip(z, entered, strict=True))
+    return tuple(joined(s, max(abs(a), abs(b))) for s, a, b in zip(kept, x, z, strict=True))

@@ -21,7 +21,7 @@ from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.queues import Tails
 from hsdsl.simulate.recorder import OpenArc, Recorder
 from hsdsl.simulate.stops import limit, reset_not_finite
-from hsdsl.simulate.surfaces import Crossing, Surfaces
+from hsdsl.simulate.surfaces import Crossing, Surfaces, larger
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ModeState:
     @property
     def sizes(self) -> State:
         """The sizes that the states have had, or those of the numbers that they were computed from on entry."""
-        return tuple(map(max, self.arc.scales, self.surfaces.scale))
+        return larger(self.arc.scales, self.surfaces.scale)
 
     def moved(self, t: Number, x: State) -> ModeState:
         """Return the same place in the mode's life, later."""
@@ -210,11 +210,5 @@ def reset(here: ModeState, crossing: Crossing, scale: State, run: Run) -> tuple[
         spread = here.kernel.spreads[k](t, *q, *scale)
     except DOMAIN_ERRORS:
         spread = ()
-    if not spread or not all(map(isfinite, spread)):  # where a reset is infinitely steep, no more is known
-        return after, tuple(map(abs, after))
-    sizes = list(spread)
-    if edge.target == here.index and edge.target_states == here.arc.states:
-        most = here.arc.jump + 1  # resets that lose energy add round-off up, they do not magnify it
-        for i in edge.changes:
-            sizes[i] = min(sizes[i], most * max(abs(after[i]), here.arc.scales[i]))
-    return after, tuple(sizes)
+    known = bool(spread) and all(map(isfinite, spread))
+    return after, tuple(spread if known else map(abs, after))  # where a reset is infinitely steep, no more is known

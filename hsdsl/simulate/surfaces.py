@@ -127,19 +127,30 @@ def roundoff(unit: Number, magnitude: Number, gradient: Vector, t: Number, x: St
     """
     total = magnitude + abs(gradient[0]) * abs(t)
     for g, a, s in zip(gradient[1:], x, scale, strict=True):
-        total = total + abs(g) * max(abs(a), s)
+        total = total + abs(g) * max(abs(a), abs(s))
     return ROUNDOFF_UNITS * unit * total
+
+
+def joined(scale: Number, size: Number) -> Number:
+    """The size of numbers of two sizes, of which the first may have a sign (see `Surfaces`)."""
+    return -max(-scale, size) if scale < 0 else max(scale, size)
+
+
+def larger(sizes: Sequence[Number], scale: State) -> State:
+    """The larger of each two sizes; of ``scale`` the signs do not count (see `Surfaces`)."""
+    return tuple(max(a, abs(s)) for a, s in zip(sizes, scale, strict=True))
 
 
 @dataclass(frozen=True)
 class Surfaces:
     """A mode's surfaces with what is needed to judge a point.
 
-    ``scale`` holds the sizes of the numbers that the state was computed from on entry. They count for the surfaces in
-    ``active``, on which the state stood then, until it has left them. ``emerging`` are those that moved past the
-    state while it waited in a strip, and that the flow leads back through. ``touched`` are the contacts that hold it.
-    The surfaces of ``pushes``, these and other contacts, are the pushes on their guards: motion along guards is off
-    them by the sizes that states have ``had``.
+    ``scale`` holds the sizes of the numbers that the state was computed from on entry: of the flow, or of the terms of
+    the last reset; then they are negative, and the next reset reads no more than the value: no size multiplies. They
+    count for the surfaces in ``active``, on which the state stood then, until it has left them. ``emerging`` are those
+    that moved past the state while it waited in a strip, and that the flow leads back through. ``touched`` are the
+    contacts that hold it. The surfaces of ``pushes``, these and other contacts, are the pushes on their guards: motion
+    along guards is off them by the sizes that states have ``had``.
     """
 
     kernel: ModeKernel
@@ -167,7 +178,7 @@ class Surfaces:
             return ROUNDOFF_UNITS * unit * magnitude
         scale = self.scale if entry or k in self.active else tuple(self.arithmetic.zero for _ in x)
         if k < len(self.edges) and self.edges[k].releases in self.pushes:
-            scale = tuple(map(max, self.had, self.scale))
+            scale = larger(self.had, self.scale)
         return roundoff(unit, magnitude, gradient, t, x, scale)
 
     def enter(self, t: Number, x: State, values: Vector, arrival: Arrival = ANY) -> list[int]:

@@ -31,6 +31,7 @@ from hsdsl.simulate.contact import (
 from hsdsl.simulate.diagnostics import FREE
 from hsdsl.simulate.root_isolation import total
 from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.surfaces import joined
 
 LEAST_FLIGHTS = 3
 MOST_CORRECTIONS_TO_GUARD = 4  # of a point towards a guard
@@ -199,7 +200,8 @@ def held_exactly(
     It stays on those that it has ``reached``. It is off them by the round-off of what it has ever been computed from.
     """
     touched, after = in_touch(here, held), after_contact(here, held, t, x)
-    after = replace(after, surfaces=replace(after.surfaces, scale=here.sizes))
+    scale = tuple(map(joined, after.surfaces.scale, here.arc.scales))
+    after = replace(after, surfaces=replace(after.surfaces, scale=scale))
     try:
         q = in_turn(partial(onto_guard, after), sorted({*touched, *reached}), t, x)
         q = in_turn(partial(fixed_point, run, after), touched, t, q)

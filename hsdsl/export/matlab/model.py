@@ -54,7 +54,7 @@ function bound = roundoff(m, q, k, t, x, p, d, scale)
     bound = 16 * eps * sides(k);
     return
   end
-  bound = 16 * eps * (sides(k) + abs(slopes(1)) * abs(t) + sum(abs(slopes(2:end)) .* max(abs(x), scale)));
+  bound = 16 * eps * (sides(k) + abs(slopes(1)) * abs(t) + sum(abs(slopes(2:end)) .* max(abs(x), abs(scale))));
 end
 """
 

@@ -10,7 +10,7 @@
 #define FURTHER 16
 
 /* The size that a state has had, or that of the numbers that it was computed from on entry. */
-static hs_real state_size(const hs_run *run, int s) { return hs_max(run->scales[s], run->scale[s]); }
+static hs_real state_size(const hs_run *run, int s) { return hs_max(run->scales[s], fabs(run->scale[s])); }
 
 /* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. See simulate/scales.py. */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope) {

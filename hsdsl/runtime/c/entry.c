@@ -121,8 +121,7 @@ static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here,
     if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
     if (run->interrupted) return stopped(run, HS_INTERRUPTED, t);
     choose_entry(run, run->beyond, t);
-    for (int s = 0; s < dimension; s++) run->landed[s] = hs_max(fabs(run->x[s]), run->scale[s]);
-    if (reset(run, run->landed)) {
+    if (reset(run, run->scale)) {
       run->task->stop.edge = run->chosen.edge;
       return stopped(run, HS_RESET_NOT_FINITE, t);
     }

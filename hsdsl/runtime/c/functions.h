@@ -165,7 +165,7 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
 static int limit_reached(const hs_run *run);
 static int goes_before(const hs_mode *mode, int a, int b);
 static void choose(hs_run *run, int count);
-static int reset(hs_run *run, hs_real *scale);
+static int reset(hs_run *run, const hs_real *scale);
 
 /* entry.c */
 static int same_state(const hs_real *a, const hs_real *b, int n);
@@ -182,7 +182,7 @@ static int slides(hs_run *run, int mode, int k);
 HS_INLINE int chatters(hs_run *run, const int n, hs_time t1);
 
 /* relaxed.c */
-static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int k);
+static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int stays);
 static int standing_on(hs_run *run);
 static int interrupted(hs_run *run);
 static int in_strip(hs_run *run, hs_reason reason, hs_time t);

@@ -97,12 +97,11 @@ static int largest(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
   const int stood = stands(run, crossing);
   if (stood == RAISED) return RAISED;
-  sizes(run, run->x, crossing->state, -1);
+  sizes(run, run->x, crossing->state, stood);
   for (int s = 0; s < run->here.table->own; s++) {
     hs_real *const found = &run->landed[s];
-    *found = hs_max(*found, span_size(run, &run->span, crossing->theta, s));
-    if (run->has_before) *found = hs_max(*found, span_size(run, &run->before, 1.0, s));
-    if (stood) *found = hs_max(*found, run->scale[s]);
+    *found = joined(*found, span_size(run, &run->span, crossing->theta, s));
+    if (run->has_before) *found = joined(*found, span_size(run, &run->before, 1.0, s));
     if (run->here.p == run->held_p) *found = hs_max(*found, run->scales[s]); /* off guards that hold it by as much */
   }
   return 0;
@@ -212,7 +211,7 @@ static int located_stuck(hs_run *run, hs_step_failure kind) {
   const int count = kind == HS_NOT_FINITE || kind == HS_UNSOLVED ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
-    sizes(run, run->x, run->x, -1);
+    sizes(run, run->x, run->x, 0);
     return LANDED;
   }
   if (run->here.table->flow(run->here.p, run->here.t, run->x, run->task->stop.slope))
@@ -417,7 +416,7 @@ static int located_at_boundary(hs_run *run) {
   const int count = contact_at(run) == GOES_ON ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
-    sizes(run, run->x, run->x, -1);
+    sizes(run, run->x, run->x, 0);
   }
   if (run->here.table != own) after_contact(run);
   return count ? jump(run) : (int)stopped(run, HS_UNTIL, t);

@@ -34,13 +34,12 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, hs_real h, hs_time t1) {
   return trial->ends = 0, NOT_FINITE;
 }
 
-/* The sizes of the numbers that a point between x and z, on the guard of edge k or none (-1), is computed from, to
+/* The sizes of the numbers that a point between x and z, which `stays` on a guard or does not, is computed from, to
    run->landed. */
-static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int k) {
-  const int stays = k >= 0 && run->active_surfaces[k];
+static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int stays) {
   for (int s = 0; s < run->here.dimension; s++) {
-    const hs_real still = stays || z[s] == run->entered[s] ? run->scale[s] : fabs(z[s]);
-    run->landed[s] = hs_max(hs_max(fabs(x[s]), fabs(z[s])), still);
+    const hs_real kept = stays || z[s] == run->entered[s] ? run->scale[s] : 0.0;
+    run->landed[s] = joined(kept, hs_max(fabs(x[s]), fabs(z[s])));
   }
 }
 
@@ -66,7 +65,7 @@ static int stuck(hs_run *run, hs_step_failure kind, int surface) {
   const int count = may_stand ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
-    sizes(run, run->x, run->x, run->chosen.edge);
+    sizes(run, run->x, run->x, run->active_surfaces[run->chosen.edge]);
     run->landed_at = run->here.t;
     return LANDED;
   }
@@ -146,7 +145,7 @@ static int flow(hs_run *run) {
     if (ratio == ratio && halvings == 0) accept(control, h, ratio);
     if (found.crossings || !run->trial.ends) {
       choose(run, found.crossings);
-      sizes(run, run->x, run->chosen.theta > 0 ? run->z : run->x, run->chosen.edge);
+      sizes(run, run->x, run->chosen.theta > 0 ? run->z : run->x, run->active_surfaces[run->chosen.edge]);
       run->landed_at = t1;
       return LANDED;
     }

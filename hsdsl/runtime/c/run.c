@@ -90,7 +90,7 @@ static void choose(hs_run *run, int count) {
 
 /* Apply the chosen crossing's reset to the values before the jump, sizes of their numbers in `scale`: the state behind
    it to run->after, and to run->both the sizes of the numbers it came from. Not 0 where it has no finite value. */
-static int reset(hs_run *run, hs_real *scale) {
+static int reset(hs_run *run, const hs_real *scale) {
   const hs_crossing *crossing = &run->chosen;
   const hs_edge *edge = &run->here.table->edge[crossing->edge];
   const int n = run->here.dimension, to = edge->target_dimension;
@@ -102,10 +102,6 @@ static int reset(hs_run *run, hs_real *scale) {
   copy(run->both + n, scale, n);
   if (hs_changed(edge, edge->spread, run->here.p, crossing->time, run->both, scale, sizes) || !all_finite(sizes, to))
     for (int s = 0; s < to; s++) sizes[s] = fabs(run->after[s]); /* where it is infinitely steep, no more is known */
-  for (int i = 0; edge->target == run->here.mode && n == run->here.table->dimension && i < edge->changes; i++) {
-    const int s = edge->change[i]; /* resets that lose energy add round-off up, they do not magnify it */
-    sizes[s] = hs_min(sizes[s], (hs_real)(run->jump + 1) * hs_max(fabs(run->after[s]), run->scales[s]));
-  }
   copy(run->both, sizes, to);
   return 0;
 }

@@ -204,6 +204,8 @@ typedef struct {
   int chatter;
   /* in the workspace, a state's room each unless said otherwise */
   hs_real *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
+  /* scale: the sizes of the numbers that the state was computed from on entry, negative where the terms of a reset gave
+     them: the next reset reads no more than the value of such a state, and no size multiplies */
   hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
   hs_real *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
   int *lifted;

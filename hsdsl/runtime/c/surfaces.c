@@ -41,6 +41,9 @@ static void shortened(const hs_run *run, const hs_polynomial *piece, hs_real the
   }
 }
 
+/* The size of numbers of two sizes, of which the first is negative where a reset's terms gave it: see hs_run. */
+HS_INLINE hs_real joined(hs_real scale, hs_real size) { return scale < 0 ? -hs_max(-scale, size) : hs_max(scale, size); }
+
 /* Value of surface k at a point. */
 static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r) {
   if (run->here.table->values(run->here.p, t, x, run->values)) return RAISED;
@@ -71,7 +74,7 @@ static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time
     const int push = is_push(run, k), scaled = entry || run->active_surfaces[k];
     for (int i = 0; i < row->count; i++) {
       const int s = row->place[i] - 1;
-      const hs_real size = s < 0 ? fabs(t) : push ? state_size(run, s) : scaled ? run->scale[s] : 0.0;
+      const hs_real size = s < 0 ? fabs(t) : push ? state_size(run, s) : scaled ? fabs(run->scale[s]) : 0.0;
       total = total + fabs(g[i]) * (s < 0 ? size : hs_max(fabs(x[s]), size));
     }
   }

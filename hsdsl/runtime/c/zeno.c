@@ -138,7 +138,7 @@ static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached) {
   run->still = same_state(run->began, x, here->dimension);
   for (int k = 0; k < edges; k++) count += run->kept[k] = in_touch(run, k);
   after_contact(run);
-  for (int s = 0; s < here->dimension; s++) run->scale[s] = state_size(run, s);
+  for (int s = 0; s < here->dimension; s++) run->scale[s] = joined(run->scale[s], run->scales[s]);
   for (int k = 0; k < here->table->surfaces; k++) run->tail[k] = k < edges && run->kept[k];
   copy(run->z, x, here->dimension);
   if (reached >= 0) run->tail[reached] = 1;

@@ -33,7 +33,8 @@ class Brent(NamedTuple):
 class Lane(NamedTuple):
     """Where a run is.
 
-    ``scale`` has the sizes of the numbers that the state was computed from on entry, ``scales`` the largest that each
+    ``scale`` has the sizes of the numbers that the state was computed from on entry, negative where a reset's terms
+    gave them: the next reset reads no more than the value of such a state. ``scales`` has the largest size that each
     state of the model has had. ``active`` and ``emerging`` are as in the reference loop. ``h`` is the step to try next,
     ``trial`` the one under way, halved ``halvings`` times. ``terms`` has the sizes of the terms of the last step.
     ``contacts`` has the numbers of contacts, `HELD` for those that hold the state since ``began``. ``stood`` is how far
@@ -138,7 +139,17 @@ def scales_here(model, lane):
 
 def sizes_here(model, lane):
     """The same, or the sizes of the numbers that the state was computed from on entry."""
-    return jnp.maximum(scales_here(model, lane), lane.scale)
+    return jnp.maximum(scales_here(model, lane), jnp.abs(lane.scale))
+
+
+def joined(scale, sizes):
+    """The sizes of numbers of two sizes, of which the first may have a sign (see `Lane`)."""
+    return jnp.where(scale < 0, -1.0, 1.0) * jnp.maximum(jnp.abs(scale), sizes)
+
+
+def sizes_of(lane, x, z, still):
+    """The sizes of the numbers that a point between x and z is computed from, or that those ``still`` came in with."""
+    return frozen(joined(jnp.where(still, lane.scale, 0.0), jnp.maximum(jnp.abs(x), jnp.abs(z))))
 
 
 def releasing(model, lane, least=HELD):

@@ -11,11 +11,11 @@ import jax.numpy as jnp
 from jax import lax
 
 from .functions import INF, chosen, frozen
-from .lane import CROSS, LEFT_DOMAIN, scaled, scales_here, stopped
+from .lane import CROSS, LEFT_DOMAIN, joined, scaled, scales_here, sizes_of, stopped
 from .model import Bound, noise_of
 from .steps import slope_at, step
 from .surfaces import SCAN, closed, each_at, standing, states_at, ties
-from .transitions import Crossing, facts_here_and_at, passed_over, sizes_of
+from .transitions import Crossing, facts_here_and_at, passed_over
 from .verdicts import attempted, looked_along, motion, rising, terms_of
 
 JUMP_HALVINGS, NEWTON_STEPS = 40, 8
@@ -135,11 +135,11 @@ def located_crossing(model, config, p, lane):
 
     def sizes(first, state):
         terms = terms_of(model.method, trial.x, rows[0][first] * trial.h, trial.stages)
-        between = jnp.maximum(jnp.maximum(sizes_of(still, trial.x, state), terms), still.terms)
         values, noise = rows[3].values[first], noise_of(rows[3], rows[1], rows[2], scaled(model, still))[first]
         held = still.contacts.any()
         stands = held | still.active[first] | (still.active & (jnp.abs(values) <= noise)).any()
-        between = jnp.where(stands, jnp.maximum(between, still.scale), between)
+        between = sizes_of(still, trial.x, state, stands | (state == still.entered_x))
+        between = joined(joined(between, terms), still.terms)
         return jnp.where(held, jnp.maximum(between, scales_here(model, still)), between)
 
     crossing = Crossing(

@@ -160,7 +160,7 @@ def noise_of(facts, t, x, scale):
     """Round-off of each surface at a point, whose numbers were computed from those of sizes (M, W) or (W)."""
     gradient = facts.gradients
     known = jnp.isfinite(gradient.sum(axis=-1))
-    sizes = jnp.maximum(jnp.abs(x)[..., None, :], scale)
+    sizes = jnp.maximum(jnp.abs(x)[..., None, :], jnp.abs(scale))
     terms = jnp.abs(gradient[..., 0]) * jnp.abs(t)[..., None] + (jnp.abs(gradient[..., 1:]) * sizes).sum(axis=-1)
     return 32 * 2.0**-53 * (facts.magnitudes + jnp.where(known, terms, 0.0))
 

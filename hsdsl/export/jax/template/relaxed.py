@@ -10,11 +10,11 @@ from jax import lax
 from .contact import is_possible
 from .control import accepted, error_ratio
 from .functions import frozen, when
-from .lane import CROSS, DEEP, FLAT, INWARD, scaled
+from .lane import CROSS, DEEP, FLAT, INWARD, scaled, sizes_of
 from .model import Bound, noise_of, norm_of
 from .steps import at, error_of, hermite
 from .surfaces import SCAN, each_at, last_up_crossing, states_at
-from .transitions import Crossing, facts_here_and_at, passed_over, sizes_of
+from .transitions import Crossing, facts_here_and_at, passed_over
 from .trials import shortened
 from .verdicts import Verdict, attempted, motion
 
@@ -109,8 +109,7 @@ def relaxed_crossing(model, config, p, lane):
     verdict = Verdict(jnp.asarray(False), failed, kind, blocked, jnp.asarray(False), ratio)
 
     def sizes(first, state):  # those of the entry count for what has not moved since, and on a guard not left
-        between = sizes_of(still, trial.x, trial.z)
-        return jnp.where((state == still.entered_x) | still.active[first], jnp.maximum(between, still.scale), between)
+        return sizes_of(still, trial.x, trial.z, (state == still.entered_x) | still.active[first])
 
     crossing = Crossing(
         goes, *points, trial.t1, depth, still.trial, trial, jnp.asarray(False), trial.t, sizes,

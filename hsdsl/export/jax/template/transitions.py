@@ -27,7 +27,7 @@ from .lane import (
     of_contacts,
     recorded,
     sampled,
-    scales_here,
+    sizes_of,
     stopped,
 )
 from .model import Bound
@@ -88,12 +88,6 @@ def corrected(bound, lane, k, t, x, time, state):
     return time + late, state + frozen(bound.flow(lane.mode, t, x)) * late
 
 
-def sizes_of(lane, x, z):
-    """The sizes of the numbers that a point between x and z is computed from."""
-    still = jnp.where(z == lane.entered_x, lane.scale, jnp.abs(z))
-    return frozen(jnp.maximum(jnp.maximum(jnp.abs(x), jnp.abs(z)), still))
-
-
 def passed_over(lane, mask):
     """A run whose trial has no crossing after all: it counts when it is made again."""
     return lane._replace(clear=lane.clear | mask, phase=jnp.where(mask, STEP, lane.phase))
@@ -125,8 +119,8 @@ def decided(model, config, p, lane, crossing):
     there = times[first], states[first]
     t, x = with_derivatives_of(point)(there, (p, lane, *there, first, length, share))
     t, x = jnp.where(fires, lane.t, t), jnp.where(fires, lane.x, x)
-    sizes = jnp.where(goes, crossing.sizes(first, there[1]), sizes_of(lane, still.x, still.x))
-    sizes = jnp.where(fires, frozen(jnp.maximum(jnp.abs(lane.x), lane.scale)), sizes)
+    sizes = jnp.where(goes, crossing.sizes(first, there[1]), sizes_of(lane, *(still.x,) * 2, still.x == lane.entered_x))
+    sizes = jnp.where(fires, lane.scale, sizes)
     landed = jnp.where(goes, crossing.landed, jnp.where(lane.phase == END, INF, still.t))
     depth = jnp.where(goes, jnp.where(found[k], crossing.depth[k], crossing.depth[first]), 0.0)
     depth = jnp.where(fires, config.relaxation, depth)
@@ -152,9 +146,6 @@ def transit(model, config, p, lane, record, event):
     after = bound.routines.reset(edge, bound.p, event.t, x)
     spread = bound.routines.spread(edge, bound.p, frozen(event.t), frozen(x), event.sizes)
     scale = frozen(jnp.where(jnp.isfinite(spread).all(), spread, jnp.abs(after)))
-    changes = model.of(model.loops, lane.mode)[event.k] & model.of(model.changes, edge)
-    most = (lane.count + 1) * jnp.maximum(jnp.abs(after), scales_here(model, lane))  # round-off adds up over resets
-    scale = frozen(jnp.where(changes, jnp.minimum(scale, most), scale))
     if config.scheme == "relaxed":
         resumed = event.landed + (config.relaxation - event.depth)
     else:
