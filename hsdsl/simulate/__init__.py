@@ -23,6 +23,7 @@
 `diagnostics`           departures from the theorem, and what is undecided
 `plan`                  a problem ready to run; the two engines
 `refinement`            the settings of the finer run that errors are measured by
+`moving`                how round-off moves that run
 `result`                what was recorded or written, as an execution
 `compiled`, `messages`  the same loop in C: its arguments, and its notes and stops in the same words
 `workspace`             where the C loop works; `output_buffers`, `columns` and `state_layouts` hold its output

@@ -10,7 +10,7 @@ import pytest
 from engines import needs_compiler
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64, multiprecision
+from hsdsl.arithmetic import FLOAT64, Arithmetic, multiprecision
 from hsdsl.roundoff import Rounded, following, moved
 
 NUMBERS = {"a": "0.1", "b": "2.7", "c": "1e9", "d": "-3"}
@@ -30,20 +30,17 @@ FORMULAS = (
 )
 
 
-def evaluated(formula: str, functions: Any, number: Any) -> Any:
-    names = {name: number(text) for name, text in NUMBERS.items()}
-    return eval(formula, {**functions, **names})
+def evaluated(formula: str, arithmetic: Arithmetic) -> Any:
+    names = {name: arithmetic.constant(Fraction(text)) for name, text in NUMBERS.items()}
+    return eval(formula, {**arithmetic.functions, **names})
 
 
 @pytest.mark.parametrize("formula", FORMULAS)
 @pytest.mark.parametrize("digits", [None, 25])
 def test_followed_round_off_is_what_is_lost(formula: str, digits: int | None) -> None:
     base, reference = FLOAT64 if digits is None else multiprecision(digits), multiprecision(80)
-    right = evaluated(formula, reference.functions, lambda text: reference.constant(Fraction(text)))
-    traced, bounded = (
-        evaluated(formula, each.functions, lambda text, each=each: each.constant(Fraction(text)))
-        for each in (following(base, traced=True), following(base, traced=False))
-    )
+    right = evaluated(formula, reference)
+    traced, bounded = (evaluated(formula, following(base, traced)) for traced in (True, False))
     known = reference.zero + traced.value + traced.error
     assert abs(known - right) <= traced.off + 8 * base.unit * abs(traced.error) + base.unit**2 * abs(right) * 1e12
     assert abs(reference.zero + bounded.value - right) <= bounded.off + base.unit**2 * abs(right)
@@ -84,7 +81,7 @@ PLACES = {
         b="{flow: {tau: 1, z: 1}}",
     ),
     "guard": dict(
-        a=f"{{flow: {{tau: 1, z: 0}}, transitions: [{{when: tau >= {CANCEL.format(x='z')}, to: b, reset: {{tau: 0}}}}]}}",
+        a=f"{{flow: {{{CLOCK}}}, transitions: [{{when: tau >= {CANCEL.format(x='z')}, to: b, reset: {{tau: 0}}}}]}}",
         b="{flow: {tau: 1, z: 1}}",
     ),
     "flow": dict(
@@ -179,7 +176,7 @@ def test_a_filter_forgets_its_round_off() -> None:
         f"w: {2 * pole * np.cos(0.7):.4f}*w - {pole**2}*v + 0.3, v: w", "w: 0.3, v: 0.1", "w >= 0.45", f"{samples}.5"
     )
     for method in ("taylor", "dop853"):
-        run = loaded.simulate(engine="python", method=method)
+        run: Any = loaded.simulate(engine="python", method=method)
         sizes = np.abs(run.values).max(axis=0)
         apart = np.abs(run.finer.values[-1] - run.values[-1])
         assert np.all(apart <= 64 * 2.0**-53 / (1 - pole) * sizes)
@@ -191,8 +188,9 @@ def test_a_filter_forgets_its_round_off() -> None:
     "reset",
     [
         "3.7*z*(1 - z)", "sin(5*z)/2 + cos(z)/3 + tan(y/3)", "min(z*1.3, 0.7) + max(y, 0.1) - abs(z - 0.4)/3",
-        "tanh(z)*1.3 + asinh(z)/9 + atan2(z, 1 + y)/5", "(1 + z**2)**1.5/4 + z**9/30", "select(z - 0.3, z/3, 0.9*z + 0.3)",
-        "floor(3*z)/5 + sign(z - 0.2)/9 + 0.11", "asin(z/9)*4 + cosh(z/3)/7 + atanh(z/5) + acosh(1.1 + z**2)/4",
+        "tanh(z)*1.3 + asinh(z)/9 + atan2(z, 1 + y)/5", "(1 + z**2)**1.5/4 + z**9/30",
+        "select(z - 0.3, z/3, 0.9*z + 0.3)", "floor(3*z)/5 + sign(z - 0.2)/9 + 0.11",
+        "asin(z/9)*4 + cosh(z/3)/7 + atanh(z/5) + acosh(1.1 + z**2)/4",
     ],
 )  # fmt: skip
 def test_both_engines_move_a_run_alike(reset: str, method: str) -> None:
@@ -207,7 +205,7 @@ modes:
 initial: {{mode: m, tau: 0, z: 0.3 + a, y: b}}
 experiment: {{until: 5.2}}
 """)
-    runs = [loaded.simulate(engine=engine, method=method, tolerance=1e-6) for engine in ("c", "python")]
+    runs: list[Any] = [loaded.simulate(engine=engine, method=method, tolerance=1e-6) for engine in ("c", "python")]
     one, other = (run.finer for run in runs)
     assert np.array_equal(one.times, other.times) and np.array_equal(one.values, other.values)
     assert not np.array_equal(one.values[0], runs[0].values[0])

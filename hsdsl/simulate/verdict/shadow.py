@@ -12,7 +12,8 @@ left out, carried along by the flow and by jumps, as long as that is small.
   show is seen.
 - Both follow for other methods from a `correction` of the step, as long as that leaves out less than the step.
 - Round-off is much the same for both, so each step moves the shadow run further away from the run by the most that it
-  may do: that of the flow, and of states that move. Where an arc begins these are rounded, too.
+  may do: that of the flow, and of states that move. Where an arc begins these are rounded, too. Starts, parameters and
+  results of resets are moved by their own round-off, and crossings by that of their surface: see `moving`.
 
 The shadow run crosses no other surface: enclosures wider than the errors decide along the run's own steps that none
 is reached.
