@@ -27,6 +27,7 @@ allows itself.
 `expansions`        operations along parts of steps, and what they leave unresolved; `expanded`: functions of these
 `commutation`       do transitions that are reached together commute?
 `accumulation`      Zeno points and rest, which the relaxed scheme goes through without a word
+`effort`            steps that crowd: no hypothesis, but said
 `strips`            transitions that are lost while another one waits in a strip
 ==================  =================================================================================================
 """
@@ -45,6 +46,7 @@ from hsdsl.simulate.stops import show
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import together
 from hsdsl.simulate.verdict.crossings import summary
+from hsdsl.simulate.verdict.effort import crowded_steps
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import Margins
@@ -67,6 +69,11 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
+    found = _of(run, diagnostics)
+    return Verdict(found.theorem, _once(found.reasons, crowded_steps(run.problem, run.execution)))
+
+
+def _of(run: RunView, diagnostics: Diagnostics) -> Verdict:
     if run.stop.reason == "interrupted":  # nobody waits for what could not decide it
         if diagnostics.departures:
             return Verdict("left", _once(diagnostics.departures))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl.execution import Execution, Verdict
 from hsdsl.simulate.verdict import RunView, assess, margins_of
+from hsdsl.simulate.verdict.effort import crowded_steps
 from hsdsl.simulate.verdict.screen import screens_of
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
     """Decide whether the theorem's hypotheses hold for a compiled run, are left, or are unknown."""
     compiled: Any = execution.compiled
     columns, problem, screens = compiled.columns, under_way.plan.problem, screens_of(under_way.plan, True)
-    if screens is None or columns.notes or not execution.stop.complete:
+    if screens is None or columns.notes or crowded_steps(problem, execution) or not execution.stop.complete:
         return assess(RunView(problem, execution), under_way.diagnostics)
     screen = screens.take()
     if not screen.decide(columns):
