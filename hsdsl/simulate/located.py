@@ -20,6 +20,7 @@ from hsdsl.simulate.entry import enter
 from hsdsl.simulate.relaxed import Event, go_on, sizes, standing_on
 from hsdsl.simulate.root_isolation import stays_below
 from hsdsl.simulate.run import ModeState, Run, choose, reset
+from hsdsl.simulate.stall_detection import pace
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import LEFT, left_domain, reached, reached_in_strip
 from hsdsl.simulate.surface_polynomials import Rise, deflated, rises_along
@@ -90,7 +91,8 @@ def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event |
     """Step until a surface is crossed, or to a time in the segment."""
     t, x, arc = here.t, here.x, here.arc
     before: Span | None = None
-    while t < limit:
+    steady = pace(run, t)
+    while t < limit and not steady.is_slow(t):
         span = steps.next(t, x, limit)
         if isinstance(span, StepFailure):
             return stuck(run, here.moved(t, x), span)
@@ -104,7 +106,7 @@ def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event |
         t, x, before = span.t1, span.z, span
         x = run.moved_along(here, t, x, span.h)
         arc.append(t, x, span.piece)
-    return here.moved(t, x)
+    return stuck(run, here.moved(t, x), StepFailure("slow")) if t < limit else here.moved(t, x)
 
 
 def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> Event | Stop | None:

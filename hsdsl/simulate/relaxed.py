@@ -22,7 +22,7 @@ from hsdsl.simulate.diagnostics import slides
 from hsdsl.simulate.entry import enter
 from hsdsl.simulate.run import ModeState, Run, choose, reset
 from hsdsl.simulate.scales import error_ratio
-from hsdsl.simulate.stall_detection import Patience
+from hsdsl.simulate.stall_detection import Patience, pace
 from hsdsl.simulate.standstill import standstill
 from hsdsl.simulate.stops import reached, reached_in_strip
 from hsdsl.simulate.surfaces import Arrival, Crossing, StepFailure, Trial, joined
@@ -71,13 +71,13 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = run.arithmetic.most_halvings
     t, x, limit, patience, chatter = here.t, here.x, here.segment.end, Patience(run.arithmetic.unit), Chatter()
-    active, emerging = here.surfaces.active, here.surfaces.emerging
+    active, emerging, steady = here.surfaces.active, here.surfaces.emerging, pace(run, t)
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return standstill(run, here).not_finite([(t, x)])
     control.begin(arc.scales, slope)
-    while t < limit:
+    while t < limit and not steady.is_slow(t):
         h, halvings, ratio, failure = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
@@ -116,7 +116,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
         arc.notice(z)
         arc.pieces.extend(pieces)
         t, x, slope = t1, z, end
-    return here.moved(t, x)
+    return stuck(run, here.moved(t, x), StepFailure("slow"), slope) if t < limit else here.moved(t, x)
 
 
 def attempts(run: Run, here: ModeState, method: Stepper) -> Attempt:

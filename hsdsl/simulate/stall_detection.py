@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 from hsdsl.arithmetic import Number
 from hsdsl.integrators.stepper import State
-from hsdsl.simulate.run import ModeState
+from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.surfaces import StepFailure
 
 IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
 MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
 CREEPING = 10  # halvings; steps below a thousandth of the full one
 MOST_CREEPING = 2000  # in a row: the run would take a thousand times its length in steps
+SHORT = 1e-6  # of a run
+MOST_SHORT = 100_000  # steps within that, in one flight: so the run would take a hundred billion
 
 
 @dataclass
@@ -46,6 +48,27 @@ class Patience:
         if self.idle > MOST_IDLE or (small and z == x):
             return failure
         return StepFailure("creeping", failure.surface) if self.creeping > MOST_CREEPING else None
+
+
+@dataclass
+class Pace:
+    """Counts the steps of a flight within a millionth of the run: ``short``, 0 for fixed steps, from ``since`` on."""
+
+    short: Number
+    since: Number
+    made: int = 0
+
+    def is_slow(self, t: Number) -> bool:
+        """Count a step from t; whether there were too many."""
+        self.made += 1
+        if t - self.since > self.short:
+            self.since, self.made = t, 0
+        return self.made > MOST_SHORT
+
+
+def pace(run: Run, t: Number) -> Pace:
+    """Begin to count at the start of a flight."""
+    return Pace(run.settings.until * (0 if run.control.tolerance is None else SHORT), t)
 
 
 def _still(here: ModeState, failure: StepFailure, t: Number, x: State, t1: Number, z: State) -> bool:

@@ -15,6 +15,7 @@ from hsdsl.simulate.chatter import Flow, jump_between
 from hsdsl.simulate.input_segments import Segment
 from hsdsl.simulate.problem import Problem
 from hsdsl.simulate.run import ModeState, Run
+from hsdsl.simulate.stall_detection import MOST_SHORT
 from hsdsl.simulate.stops import LEFT, left_domain, show
 from hsdsl.simulate.surfaces import StepFailure
 
@@ -67,6 +68,11 @@ class Standstill:
         t, x, h, name = self.t, self.x, self.h, self.mode.name
         if failure.kind == "wall" and failure.surface is not None:
             return left_domain(self.mode, failure.surface, t, LEFT)
+        if failure.kind == "slow":
+            steps = f"in mode {name} {MOST_SHORT} steps were made within a millionth of the run, up to t = {show(t)}"
+            return Stop(
+                "step_underflow", t, f"{steps}; fastest is {self._fastest()} take a shorter run or a larger scale"
+            )
         instant = self.problem.arithmetic.sqrt(self.problem.arithmetic.unit) * t
         faster_than_time = any(0 < s < instant * abs(f) for s, f in zip(self.scales, slope, strict=True))
         if failure.kind == "not finite" or (failure.kind in ("error", "unsolved", "creeping") and faster_than_time):

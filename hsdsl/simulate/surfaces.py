@@ -62,7 +62,7 @@ ANY = Arrival()
 class StepFailure:
     """Why a trial step ends outside the relaxed domain."""
 
-    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump"]
+    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump", "slow"]
     surface: int | None = None
 
 

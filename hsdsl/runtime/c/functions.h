@@ -117,6 +117,8 @@ static int struggles(const hs_control *control);
 
 /* stall_detection.c */
 static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, hs_time t1);
+static void begin_pace(hs_run *run);
+static int is_slow(hs_run *run);
 
 /* hs.c */
 static void *take(hs_store *store, int64_t count, size_t size);

@@ -178,7 +178,8 @@ typedef enum {
   HS_ERROR,
   HS_CREEPING,
   HS_UNSOLVED,
-  HS_JUMP
+  HS_JUMP,
+  HS_SLOW
 } hs_step_failure;
 
 /* Why a run ended, and where it was: mode, input segment, state, and (stuck) the flow there and the step's size;

@@ -248,7 +248,8 @@ static int follow(hs_run *run, hs_time limit) {
   run->sloped = run->creeping = run->has_before = run->chatter = 0;
   run->ratio = 1;
   forget_steps(run);
-  while (here->t < limit) {
+  begin_pace(run);
+  while (here->t < limit && !is_slow(run)) {
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
     const hs_step_failure failure = next_span(run, n, limit);
     if (failure != HS_CLEAR) return located_stuck(run, failure);
@@ -260,7 +261,7 @@ static int follow(hs_run *run, hs_time limit) {
     append(run, run->span.t1, run->z, &run->span.piece);
     go_to_end(run);
   }
-  return AT_BOUNDARY;
+  return here->t < limit ? located_stuck(run, HS_SLOW) : AT_BOUNDARY;
 }
 
 /* Forget the ends of contacts among what else might have been. */

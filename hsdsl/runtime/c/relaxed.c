@@ -61,7 +61,7 @@ static int standing_on(hs_run *run) {
 
 /* No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop. */
 static int stuck(hs_run *run, hs_step_failure kind, int surface) {
-  const int may_stand = kind != HS_ERROR && kind != HS_CREEPING && kind != HS_JUMP;
+  const int may_stand = kind != HS_ERROR && kind != HS_CREEPING && kind != HS_JUMP && kind != HS_SLOW;
   const int count = may_stand ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
@@ -116,7 +116,8 @@ static int flow(hs_run *run) {
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
   begin_steps(run);
-  while (here->t < limit) {
+  begin_pace(run);
+  while (here->t < limit && !is_slow(run)) {
     hs_real h = control->h, ratio = NAN;
     hs_time t1;
     int halvings = 0;
@@ -164,7 +165,7 @@ static int flow(hs_run *run) {
     run->k[0] = run->slope;
     run->k[run->method->stages] = run->end;
   }
-  return AT_BOUNDARY;
+  return here->t < limit ? stuck(run, HS_SLOW, -1) : AT_BOUNDARY;
 }
 
 static int in_strip(hs_run *run, hs_reason reason, hs_time t) {

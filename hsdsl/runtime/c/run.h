@@ -242,6 +242,8 @@ typedef struct {
 #endif
   /* of the located scheme */
   hs_span span, before;
+  hs_time since, short_time; /* short_steps of a flight since then; a millionth of the run */
+  int short_steps;
   int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
   hs_real ratio;                     /* of the last error estimate */
   hs_curves curves;

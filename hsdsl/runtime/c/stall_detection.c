@@ -4,6 +4,8 @@
 
 #define IDLE_UNITS 64
 #define MOST_IDLE 64
+#define SHORT 1e-6
+#define MOST_SHORT 100000
 
 /* Whether the surface in the way did not come nearer: its round-off is larger than what the step adds. */
 static int still(hs_run *run, int surface, hs_time t1) {
@@ -32,4 +34,18 @@ static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure fai
   stall->creeping = halvings >= CREEPING ? stall->creeping + 1 : 0;
   if (stall->idle > MOST_IDLE || (small && unmoved(run))) return failure;
   return stall->creeping > MOST_CREEPING ? HS_CREEPING : HS_CLEAR;
+}
+
+/* Begin to count the steps of a flight within a millionth of the run. */
+static void begin_pace(hs_run *run) {
+  run->since = run->here.t;
+  run->short_steps = 0;
+  run->short_time = run->task->settings.until * (run->control.tolerance > 0 ? SHORT : 0.0);
+}
+
+/* Count a step from run->here.t; whether there were too many. */
+static int is_slow(hs_run *run) {
+  run->short_steps++;
+  if (run->here.t - run->since > run->short_time) run->since = run->here.t, run->short_steps = 0;
+  return run->short_steps > MOST_SHORT;
 }

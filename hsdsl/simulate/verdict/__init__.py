@@ -32,6 +32,7 @@ allows itself.
 `expansions`        operations along parts of steps, and what they leave unresolved; `expanded`: functions of these
 `commutation`       do transitions that are reached together commute?
 `accumulation`      Zeno points and rest, which the relaxed scheme goes through without a word
+`effort`            steps that crowd: no hypothesis, but said
 `strips`            transitions that are lost while another one waits in a strip
 ==================  =================================================================================================
 """
@@ -49,6 +50,7 @@ from hsdsl.simulate.diagnostics import Diagnostics
 from hsdsl.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.simulate.verdict.commutation import together
 from hsdsl.simulate.verdict.crossings import summary
+from hsdsl.simulate.verdict.effort import crowded_steps
 from hsdsl.simulate.verdict.finding import Finding
 from hsdsl.simulate.verdict.remarked import remarked
 from hsdsl.simulate.verdict.run_view import RunView
@@ -73,7 +75,8 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
         What the loop itself noted.
     """
     verdict, looked_at = _judged(run, diagnostics)
-    return Verdict(verdict.theorem, verdict.reasons, remarked(looked_at, diagnostics))
+    reasons = _once(verdict.reasons, crowded_steps(run.problem, run.execution))
+    return Verdict(verdict.theorem, reasons, remarked(looked_at, diagnostics))
 
 
 def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:

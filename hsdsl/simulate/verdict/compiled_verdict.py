@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.execution import Execution, Verdict
 from hsdsl.program import Program
 from hsdsl.simulate.verdict import RunView, assess, margins_of
+from hsdsl.simulate.verdict.effort import crowded_steps
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.simulate.verdict.remarked import ends_beyond, may_end_beyond
 from hsdsl.simulate.verdict.screen import screens_of
@@ -20,7 +21,7 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
     """Decide whether the theorem's hypotheses hold for a compiled run, are left, or are unknown."""
     compiled: Any = execution.compiled
     columns, problem, screens = compiled.columns, under_way.plan.problem, screens_of(under_way.plan, True)
-    if screens is None or columns.notes or not execution.stop.complete:
+    if screens is None or columns.notes or crowded_steps(problem, execution) or not execution.stop.complete:
         return assess(RunView(problem, execution), under_way.diagnostics)
     screen = screens.take()
     if not screen.decide(columns):
