@@ -117,6 +117,7 @@ class ModelText:
         yield "edge_priority", cell(vector(edge.priority for edge in mode.edges) for mode in modes)
         yield "edge_changes", cell(cell(vector(1 + i for i in edge.changes) for edge in mode.edges) for mode in modes)
         yield "edge_counts", cell(cell(vector(1 + i for i in edge.counts) for edge in mode.edges) for mode in modes)
+        yield "queues", cell(vector(1 + queue.waiting for queue in mode.queues) for mode in modes)
         held = [0 if none or mode.held is None else 1 + mode.held for mode in modes]
         yield "held", vector(held)
         yield "contacts", str(program.contact_count)

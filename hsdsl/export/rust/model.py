@@ -91,7 +91,8 @@ def _mode(j: int, mode: ModeProgram, states: tuple[str, ...]) -> str:
         f"        is_final: {_truth(mode.final)},\n"
         f"        flow: {flow},\n        values: {values},\n        magnitudes: {magnitudes},\n"
         f"        outputs: {outputs},\n        gradients: &{gradients},\n        rates: &{rates},\n"
-        f"        terms: {terms},\n        held: {held},\n        states: &{places},\n    }},\n"
+        f"        terms: {terms},\n        held: {held},\n        states: &{places},\n"
+        f"        queues: &{array(str(queue.waiting) for queue in mode.queues)},\n    }},\n"
     )
 
 

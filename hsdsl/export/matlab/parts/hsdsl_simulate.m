@@ -143,6 +143,10 @@ function [w, after, scale] = reset(w, here, k, t, x, sizes)
     had = w.sizes(w.m.state_index{q}(changes));
     scale(changes) = min(scale(changes), (w.count + 1) * max(abs(after(changes)), had));
   end
+  n = w.m.queues{q};
+  if w.m.edge_target{q}(k) == q && any(x(n) >= 1 & after(n) > x(n))
+    w = ended(w, 'waiting_limit', sprintf('two executions of an event wait at t = %.10g, and one can', t));
+  end
   if ~all(isfinite(after))
     w = ended(w, 'not_finite', sprintf('the reset of %s has no value at t = %.10g', w.m.edge_names{q}{k}, t));
   end

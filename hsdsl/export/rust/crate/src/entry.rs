@@ -134,6 +134,9 @@ impl<S: Sink> Run<'_, S> {
                 Some(found) => found,
                 None => return Err(self.stop(StopReason::NotFinite, t)),
             };
+            if self.crowds(&crossing, &after) {
+                return Err(self.stop(StopReason::WaitingLimit, t));
+            }
             self.record(&crossing, fires, t, &after, true);
             self.x = after;
             self.scale = scale;

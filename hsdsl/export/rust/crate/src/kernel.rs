@@ -42,6 +42,8 @@ pub struct Mode {
     pub held: Option<Routine>,
     /// For each state its number among those of all modes.
     pub states: &'static [usize],
+    /// States with the number of executions of an event that wait.
+    pub queues: &'static [usize],
 }
 
 /// One row of a table without its zeros: stages and their weights.
@@ -95,6 +97,8 @@ pub enum StopReason {
     LeftDomain,
     Zeno,
     TransitionLimit,
+    /// A second execution of an event begins to wait: there is room for one.
+    WaitingLimit,
     NotFinite,
     StepUnderflow,
 }

@@ -230,6 +230,9 @@ impl<S: Sink> Run<'_, S> {
             Some(found) => found,
             None => return Err(self.stop(StopReason::NotFinite, t)),
         };
+        if self.crowds(crossing, &after) {
+            return Err(self.stop(StopReason::WaitingLimit, t));
+        }
         resumed = min(resumed, until);
         self.strip(crossing, &[(t, 0.0), (t1, depth), (resumed, epsilon)]);
         self.record(crossing, event.tied, resumed, &after, false);

@@ -238,6 +238,12 @@ impl<S> Run<'_, S> {
         edge.target == self.mode && edge.dimension == own && self.dimension == own
     }
 
+    /// Whether a second execution of an event would wait behind a transition.
+    pub(crate) fn crowds(&self, crossing: &Crossing, after: &State) -> bool {
+        let begins = |&q: &usize| crossing.state[q] >= 1.0 && after[q] > crossing.state[q];
+        self.returns(&self.here().edges[crossing.edge]) && self.here().queues.iter().any(begins)
+    }
+
     /// The sizes that the flow gives the states within the run, in a mode with motion along guards; else zero.
     fn start_sizes(&self) -> State {
         self.flow_sizes().filter(|found| found[..self.dimension].iter().all(|v| finite(*v))).unwrap_or([0.0; W])
