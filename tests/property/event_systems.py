@@ -8,7 +8,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, Literal
 
 import mpmath
 
@@ -118,10 +118,13 @@ class EventSystem:
 
 @dataclass
 class Memory:
-    """What an event remembers: ``waits`` has times and values that the reset gets, None where it gets those of then."""
+    """What an event remembers: ``waits`` has times and values that the reset gets, None where it gets those of then.
+
+    It is ``due`` by the flow or by a reset.
+    """
 
     armed: bool
-    due: bool = False
+    due: Literal["", "flow", "reset"] = ""
     waits: list[tuple[Any, Numbers | None]] = field(default_factory=list[Any])
 
 
@@ -166,7 +169,7 @@ class Simulator:
                 else:
                     memory.armed = True
                     if not event.persistent:
-                        memory.due, memory.waits = False, []
+                        memory.due, memory.waits = "", []
             count = count + 1 if self.t - instant <= SAME else 0
             instant = self.t
             if count > MOST_AT_ONCE:
@@ -194,11 +197,11 @@ class Simulator:
 
         return event.joined([of(part) for part in event.parts])
 
-    def set_off(self, event: RandomEvent, memory: Memory) -> None:
+    def set_off(self, event: RandomEvent, memory: Memory, by: Literal["flow", "reset"] = "flow") -> None:
         """The condition turned true, with the values of this instant."""
         memory.armed = False
         if event.delay is None:
-            memory.due = True
+            memory.due = by
             return
         delay = event.delay.value(self.names())
         values = None if event.at_execution else {x: value.value(self.names()) for x, value in event.reset.items()}
@@ -212,13 +215,24 @@ class Simulator:
             ready = [k for k, memory in enumerate(self.memory) if self.is_ready(memory)]
             if not ready:
                 return
-            self.make(min(ready, key=self.rank))
+            self.make(self.first_of(ready))
             if len(self.found.made) > MOST:
                 raise Unbounded
         self.found.endless = self.t
 
     def is_ready(self, memory: Memory) -> bool:
-        return memory.due or (bool(memory.waits) and memory.waits[0][0] <= self.t + SAME)
+        return bool(memory.due) or (bool(memory.waits) and memory.waits[0][0] <= self.t + SAME)
+
+    def first_of(self, ready: list[int]) -> int:
+        """What a reset set off goes before what the flow reached with no higher priority, and else M6 decides."""
+        waiting = [k for k in ready if not self.memory[k].due]
+        by_flow = [k for k in ready if self.memory[k].due == "flow"]
+        set_off = [k for k in ready if self.memory[k].due == "reset"]
+        if set_off:
+            first = min((*set_off, *waiting), key=self.rank)
+            if first in set_off and all(self.rank(k)[0] >= self.rank(first)[0] for k in by_flow):
+                return first
+        return min((*by_flow, *waiting), key=self.rank)
 
     def rank(self, k: int) -> tuple[Any, ...]:
         ranked = self.system.events[k].priority
@@ -227,7 +241,7 @@ class Simulator:
     def make(self, k: int) -> None:
         event, memory, before = self.system.events[k], self.memory[k], self.names()
         values = None if memory.due else memory.waits.pop(0)[1]
-        memory.due = False
+        memory.due = ""
         values = values or {x: value.value(before) for x, value in event.reset.items()}
         self.x = {**self.x, **values}
         self.found.made.append((self.t, event.name))
@@ -238,9 +252,11 @@ class Simulator:
             if not self.holds(other, changed):
                 its.armed = True
                 if not other.persistent:
-                    its.due, its.waits = False, []
+                    its.due, its.waits = "", []
             elif its.armed:
-                self.set_off(other, its)
+                self.set_off(other, its, "reset")
+            if its.due and other is not event:
+                its.due = "reset"
         if self.system.ball is not None:
             self.rest(k, changed)
 

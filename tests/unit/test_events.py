@@ -467,3 +467,62 @@ def test_verdict_names_what_is_lost_in_a_strip(engine, transitions, made):
     assert run.verdict.theorem == "left"
     assert run.verdict.reasons[0].startswith(f"{made[1]} was lost at t = 1: ")
     assert [one.edge for one in of.simulate(engine=engine).transitions] == made
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("c", [0.3, 0.62, 0.97])
+@pytest.mark.parametrize("delay", ["", ", delay: 0"])
+def test_a_ball_of_events_comes_to_rest(engine, c, delay):
+    """From height 1 it rests at T (1 + c)/(1 - c), where T = sqrt(2/g) is the first fall."""
+    event = f"{{name: bounce, event: h <= 0, reset: {{v: -{c}*v, n: n + 1}}{delay}}}"
+    run = model("h: v, v: -10, n: 0", event, "h: 1, v: 0, n: 0", "40").simulate(engine=engine)
+    first = math.sqrt(0.2)
+    assert run.stop.reason == "until" and run.final.state["h"] == run.final.state["v"] == 0
+    assert run.transitions[-1].time == pytest.approx(first * (1 + c) / (1 - c), abs=2e-6)
+    assert run.final.state["n"] == len(times(run, "bounce"))
+    assert run.verdict.theorem == "left" and not [r for r in run.verdict.reasons if "@" in r]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("scheme", ["located", "relaxed"])
+@pytest.mark.parametrize("base", [2, 3, 1.3])
+@pytest.mark.parametrize("kind", ["event: x <= 0", "when: x <= 0, to: m"])
+def test_a_tail_without_a_limit_stops(engine, scheme, base, kind):
+    """x falls from 1 and is kicked to b**-1, b**-2, ...: at 1 + 1/(b - 1) infinitely many kicks are over."""
+    if scheme == "relaxed" and kind.startswith("when"):
+        pytest.skip("the relaxed scheme goes on, at the surface")
+    kick = f"{{name: kick, {kind}, reset: {{n: n + 1, x: {base}**(-(n + 1))}}}}"
+    run = model("x: -1, n: 0", kick, "x: 1, n: 0", "9").simulate(engine=engine, scheme=scheme)
+    assert run.stop.reason == "zeno" and not run.stop.reason == "until"
+    late = 2e-6 * len(run.transitions) if scheme == "relaxed" else 1e-10
+    assert run.stop.time == pytest.approx(1 + 1 / (base - 1), abs=late) and len(run.transitions) < 200
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_what_only_counts_keeps_no_cascade_going(engine):
+    two = "{name: a, event: y >= 1, reset: {y: 0, n: n + 1}}, {name: b, event: y <= 0, reset: {y: 1, n: n + 3}}"
+    go = "{when: x >= 2, to: m, reset: {x: 0, y: 1}}"
+    run = model("x: 1, y: 0, n: 0", f"{two}, {go}", "x: 0, y: 1/2, n: 0").simulate(engine=engine)
+    assert run.stop.reason == "zeno" and run.stop.time == pytest.approx(2) and len(run.transitions) < 8
+    limited = two.replace("y >= 1,", "y >= 1 and n < 40,")
+    run = model("x: 1, y: 0, n: 0", f"{limited}, {go}", "x: 0, y: 1/2, n: 0", "3").simulate(engine=engine)
+    assert run.stop.reason == "until" and run.final.state["n"] >= 40
+    once = model("x: 1, n: 0", "{when: x >= 2, to: m, reset: {n: n + 1}}", "x: 0, n: 0").simulate(engine=engine)
+    assert once.stop.reason == "zeno" and len(once.transitions) < 4
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("first", "second"), [(", delay: 0", ""), ("", ", delay: 0"), (", delay: 0", ", delay: 0")])
+@pytest.mark.parametrize("priority", [0, 2])
+def test_a_delay_of_0_changes_no_order(engine, first, second, priority):
+    """Both are set off by one reset, and then by the flow: M6 decides."""
+    both = (
+        f"{{name: a, event: y + x >= 5, reset: {{n: 10*n + 1}}, values: execution{first}}},"
+        f"{{name: b, event: y + x >= 5, reset: {{n: 10*n + 2}}, priority: {priority}, values: execution{second}}}"
+    )
+    both = both.replace(", values: execution}", "}")
+    go = "{when: x >= 2, to: m, reset: {x: 0, y: 5}}, {when: x >= 1, if: y > 4, to: m, reset: {y: 0}}"
+    run = model("x: 1, y: 0, n: 0", f"{both}, {go}", "x: 0, y: 0, n: 0", "6.5").simulate(engine=engine)
+    made = [(round(m.time, 6), m.edge) for m in run.transitions if m.edge in "ab"]
+    order = "ba" if priority else "ab"
+    assert made[:2] == [(2.0, order[0]), (2.0, order[1])] and len(made) % 2 == 0

@@ -135,15 +135,19 @@ class Event:
         """Whether new values of states change its condition."""
         return any(c.residual.xreplace(meaning) != c.residual for c in comparisons(self.event.trigger))
 
-    def after(self, meaning: Mapping[Any, Any], reached: Reached | None = None) -> Any:
+    def after(self, meaning: Mapping[Any, Any], reached: Reached | None = None, going_on: bool = False) -> Any:
         """1 where the condition holds at new values of states.
 
         Of the comparisons that stay the one that was ``reached`` holds while the flow does not lead back, and so do
-        those that counted as reached with it.
+        those that counted as reached with it. Where the mode is ``going_on``, comparisons that stay are on their
+        surfaces what they are next.
         """
 
         def of(part: Reached) -> Any:
-            if reached is None or part.residual.xreplace(meaning) != part.residual:
+            stays = part.residual.xreplace(meaning) == part.residual
+            if stays and going_on and part.strict and (rate := self.rate(part.residual)) != 0:
+                return part.rises(rate, TIME).xreplace(meaning)
+            if reached is None or not stays:
                 return part.holds(meaning)
             turns = part.turns(reached)
             rate = self.rate(part.residual)

@@ -47,6 +47,8 @@ def edges_of(event: Event, highest: Any | None, events: Sequence[Event]) -> Iter
             if other.delay is not None and other.goes_before(event):
                 alike = ONE if highest is None else below(other.priority - event.priority, ZERO, ZERO, ONE)
                 now *= 1 - other.ready * alike
+            elif highest is None and other.delay is None and other.edge.priority > event.edge.priority:
+                now *= 1 - other.ready
         yield _when_due(fires, event, now), event, None
     if event.delay is not None:
         made = executes(event)

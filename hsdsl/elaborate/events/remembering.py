@@ -100,13 +100,13 @@ def _after_firing(event: Event, meaning: Mapping[Any, Any], reached: Reached | N
     Then its condition is false however short the flow goes back for. Where it was due it need not hold.
     """
     known = reached is not None and not event.touched(meaning) and not event.leaves(meaning)
-    armed = ZERO if known else ONE - event.after(meaning, reached)
+    armed = ZERO if known else ONE - event.after(meaning, reached, reached is None)
     return {event.names["armed"]: armed} | ({event.names["due"]: ZERO} if event.jumps else {})
 
 
 def _changed(event: Event, meaning: Mapping[Any, Any]) -> Values:
     """The memory after another edge changed the condition."""
-    armed, due, holds = event.symbol("armed"), event.symbol("due"), event.after(meaning)
+    armed, due, holds = event.symbol("armed"), event.symbol("due"), event.after(meaning, going_on=True)
     now = armed * holds
     if event.event.persistent:  # it also goes where the flow turns it true at this instant
         now = maximum(now, armed * event.rises())

@@ -84,9 +84,10 @@ def _tables(source: Source) -> str:
         numbers.append(tuple(range(len(edges), len(edges) + len(mode.edges))))
         for k, edge in enumerate(mode.edges):
             target = tuple(map(states.index, edge.target_states))
+            queues = tuple(queue.waiting for queue in mode.queues if edge.target == j)
             edges.append(
                 f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
-                f"{edge.counts}, {edge.changes}, SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}, "
+                f"{edge.counts}, {edge.changes}, {queues}, SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}, "
                 f"mode_{mode.held if edge.branched else j}_reset_{k}),"
             )
     found = flows(source)

@@ -12,9 +12,10 @@ from .functions import INF, NAN, frozen
 from .model import HELD, LOOKED_AT
 
 STEP, CROSS, STUCK, BOUNDARY, END, ENTER, FIRE, TOUCH, DONE = range(9)  # what a lane does next
-RUNNING, UNTIL, FINAL, LEFT_DOMAIN, ZENO, LIMIT, NOT_FINITE, UNDERFLOW, STEPS = range(9)  # how it ended
+RUNNING, UNTIL, FINAL, LEFT_DOMAIN, ZENO, LIMIT, NOT_FINITE, UNDERFLOW, STEPS, WAITING = range(10)  # how it ended
 STOPS = (
-    "running", "until", "final", "left_domain", "zeno", "transition_limit", "not_finite", "step_underflow", "steps"
+    "running", "until", "final", "left_domain", "zeno", "transition_limit", "not_finite", "step_underflow", "steps",
+    "waiting_limit",
 )  # fmt: skip
 FREE = 16  # transitions within the relaxation that cost no time
 CLEAR, WALL, DEEP, FLAT, INWARD, VALUE, WRONG, CREEPING = range(8)  # why a trial step does not count

@@ -100,11 +100,12 @@ class Model:
                 self.of_owner[j, own + k], self.of_held[mode.owner, plain + k] = plain + k, own + k
         self.holds = bool((self.contact >= 0).any())
         self.target = np.array([edge.target for edge in edges] or [0])
-        self.counts, self.changes = np.zeros((2, max(1, len(edges)), self.W), bool)
+        self.counts, self.changes, self.queues = np.zeros((3, max(1, len(edges)), self.W), bool)
         self.returns = np.array([edge.source == edge.target for edge in edges] or [False])
         self.source = np.array([edge.source for edge in edges] or [0])
         for k, edge in enumerate(edges):
             self.counts[k, list(edge.counts)] = self.changes[k, list(edge.changes)] = True
+            self.queues[k, list(edge.queues)] = True
         # whose outputs a run has behind an edge: a final mode without a flow keeps the states before, and these
         keepers = [e.source if e.states and not modes[e.target].states else e.target for e in edges]
         self.keeper = np.array(keepers or [0])

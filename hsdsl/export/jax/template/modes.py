@@ -113,7 +113,7 @@ def mode_of(
     )
 
 
-def edge_of(name, source, target, states, conditional, priority, counts, changes, width, reset, spread, slow):
+def edge_of(name, source, target, states, conditional, priority, counts, changes, queues, width, reset, spread, slow):
     """An edge of plain routines; ``slow`` is its reset, or the branch of that which slow impacts take."""
     return Edge(
         name,
@@ -124,6 +124,7 @@ def edge_of(name, source, target, states, conditional, priority, counts, changes
         priority,
         counts,
         changes,
+        queues,
         lambda p, t, x: padded(reset(p, t, x), width),
         lambda p, t, x, s: padded(spread(p, t, x, s), width),
         lambda p, t, x: padded(slow(p, t, x), width),
@@ -132,7 +133,10 @@ def edge_of(name, source, target, states, conditional, priority, counts, changes
 
 @dataclass(frozen=True)
 class Edge:
-    """An edge between modes, given by their numbers; the states of its target, those it counts with, and changes."""
+    """An edge between modes, given by their numbers; the states of its target, those it counts with, and changes.
+
+    ``queues`` are the states of its mode with the number of executions of an event that wait.
+    """
 
     name: str
     source: int
@@ -142,6 +146,7 @@ class Edge:
     priority: int
     counts: tuple[int, ...]
     changes: tuple[int, ...]
+    queues: tuple[int, ...]
     reset: Callable
     spread: Callable
     slow: Callable

@@ -22,6 +22,7 @@ from .lane import (
     STUCK,
     UNTIL,
     VALUE,
+    WAITING,
     contraction,
     flown,
     of_contacts,
@@ -163,8 +164,9 @@ def transit(model, config, p, lane, record, event):
         record, config, mask & waits, lane.mode, event.t, jnp.minimum(resumed, config.until),
         lambda times: jnp.broadcast_to(x, (len(times), model.W)),
     )  # fmt: skip
-    stops = mask & (late | bad)
-    halted = stopped(lane, stops, jnp.where(late, UNTIL, NOT_FINITE))
+    crowd = (model.of(model.queues, edge) & (frozen(x) >= 1) & (frozen(after) > frozen(x))).any()  # one can wait
+    stops = mask & (late | bad | crowd)
+    halted = stopped(lane, stops, jnp.where(late, UNTIL, jnp.where(bad, NOT_FINITE, WAITING)))
     halted = halted._replace(
         t=jnp.where(late, config.until, event.t), x=jnp.where(before.phase == END, lane.x, x),
         count=lane.count + jnp.where(late, 1, 0),
