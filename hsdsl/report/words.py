@@ -14,6 +14,7 @@ from hsdsl.execution import Execution, Transition
 from hsdsl.names import called, seen, without_memory
 from hsdsl.parts import change, compact, of_all
 from hsdsl.report.alike import condensed
+from hsdsl.report.remedies import remedies_of
 
 DIGITS = 10  # of a run without a tolerance, whose error nothing says
 _LEAST_DIGITS, _MOST_DIGITS = 3, 16
@@ -97,6 +98,8 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     if left_out is not None:
         yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
     yield "verdict", ": ".join(filter(None, (execution.verdict.theorem, "; ".join(_reasons(execution)))))
+    if execution.verdict.theorem == "unknown":
+        yield from (("remedy", each) for each in remedies_of(execution.verdict.reasons))
     yield "time", ", ".join(f"{stage} {value:.3g} s" for stage, value in execution.seconds.items())
 
 
