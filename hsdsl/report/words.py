@@ -15,6 +15,7 @@ from hsdsl.execution import Execution, Transition
 from hsdsl.names import called, seen, without_memory
 from hsdsl.parts import change, compact, of_all
 from hsdsl.report.alike import condensed
+from hsdsl.report.remedies import remedies_of
 
 DIGITS = 10  # of a run without a tolerance, whose error nothing says
 _LEAST_DIGITS, _MOST_DIGITS = 3, 16
@@ -103,6 +104,8 @@ def facts(execution: Execution) -> Iterator[tuple[str, str]]:
     yield "verdict", conclusion(execution)
     if conclusion(execution) != ": ".join((execution.verdict.theorem, *reasons(execution))):
         yield from (("reason", each) for each in reasons(execution))
+    if execution.verdict.theorem == "unknown":
+        yield from (("remedy", each) for each in remedies_of(execution.verdict.reasons))
     yield "time", ", ".join(f"{stage} {value:.3g} s" for stage, value in execution.seconds.items())
 
 

@@ -153,8 +153,9 @@ class World:
     ill: set[str] = field(default_factory=set[str])
 
     def same(self, other: World) -> bool:
-        names = ("modes", "values", "sample", "armed", "due", "waiting")
-        return all(getattr(self, name) == getattr(other, name) for name in names)
+        names = ("modes", "values", "sample", "armed", "due")
+        alike = all(getattr(self, name) == getattr(other, name) for name in names)
+        return alike and sorted(self.waiting, key=str) == sorted(other.waiting, key=str)
 
     def copy(self) -> World:
         system = self.system
@@ -412,6 +413,7 @@ class World:
         )
         other = self.copy()
         other.choices()
+        self.ill |= other.ill
         other.settle()
         other.sample += 1
         other.settle()

@@ -38,6 +38,7 @@ def judge(seeds: range) -> Counter[str]:
         run = hsdsl.loads(written(system)).simulate()
         found = is_right(run, right)
         assert found or run.verdict.theorem != "holds", (seed, right.ill, run.verdict)
+        assert not any("order" in why for why in right.ill) or run.verdict.theorem != "holds", (seed, run.verdict)
         if not right.ill:
             assert found, (seed, run.stop, run.verdict)
             assert run.verdict.theorem != "left", (seed, run.verdict)
