@@ -154,7 +154,9 @@ def test_chaos_is_repeated_and_unknown() -> None:
     assert "finer" in run.__dict__
 
 
-@pytest.mark.parametrize(("engine", "method"), [*(("c", method) for method in METHODS), ("python", "taylor")])
+@pytest.mark.parametrize(
+    ("engine", "method"), [*(("c", method) for method in (*METHODS, "dop853")), ("python", "taylor")]
+)
 def test_round_off_that_both_share_is_seen(engine: str, method: str) -> None:
     """A rate of cos t is the sum of terms of 1e14, whose last digit is 0.016: round-off decides whether x reaches 1."""
     flow = {"x": "(c + 1e7)**2 - 1e14 - 2e7*c - c**2 + c", "c": "-s", "s": "c"}
