@@ -164,8 +164,9 @@ static int enter_surfaces(fmu *unit, double t, const hs_mode *before, const int 
     const int on = k == made ? fabs(r[k] - from) <= margin[k] : fmu_is_on(unit, k);
     const int outside = fmu_may_be_beyond(unit, k) && r[k] > margin[k] && !(stays && crossed[k]);
     now->side[k] = outside ? FMU_OUTSIDE : FMU_INSIDE;
-    if (stays && on && fmu_is_driven(unit, k) && !fmu_may_be_beyond(unit, k) && r[k] > margin[k] / 2) now->side[k] = FMU_ON;
-    if (now->side[k] == FMU_ON) now->furthest[k] = k == made ? r[k] : now->furthest[k];
+    const int counts = fmu_is_driven(unit, k) && !fmu_may_be_beyond(unit, k);
+    if (stays && on && counts && r[k] > margin[k] / 2) now->side[k] = FMU_ON;
+    if (now->side[k] == FMU_ON && k == made) now->furthest[k] = r[k];
     now->inside_at[k] = t;
     if (!stays || k == made) now->left_at[k] = INFINITY;
     if (r[k] < -margin[k]) now->left_at[k] = hs_min(now->left_at[k], t);
@@ -256,10 +257,13 @@ static void copy_inputs(fmu_given_values *to, const fmu_given_values *from) {
 void fmu_enter_events(fmu *unit) {
   fmu_data *const now = &unit->now;
   const fmu_given_values seen = now->seen;
+  now->at_event = 1;
   copy_inputs(&now->earlier, &now->given);
   now->seen = now->earlier;
   if (!memcmp(now->seen_state, now->state, sizeof now->state)) copy_inputs(&now->seen, &seen);
 }
+
+void fmu_leave_events(fmu *unit) { unit->now.at_event = 0; }
 
 /* Make the transitions that are due; why the run ends, if it does. */
 static const char *transitions(fmu *unit, int entry) {
@@ -334,6 +338,7 @@ static int32_t present_segment(const fmu_data *now, int *jumped) {
 }
 
 fmu_status fmu_begin(fmu *unit) {
+  unit->now.at_event = 1;
   if (enter_surfaces(unit, unit->now.time, 0, 0, -1, 0.0)) return FMU_ERROR;
   settle(unit, 1);
   return !unit->now.ended && set_sides(unit) ? FMU_ERROR : FMU_OK;

@@ -57,9 +57,9 @@ FMI_TYPED(void, FreeInstance, void *i) {
   free(own);
 }
 
-NOTHING_TO_DO(EnterContinuousTimeMode)
 NOTHING_TO_DO(Terminate)
 
+FMI(EnterContinuousTimeMode, void *i) { return fmu_leave_events(((instance *)i)->unit), FMI_OK; }
 FMI(EnterEventMode, void *i) { return fmu_enter_events(((instance *)i)->unit), FMI_OK; }
 FMI(ExitInitializationMode, void *i) { return fmi_answer(i, fmu_initialize(((instance *)i)->unit)); }
 FMI(Reset, void *i) { return fmu_reset(((instance *)i)->unit), FMI_OK; }

@@ -155,8 +155,9 @@ fmu_status fmu_get(fmu *unit, unsigned reference, double *value) {
       if (fmu_get_indicators(unit, indicators)) return FMU_NO_VALUE;
       *value = indicators[variable->index];
       return FMU_OK;
-    default: unit->refusal = "a mode is an integer: export with --mode local for tools that read reals alone"; return FMU_ERROR;
+    default: unit->refusal = "a mode is an integer: --mode local is for tools that read all outputs as reals";
   }
+  return FMU_ERROR;
 }
 
 /* Whether a parameter may be tuned to a value: those that it decides are within their bounds too. */

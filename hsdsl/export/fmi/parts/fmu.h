@@ -33,11 +33,12 @@ typedef struct {
   double furthest[PROBLEM_SURFACES + 1]; /* how far beyond a surface the state is that is on it */
   double input_size[FMU_INPUTS + 1];     /* the largest so far */
   double inside_at[PROBLEM_SURFACES + 1]; /* when a state was inside at last */
-  double left_at[PROBLEM_SURFACES + 1]; /* when it was inside at first, off the surface, since the last transition there */
+  double left_at[PROBLEM_SURFACES + 1]; /* when it was off the surface, inside, at first since its last transition */
   int again;                      /* transitions in a row from a surface that the state did not leave */
   fmu_given_values given, earlier; /* now, and before this event; in co-simulation before this step */
-  fmu_given_values seen;           /* where indicators were evaluated last, at this state: */
+  fmu_given_values seen;           /* where indicators were evaluated last between events, at this state: */
   double seen_state[PROBLEM_STATES + 1];
+  int at_event;
   int tuned; /* whether what is given has changed since it was put in place */
   /* of co-simulation: what is shown in place of the state while it waits in a strip, or before an event is handled */
   int shows_before, before_mode;
@@ -87,6 +88,7 @@ fmu_status fmu_initialize(fmu *unit);
 
 /* An event begins: what is given now is what was before it. */
 void fmu_enter_events(fmu *unit);
+void fmu_leave_events(fmu *unit);
 
 /* Handle what is due at the present time; `jumped` says whether states have changed, `next` is the next known event. */
 fmu_status fmu_update(fmu *unit, int *jumped, double *next);

@@ -123,8 +123,10 @@ fmu_status fmu_get_indicators(fmu *unit, double *z) {
   for (int k = 0; k < PROBLEM_SURFACES; k++) z[k] = 1.0;
   if (!p) return FMU_NO_VALUE;
   if (unit->now.ended) return FMU_OK;
-  unit->now.seen = unit->now.given;
-  memcpy(unit->now.seen_state, unit->now.state, sizeof unit->now.state);
+  if (!unit->now.at_event) {
+    unit->now.seen = unit->now.given;
+    memcpy(unit->now.seen_state, unit->now.state, sizeof unit->now.state);
+  }
   fmu_local(unit, x);
   if (mode->values(p, unit->now.time, x, r)) return FMU_NO_VALUE;
   for (int k = 0; k < mode->surfaces; k++) {
