@@ -211,6 +211,21 @@ def test_events_keep_how_they_are_made() -> None:
     assert hsdsl.loads(text).simulate().final.state["y"] == 7
 
 
+def test_what_is_taken_for_granted_is_told_by_every_run() -> None:
+    first, second = (
+        event("time > 1", {"p": value}).replace("</event>", f"<priority>{math('3')}</priority></event>")
+        for value in ("1", "2")
+    )
+    constraint = f"<constraint>{math('p < 5')}</constraint>"
+    text = model(Parameters=parameter("p", 0), Events=first + second, Constraints=constraint)
+    run = hsdsl.loads(of(text)).simulate()
+    unchecked, chosen = (warning for warning in run.warnings if warning.code == "HS707")
+    assert unchecked.message.startswith("the SBML constraints of line 1 are not checked: write them under `domain`")
+    assert "have one priority: where SBML chooses at random, the first in the file goes first" in chosen.message
+    assert all(len(warning.message.split()) <= 25 for warning in run.warnings)
+    assert hsdsl.loads(of(model(Parameters=parameter("p", 0), Events=first))).simulate().warnings == ()
+
+
 def test_units_are_kept() -> None:
     """Defined units, and those of the model."""
     units = (
