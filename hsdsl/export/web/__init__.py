@@ -45,7 +45,14 @@ def with_scene(source: Source) -> Source:
     given = source.problem
     program = lower(system)
     problem = Problem(
-        program, given.kernel, given.settings, given.timeline, given.mode, given.states, given.x, given.waits,
+        program,
+        given.kernel,
+        given.settings,
+        given.timeline,
+        given.mode,
+        given.states,
+        given.x,
+        given.waits,
         given.moved,
     )
     return replace(source, system=system, problem=problem)

@@ -65,8 +65,9 @@ static void hs_open_given(hs_given_run *own, const hs_given *given, const double
 
 /* Run to the end; why it ended, as a number of `words`. */
 static int hs_run_given(hs_given_run *own) {
-  static const char *const words[] = {"until", "final", "left_domain", "zeno", "transition_limit", "not_finite",
-                                      "step_underflow"};
+  static const char *const words[] = {"until", "final", "left_domain", "zeno", "transition_limit", "waiting_limit",
+                                      "not_finite", "step_underflow"};
+  const int count = (int)(sizeof words / sizeof *words);
   int reason = 0;
   hs_run_instance(&own->run);
 #if defined(HS_GROWS)
@@ -76,7 +77,7 @@ static int hs_run_given(hs_given_run *own) {
     free(block);
   }
 #endif
-  while (reason < 7 && strcmp(hs_stop_word(&own->run.task.stop), words[reason])) reason++;
+  while (reason < count && strcmp(hs_stop_word(&own->run.task.stop), words[reason])) reason++;
   return reason;
 }
 

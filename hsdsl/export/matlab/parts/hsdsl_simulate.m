@@ -19,7 +19,8 @@ function r = hsdsl_simulate(m, p, x0, s)
   width = out(5);
   rows = reshape(out(6:5 + out(3) * (3 + width)), 3 + width, []).';
   made = reshape(out(6 + numel(rows):end), 5 + 2 * width, []);
-  words = {'until', 'final', 'left_domain', 'zeno', 'transition_limit', 'not_finite', 'step_underflow', 'interrupted'};
+  words = {'until', 'final', 'left_domain', 'zeno', 'transition_limit', 'waiting_limit', 'not_finite', ...
+           'step_underflow', 'interrupted'};
   stop = words{out(1) + 1};
   r = struct('t', rows(:, 1), 'j', rows(:, 2), 'x', rows(:, 3:end), 'transitions', transitions(m, made, width), ...
              'stop', stop, 'about', about(m, stop, out(2), rows(end, 3), rows(end, 4:end)));
@@ -107,6 +108,8 @@ function text = about(m, stop, t, q, x)
       text = sprintf('transitions accumulate, or return to the same state, at t = %.10g', t);
     case 'transition_limit'
       text = sprintf('as many transitions as allowed at t = %.10g', t);
+    case 'waiting_limit'
+      text = sprintf('more executions of an event than can wait at t = %.10g', t);
     case 'not_finite'
       text = sprintf('something of mode %s has no finite value at t = %.10g', mode, t);
     case 'step_underflow'

@@ -37,6 +37,8 @@ pub enum StopReason {
     LeftDomain,
     Zeno,
     TransitionLimit,
+    /// More executions of an event were to wait than may, or than there is memory for.
+    WaitingLimit,
     NotFinite,
     StepUnderflow,
     /// One chain of transitions at an instant entered more modes than there is memory for.
@@ -44,12 +46,13 @@ pub enum StopReason {
 }
 
 impl StopReason {
-    const ALL: [(StopReason, &'static str); 8] = [
+    const ALL: [(StopReason, &'static str); 9] = [
         (StopReason::Until, "until"),
         (StopReason::Final, "final"),
         (StopReason::LeftDomain, "left_domain"),
         (StopReason::Zeno, "zeno"),
         (StopReason::TransitionLimit, "transition_limit"),
+        (StopReason::WaitingLimit, "waiting_limit"),
         (StopReason::NotFinite, "not_finite"),
         (StopReason::StepUnderflow, "step_underflow"),
         (StopReason::Interrupted, "interrupted"),
