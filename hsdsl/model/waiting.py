@@ -1,4 +1,4 @@
-"""Executions that wait where a run starts: those of `run.final.state` of a run that goes on, beyond the first of each."""
+"""Executions that wait where a run starts: those of the `run.final.state` that it goes on from, beyond the first."""
 
 from __future__ import annotations
 
