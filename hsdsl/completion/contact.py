@@ -33,7 +33,6 @@ from hsdsl.completion.nearby import (
 )
 from hsdsl.completion.printer import text_of
 from hsdsl.expression.derivatives import derivative, lie_derivative
-from hsdsl.expression.scope import symbol
 from hsdsl.functions import sign
 from hsdsl.names import memory, without_memory
 from hsdsl.system import TIME, Edge, Mode, Surface

@@ -1,4 +1,4 @@
-"""Executions that wait where a run starts: those of `run.final.state` of a run that goes on, beyond the first of each."""
+"""Executions that wait where a run starts, behind the first of each event: those of a run that it goes on from."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ from hsdsl.simulate.settings import Settings
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """A program, its numbers, and where it starts: mode, the names of its states, ``x`` at t = 0, and what ``waits``."""
+    """A program, its numbers, and where it starts: mode, names of its states, ``x`` at t = 0, and what ``waits``."""
 
     program: Program
     kernel: Kernel

@@ -68,7 +68,7 @@ def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Numb
 
 
 def unresolved(run: Run, here: ModeState, k: int) -> Stop | None:
-    """Stop at the end of a tail of edge k that runs to no limit, where what is left of it is shorter than time can tell.
+    """Stop where what is left of a tail of edge k that runs to no limit is shorter than time can tell.
 
     The relaxed scheme goes on with all but events, which might not be armed again there.
     """

@@ -302,7 +302,8 @@ class _Writer:
             f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}, {len(edge.changes)}, "
             f"{self.table('int', 'places', list(map(str, edge.changes)))}, "
             f"{-1 if edge.contact is None else edge.contact}, {edge.push_order}, {len(edge.counts)}, "
-            f"{self.table('int', 'places', list(map(str, edge.counts)))}, {int(edge.branched)}, {int(bool(edge.of_event))}, "
+            f"{self.table('int', 'places', list(map(str, edge.counts)))}, {int(edge.branched)}, "
+            f"{int(bool(edge.of_event))}, "
             f"{-1 if edge.releases is None else edge.releases}}}"
         )
 

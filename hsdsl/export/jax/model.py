@@ -87,7 +87,8 @@ def _tables(source: Source) -> str:
             queues = tuple(queue.waiting for queue in mode.queues if edge.target == j)
             edges.append(
                 f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
-                f"{edge.counts}, {edge.changes}, {queues}, SIZES[0],\n            mode_{j}_reset_{k}, mode_{j}_spread_{k}, "
+                f"{edge.counts}, {edge.changes}, {queues}, SIZES[0],\n            "
+                f"mode_{j}_reset_{k}, mode_{j}_spread_{k}, "
                 f"mode_{mode.held if edge.branched else j}_reset_{k}),"
             )
     found = flows(source)

@@ -117,5 +117,4 @@ def _seen(run: RunView, made: Transition, t: Number, x: State) -> Place | None:
 
 
 def _landed(run: RunView, made: Transition, x: State) -> Place:
-    before, edge = run.before(made)
     return run.place(made.target, made.time, run.landed(made, run.tails_before(made).copy(), x))
