@@ -190,7 +190,7 @@ def _final(
         mode=last.mode,
         jump=last.jump,
         kind=last.kind,
-        state={s: _native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)} | waits,
+        state={**{s: _native(v) for s, v in zip(last.states, columns["values"][row][:width], strict=True)}, **waits},
         outputs={name: _native(v) for name, v in zip(outputs, columns["outputs"][row], strict=True)},
     )
 

@@ -13,6 +13,7 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
+from hsdsl.arithmetic import Number
 from hsdsl.execution import Array
 from hsdsl.runtime import structures
 from hsdsl.runtime.kernel import CompiledModel, runtime
@@ -137,7 +138,9 @@ class Workspace:
             start, end = (i * self._queued for i in (tail.first, tail.first + tail.count))
             if tail.count:
                 numbers = structures.array_at(ctypes.c_double, tail.waits, end)
-                found[name] = [tuple(numbers[i : i + queues[name]]) for i in range(start, end, self._queued)]
+                found[name] = [
+                    tuple[Number, ...](numbers[i : i + queues[name]]) for i in range(start, end, self._queued)
+                ]
         return found
 
 
