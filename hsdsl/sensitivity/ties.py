@@ -124,7 +124,7 @@ def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[st
     orders: list[Order] = []
     for edge in (made.edge, *others):
         try:
-            landed = settle(run, place, run.edge_at(place, edge), since)
+            landed = settle(run, place, run.edge_at(place, edge), since, run.tails_before(made).copy())
         except DOMAIN_ERRORS:
             landed = None
         if landed is not None:

@@ -112,7 +112,8 @@ class Workspace:
     def longer(self, tail: Any) -> int:
         """Make room for as many that wait as a tail says."""
         try:
-            self._waits.append(np.empty(tail.room * self._queued))
+            room: int = tail.room * self._queued
+            self._waits.append(np.empty(room))
             tail.waits = self._waits[-1].ctypes.data
         except BaseException as error:
             self.failed.append(error)

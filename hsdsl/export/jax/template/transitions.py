@@ -120,7 +120,8 @@ def decided(model, config, p, lane, crossing):
     there = times[first], states[first]
     t, x = with_derivatives_of(point)(there, (p, lane, *there, first, length, share))
     t, x = jnp.where(fires, lane.t, t), jnp.where(fires, lane.x, x)
-    sizes = jnp.where(goes, crossing.sizes(first, there[1]), sizes_of(lane, *(still.x,) * 2, still.x == lane.entered_x))
+    here = sizes_of(lane, still.x, still.x, still.x == lane.entered_x)
+    sizes = jnp.where(goes, crossing.sizes(first, there[1]), here)
     sizes = jnp.where(fires, lane.scale, sizes)
     landed = jnp.where(goes, crossing.landed, jnp.where(lane.phase == END, INF, still.t))
     depth = jnp.where(goes, jnp.where(found[k], crossing.depth[k], crossing.depth[first]), 0.0)
