@@ -25,7 +25,8 @@ REMEDIES = (
     Remedy(
         ("the run is unreliable from t = ... on",),
         "from there a finer run makes other transitions, or an error exceeds a tenth of its state",
-        "a smaller `--tolerance`; in chaos no tolerance helps for long: shorten `until`",
+        "a smaller `--tolerance`; in chaos no tolerance helps for long: shorten `until`. Where digits cancel, as in "
+        "`sqrt(x**2 + 1e18) - 1e9`, write the expression without that, or use `--precision`",
     ),
     Remedy(
         (

@@ -21,7 +21,7 @@ PROGRAM = ("hsdsl.arithmetic", "hsdsl.enclosures", "hsdsl.program")
 IN_C_ALONE = {
     "BITS", "UNIT", "TIME_UNIT", "INTEGER_POWERS",  # of the number type
     "PAUSED", "LANDED", "AT_BOUNDARY", "WITHOUT_VALUE", "NO_VALUE", "NO_CONVERGENCE", "TESTS",  # answers of functions
-    "MOST_CUTS", "LEAST_MOST_DEGREE", "BLOCK", "STEPS_BEFORE_SEARCH", "SMALL",  # of memory
+    "MOST_CUTS", "LEAST_MOST_DEGREE", "BLOCK", "STEPS_BEFORE_SEARCH", "SMALL", "FEWEST_WAITS",  # of memory
     "LEVELS", "END_LEVELS", "MOST_PARTS_TRIED", "COARSE_PARTS_TRIED", "CLOSE_SHARE",  # of the screen
     "TINIEST", "LIBRARY",  # of ranges: Python takes the next number instead
 }  # fmt: skip

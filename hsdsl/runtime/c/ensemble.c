@@ -1,5 +1,7 @@
 /* Many instances of one model, of which little is kept. See hsdsl/simulate/ensemble.py. */
 
+#include <stdio.h>
+
 #include "functions.h"
 
 /* Evaluate the samples that fall into the chunk; after its last time another row may

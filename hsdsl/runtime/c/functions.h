@@ -125,6 +125,7 @@ static void *take(hs_store *store, int64_t count, size_t size);
 static hs_real *numbers(hs_store *store, int64_t count);
 
 /* surfaces.c */
+HS_INLINE hs_real joined(hs_real scale, hs_real size);
 static void at(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_real *value);
 static void shortened(const hs_run *run, const hs_polynomial *piece, hs_real theta, hs_polynomial *part);
 static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r);
@@ -170,6 +171,7 @@ static void choose(hs_run *run, int count);
 static int reset(hs_run *run, const hs_real *scale);
 
 /* entry.c */
+static const hs_real *decisive(hs_run *run);
 static int same_state(const hs_real *a, const hs_real *b, int n);
 static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here, hs_real since, int jumped,
                  hs_time reset_at);

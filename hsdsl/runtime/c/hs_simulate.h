@@ -141,6 +141,8 @@ typedef struct {
   int64_t *slot; /* one more than the place of a state, or 0 */
 } hs_visited;
 
+#define FEWEST_WAITS 16 /* executions that a queue has room for at first */
+
 /* Executions that wait behind the first of a queue, in the order in which they are made. */
 typedef struct {
   int64_t room, first, count;

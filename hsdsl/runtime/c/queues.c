@@ -2,8 +2,6 @@
 
 #include "functions.h"
 
-#define FEWEST_WAITS 16
-
 void hs_forget_waits(const hs_model *model, hs_tail *tail) {
   for (int q = 0; q < model->queues; q++) tail[q].first = tail[q].count = 0;
 }

@@ -10,7 +10,7 @@ from hsdsl.names import remembered_state, without_memory
 from hsdsl.simulate.verdict.place import Place
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
 
-LONGEST = 16  # transitions at one instant
+FOLLOWED = 16  # transitions at one instant
 
 
 def landed(run: RecordedRun, chain: Sequence[Transition], x: State) -> Place:
@@ -25,7 +25,7 @@ def landed_nearby(run: RecordedRun, chain: Sequence[Transition], error: State) -
     """Where states land that an error moves along the guard of the first of some transitions; none of too many."""
     before, edge = run.before(chain[0])
     near = before.moved_by(error) if chain[0].entry else before.along_guard(edge, error)
-    return [landed(run, chain, x) for x in near] if len(chain) <= LONGEST else []
+    return [landed(run, chain, x) for x in near] if len(chain) <= FOLLOWED else []
 
 
 def remembered_alike(run: RecordedRun, chain: Sequence[Transition], names: Sequence[str], error: State) -> bool:
