@@ -45,7 +45,7 @@ _GENERATED = re.compile(
     r"def|return|bind|given|and|or|not|True|False|nan|pi|e|t|heaviside|pow|inf"
     r"|flow|surfaces|magnitudes|outputs|(?:gradient|rate|reset|spread|expression|parameter|minimum|maximum|input)_\d+"
     r"|condition_\d+_\d+|initial|until|step|tolerance|relaxation|max_transitions|sample_times|sample_count"
-    r"|[xpabcsvwgk]\d+|q_m?\d+_\d+"
+    r"|[xpabcsvwgke]\d+|q_m?\d+_\d+"
     r"|sin|cos|tan|asin|acos|atan|atan2|sinh|cosh|tanh|asinh|acosh|atanh|exp|log|sqrt|abs|sign|floor|min|max"
 )
 _GENERATED_C = re.compile(
