@@ -260,10 +260,10 @@ static int unresolved(hs_run *run, int k);
 
 /* moving.c */
 #if defined(HS_MOVES)
-static void move_reset(hs_run *run);
-static void move_crossing(hs_run *run);
-static void move_along(hs_run *run, hs_time t, hs_real *x, hs_real h);
-static void move_start(hs_run *run, hs_time t);
+HS_APART static void move_reset(hs_run *run);
+HS_APART static void move_crossing(hs_run *run);
+HS_APART static void move_along(hs_run *run, hs_time t, hs_real *x, hs_real h);
+HS_APART static void move_start(hs_run *run, hs_time t);
 #define HS_MOVE(run, move) \
   if ((run)->task->moves) move
 #else
