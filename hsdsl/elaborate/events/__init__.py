@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from hsdsl.elaborate.events.event import Event, chosen
-from hsdsl.elaborate.events.firing import edges_of, highest_priority
+from hsdsl.elaborate.events.firing import edges_of
 from hsdsl.elaborate.events.remembering import Memory, all_states, entered, new_values, remembered
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.trigger import comparisons
@@ -77,10 +77,9 @@ def _part(part: Part, events: Sequence[Event]) -> Part:
 
 def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[str, ...]]) -> Mode:
     own, edges = memories[mode.name].events, list[Edge]()
-    highest = highest_priority(own)
     by_name = {e.edge.name: e for e in own}
     for edge in mode.edges:
-        drafts = [(edge, None, None)] if edge.event is None else edges_of(by_name[edge.name], highest, own)
+        drafts = [(edge, None, None)] if edge.event is None else edges_of(by_name[edge.name], own)
         made = [remembered(draft, memories, order) for draft in drafts]
         given = () if edge.event is None else (edge.name, edge.event.text, *edge.event.options)
         edges += made if not given else [replace(part, of_event=given) for part in made]

@@ -5,35 +5,41 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial, reduce
+from functools import partial
+from math import prod
 from typing import Any
 
 from hsdsl.elaborate.events.event import Event, Values
 from hsdsl.elaborate.events.waiting import begins_to_wait, dropped, executes
 from hsdsl.expression.scope import symbol
 from hsdsl.expression.trigger import Reached, comparisons, condition
-from hsdsl.functions import below, maximum, minimum
+from hsdsl.functions import below
 from hsdsl.system import HALF, ONE, TIME, TRUTH, ZERO, Edge, all_of, at_least
 
 Draft = tuple[Edge, Event | None, Reached | None]
 
 
-def highest_priority(events: Sequence[Event]) -> Any | None:
-    """The highest priority of the events that are to be made at this instant; None where the edges' own decide."""
-    if all(event.event.priority is None for event in events):
+def turn_of(event: Event, events: Sequence[Event]) -> Any | None:
+    """1 where no event of a higher priority is to be made at this instant, else 0; None where the edges' own decide.
+
+    Each pair is compared by itself, so that an error of a state that priorities read decides nothing between others.
+    """
+    if all(other.event.priority is None for other in events):
         return None
-    least = reduce(minimum, (event.priority for event in events))
-    return reduce(maximum, (below(event.ready, HALF, least, event.priority) for event in events))
+    others = [other for other in events if other is not event]
+    higher = ((other, below(event.priority - other.priority, ZERO, ONE, ZERO)) for other in others)
+    return prod((ONE - rank * other.ready for other, rank in higher if rank != 0), start=ONE)
 
 
-def edges_of(event: Event, highest: Any | None, events: Sequence[Event]) -> Iterator[Draft]:
+def edges_of(event: Event, events: Sequence[Event]) -> Iterator[Draft]:
     """The edges of one of a mode's events: which of them fires it, and the comparison that was reached."""
     edge, trigger, armed = replace(event.edge, event=None), event.event.trigger, event.symbol("armed")
     fires = edge if event.delay is None else staying(event, f"{edge.name} triggers", begins_to_wait(event))
     if event.delay is not None:  # what only remembers goes before anything that changes states
         fires = replace(fires, priority=1 + max(other.priority for other in event.mode.edges))
-    turn = None if highest is None else at_least(event.priority, highest)
-    free = [] if turn is None or event.delay is not None else [turn]
+    turn = turn_of(event, events)
+    goes = () if turn is None or turn == 1 else (at_least(turn, HALF),)
+    free = goes if event.delay is None else ()
     for part in comparisons(trigger):
         others = condition(trigger, partial(_with, event, part, True))
         surface = event.surface(part.left, part.right, part.text)
@@ -41,18 +47,18 @@ def edges_of(event: Event, highest: Any | None, events: Sequence[Event]) -> Iter
         yield replace(fires, surface=surface, condition=when, condition_text=_text(event)), event, part
     if event.jumps:
         now = event.symbol("due")
-        if highest is not None and event.delay is None:
-            now *= below(event.priority - highest, ZERO, ZERO, ONE)
+        if turn is not None and event.delay is None:
+            now *= turn
         for other in events if event.delay is None else ():
             if other.delay is not None and other.goes_before(event):
-                alike = ONE if highest is None else below(other.priority - event.priority, ZERO, ZERO, ONE)
+                alike = ONE if turn is None else below(other.priority - event.priority, ZERO, ZERO, ONE)
                 now *= 1 - other.ready * alike
-            elif highest is None and other.delay is None and other.edge.priority > event.edge.priority:
+            elif turn is None and other.delay is None and other.edge.priority > event.edge.priority:
                 now *= 1 - other.ready
         yield _when_due(fires, event, now), event, None
     if event.delay is not None:
         made = executes(event)
-        yield made if turn is None else replace(made, condition=all_of(made.condition, turn)), None, None
+        yield replace(made, condition=all_of(made.condition, *goes)), None, None
     arms = staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | dropped(event))
     for part in comparisons(trigger):
         holds = condition(trigger, partial(_with, event, part, False))

@@ -38,10 +38,11 @@ def at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding]
     for k in range(len(place.mode.edges) + len(place.mode.walls)):
         if k == crossed or k in tied or place.value(k) > place.roundoff_bound(k) or not place.rate(k) > 0:
             continue
-        if crossed is not None and crossed != k and place.outranks(crossed, k, run.safe_error(place, arc.last)):
-            continue
         finding = near_surface(run, place, k, arc.last, "is about to reach")
         if finding is None:
+            continue
+        error, late = run.safe_error(place, arc.last), run.safe_time_error(place, k, arc.last)
+        if crossed is not None and place.outranks(crossed, k, error, late):
             continue
         if crossed is None:
             jumps = list(jumps_near(run, run.times[arc.last], 0.0)) if k < len(place.mode.edges) else []

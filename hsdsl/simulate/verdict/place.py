@@ -101,11 +101,23 @@ class Place:
         except (Undecided, *DOMAIN_ERRORS):
             return Range(-inf, inf)
 
-    def outranks(self, j: int, k: int, error: State) -> bool:
-        """Whether edge j goes before edge k by priority wherever either may be reached: they have one surface."""
+    def outranks(self, j: int, k: int, error: State, late: float = 0.0) -> bool:
+        """Whether edge j goes before edge k wherever either may be reached: they have one surface.
+
+        It has the higher priority, or on the guard the condition of k does not hold: nowhere else is it reached.
+        """
         edges = self.mode.edges
-        if k >= len(edges) or not edges[j].priority > edges[k].priority:
+        try:
+            if k >= len(edges) or not self._coincide(j, k, error):
+                return False
+            times = (self.t - late, self.t, self.t + late)
+            return edges[j].priority > edges[k].priority or not any(
+                self.kernel.conditions[k](t, *x)[0] for x in self.along_guard(k, error) for t in times
+            )
+        except DOMAIN_ERRORS:
             return False
+
+    def _coincide(self, j: int, k: int, error: State) -> bool:
         for x in self.moved_by(error):
             values = self.kernel.surfaces(self.t, *x)
             if not abs(values[j] - values[k]) <= self.surfaces.roundoff_bound(k, self.t, x):

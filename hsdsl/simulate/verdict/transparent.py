@@ -103,7 +103,9 @@ def almost_left(run: RunView, k: int, row: int, places: Sequence[Place]) -> Find
 
 def undecided_condition(run: RunView, place: Place, k: int, row: int, passed: Passed) -> Finding | None:
     """Note that a surface is passed at a place where its condition does not hold, or say that it might."""
-    if place.conditions(k, run.safe_error(place, row), run.safe_time_error(place, k, row)) == {False}:
+    error, late = run.safe_error(place, row), run.safe_time_error(place, k, row)
+    first = row in run.crossed and place.outranks(run.crossed[row], k, error, late)
+    if first or place.conditions(k, error, late) == {False}:
         left = row in run.crossed and run.times[row] - place.t <= run.tie(place.t)  # the mode, at that very instant
         if not left and may_be_passed(run.problem.program, place.mode.edges[k]):
             passed.setdefault(place.name(k), []).append(place.t)
