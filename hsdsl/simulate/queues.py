@@ -47,7 +47,7 @@ class Tails:
         return z
 
     def _joined(self, queue: Queue, first: Waits, new: Waits) -> Waits:
-        """The first of those that wait, with one more; of tied times, then one time, the one that has waited is first."""
+        """The first of those that wait, with one more; of tied times, made one, the one that has waited goes first."""
         waits = self._waits.setdefault(queue.name, [])
         if new[0] < _not_tied(first):
             waits.insert(0, first)

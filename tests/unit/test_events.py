@@ -572,3 +572,18 @@ def test_executions_that_crowd_do_not_accumulate(engine, tolerance):
     run = given.simulate(engine=engine, method="dopri5", tolerance=tolerance)
     assert run.stop.reason == "until"
     assert len(times(run, "go")) == 12
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("shift", "theorem"), [("1e-7", "unknown"), ("1e-3", "holds")])
+def test_an_order_of_executions_within_the_error_is_unknown(engine, shift, theorem):
+    given = model(
+        "x: 3*cos(3*t) - 0.5*(x - sin(3*t)), c: 1, s: 0, m: 0",
+        f"{{name: go, event: x >= 0.3, delay: '20 - m*2.0943951023931953*(1 + {shift})', reset: {{s: c}}}}, "
+        "{name: down, event: x <= -0.3, reset: {m: m + 1}}",
+        "x: 0, c: 0, s: 0, m: 0",
+        until="25",
+    )
+    verdict = given.simulate(engine=engine, method="dopri5", tolerance=1e-4).verdict
+    assert verdict.theorem == theorem
+    assert any("the order of executions of go" in reason for reason in verdict.reasons) == (theorem == "unknown")
