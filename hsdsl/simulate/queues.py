@@ -7,17 +7,15 @@ its time says, the first was made, or all were dropped.
 
 from __future__ import annotations
 
-from bisect import insort_right
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping
-from operator import itemgetter
 
-from hsdsl.arithmetic import Number
+from hsdsl.arithmetic import TIE, Number
 from hsdsl.integrators.stepper import State
 from hsdsl.names import nth_memory
 from hsdsl.program import ModeProgram, Queue
 
 Waits = tuple[Number, ...]  # the time at which one is made, and its values
-FIRST = itemgetter(0)
 
 
 class Tails:
@@ -49,12 +47,14 @@ class Tails:
         return z
 
     def _joined(self, queue: Queue, first: Waits, new: Waits) -> Waits:
-        """The first of those that wait, with one more; of equal times the one that has waited goes first."""
+        """The first of those that wait, with one more; of tied times, made one, the one that has waited goes first."""
         waits = self._waits.setdefault(queue.name, [])
-        if new[0] < first[0]:
+        if new[0] < _not_tied(first):
             waits.insert(0, first)
             return new
-        insort_right(waits, new, key=FIRST)
+        place = bisect_right(waits, new[0], key=_not_tied)
+        ahead = waits[place - 1] if place else first
+        waits.insert(place, (max(ahead[0], new[0]), *new[1:]))
         return first
 
     def states(self, modes: Iterable[ModeProgram]) -> dict[str, Number]:
@@ -67,6 +67,11 @@ class Tails:
             for k, one in enumerate(waits, 2):
                 found |= {nth_memory(state, k): value for state, value in zip(names, one, strict=True)}
         return found
+
+
+def _not_tied(one: Waits) -> Number:
+    """Before when others are made before one."""
+    return one[0] - TIE * abs(one[0])
 
 
 def _of(queue: Queue, x: State) -> Waits:

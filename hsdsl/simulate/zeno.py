@@ -34,14 +34,15 @@ from hsdsl.simulate.run import ModeState, Run
 from hsdsl.simulate.surfaces import joined
 
 LEAST_FLIGHTS = 3
+LAST_TIES = 4  # what is tied with the flight of an event that is as short may keep it from being armed again
 MOST_CORRECTIONS_TO_GUARD = 4  # of a point towards a guard
 MOST_ROUNDS = 60  # of acceleration towards a fixed point
 MOST_LEAP = 16  # times a step
 
 
-def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
+def contraction(made: Sequence[Transition], of_flow: bool = False) -> tuple[Number, Number] | None:
     """Return the last flight and the largest ratio of the last few of the last edge, if they shrink; else None."""
-    flights = last_flights(made)
+    flights = last_flights(made, of_flow)
     if not flights or not min(flights) > 0:
         return None
     ratio = max(b / a for a, b in pairwise(flights))
@@ -51,13 +52,13 @@ def contraction(made: Sequence[Transition]) -> tuple[Number, Number] | None:
 def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Number]:
     """The last few flights between transitions of the last edge, in order; none where they are not as many.
 
-    Other edges that lead back to the same mode may fire meanwhile; :data:`FREE` transitions are looked at. Where they
-    are ``of_flow`` time in strips does not count.
+    Other edges that lead back to the same mode may fire meanwhile, also as entries; :data:`FREE` transitions are looked
+    at. Where they are ``of_flow`` time in strips does not count.
     """
     times: list[Number] = []
     waited = made[-1].time * 0
     for one in reversed(made[-FREE:]):
-        if one.source != made[-1].source or one.source != one.target or one.entry:
+        if one.source != made[-1].source or one.source != one.target or (one.entry and one.edge == made[-1].edge):
             break
         if of_flow and times and one.resumed is not None:
             waited = waited + (one.resumed - one.time)
@@ -71,17 +72,28 @@ def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Numb
 def unresolved(run: Run, here: ModeState, k: int) -> Stop | None:
     """Stop at the end of a tail of edge k without a limit, where what is left of it is shorter than time can tell.
 
-    The relaxed scheme goes on with all but events, which might not be armed again there.
+    Events might not be armed again there: they stop before. The relaxed scheme goes on with all others.
     """
     edge, t = here.mode.edges[k], here.t
+    if empties(here, k):
+        return None
     if run.settings.scheme == "located":
         follows = edge.contact is not None and run.settings.completion != "none"
         found = None if follows else contraction(run.recorder.transitions)
         ends = found is not None and found[0] * found[1] <= run.tie(t) * (1 - found[1])
+        if edge.of_event and not ends and t == run.recorder.transitions[-1].resumed:
+            found = contraction(run.recorder.transitions, of_flow=True)
+            ends = found is not None and found[0] * found[1] <= LAST_TIES * run.tie(t)
     else:
         flights = last_flights(run.recorder.transitions, of_flow=True) if edge.of_event else []
         ends = bool(flights) and max(flights) <= run.tie(t)
     return run.diagnostics.accumulates(edge.name, t, t) if ends else None
+
+
+def empties(here: ModeState, k: int) -> bool:
+    """Whether edge k makes executions that wait: they end, however close together they are."""
+    changes = here.mode.edges[k].changes
+    return any(queue.waiting in changes and queue.values[0] not in changes for queue in here.mode.queues)
 
 
 def flown(made: Sequence[Transition], t: Number) -> Number:
@@ -122,7 +134,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
     made = run.recorder.transitions
     found = nearly_over(run, here, k)
-    if found is None or here.mode.states != here.arc.states:
+    if found is None or empties(here, k) or here.mode.states != here.arc.states:
         return here
     edges, left = found
     end = min(here.t + left, here.segment.end)

@@ -526,3 +526,64 @@ def test_a_delay_of_0_changes_no_order(engine, first, second, priority):
     made = [(round(m.time, 6), m.edge) for m in run.transitions if m.edge in "ab"]
     order = "ba" if priority else "ab"
     assert made[:2] == [(2.0, order[0]), (2.0, order[1])] and len(made) % 2 == 0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("bounce", [0.005, 0.05, 0.3, 0.7])
+@pytest.mark.parametrize("delay", ["", "delay: 0.5, ", "delay: 30, "])
+def test_a_ball_that_sets_off_other_events_does_not_fall_through_its_floor(engine, bounce, delay):
+    given = model(
+        "h: v, v: -9.81, n: 0",
+        f"{{name: hit, event: h <= 0, reset: {{v: -{bounce}*v}}}}, "
+        f"{{name: up, event: v >= 0, {delay}reset: {{n: n + 1}}}}",
+        "h: 1, v: -0.1, n: 0",
+        until="5",
+    )
+    run = given.simulate(engine=engine)
+    assert run.stop.reason == "zeno"
+    assert run.final.state["h"] >= 0
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("at", ["28.93", "28.604", "30.347"])
+def test_executions_whose_times_are_tied_are_made_as_they_began(engine, at):
+    given = model(
+        "x: 3*cos(3*t), c: 1, s: 0",
+        f"{{name: go, event: x >= 0.3, delay: '({at} - 1.1*c)/1.1', reset: {{s: c}}}}",
+        "x: 0, c: 0, s: 0",
+        until="28",
+    )
+    run = given.simulate(engine=engine)
+    made = [one.after["s"] for one in run.transitions if one.edge == "go" and one.time <= float(at) / 1.1 + 1e-9]
+    assert len(made) >= 12
+    assert made == sorted(made)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-9])
+def test_executions_that_crowd_do_not_accumulate(engine, tolerance):
+    given = model(
+        "x: 3*cos(3*t) - 0.5*(x - sin(3*t)), c: 1, s: 0, m: 0",
+        "{name: go, event: x >= 0.3, delay: '20 - m*2.0943951023931953', reset: {s: c}}, "
+        "{name: down, event: x <= -0.3, reset: {m: m + 1}}",
+        "x: 0, c: 0, s: 0, m: 0",
+        until="25",
+    )
+    run = given.simulate(engine=engine, method="dopri5", tolerance=tolerance)
+    assert run.stop.reason == "until"
+    assert len(times(run, "go")) == 12
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(("shift", "theorem"), [("1e-7", "unknown"), ("1e-3", "holds")])
+def test_an_order_of_executions_within_the_error_is_unknown(engine, shift, theorem):
+    given = model(
+        "x: 3*cos(3*t) - 0.5*(x - sin(3*t)), c: 1, s: 0, m: 0",
+        f"{{name: go, event: x >= 0.3, delay: '20 - m*2.0943951023931953*(1 + {shift})', reset: {{s: c}}}}, "
+        "{name: down, event: x <= -0.3, reset: {m: m + 1}}",
+        "x: 0, c: 0, s: 0, m: 0",
+        until="25",
+    )
+    verdict = given.simulate(engine=engine, method="dopri5", tolerance=1e-4).verdict
+    assert verdict.theorem == theorem
+    assert any("the order of executions of go" in reason for reason in verdict.reasons) == (theorem == "unknown")

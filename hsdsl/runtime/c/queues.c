@@ -26,19 +26,26 @@ static int room_for_wait(const hs_model *model, hs_tail *tail, hs_task *task) {
   return tail->count == tail->room;
 }
 
-/* Let one wait, its values in states x, behind those of the first `high` that are made before it or at its time. */
-static void insert_wait(const hs_model *model, hs_tail *tail, const hs_queue *queue, const hs_real *x, int64_t high) {
+/* Before when others are made before one that waits until a time. */
+static hs_real not_tied(hs_real time) { return time - HS_TIE * fabs(time); }
+
+/* Let one wait, its values in states x, behind those of the first `high` that are made before it or tied with it. It is
+   not made before the one ahead of it, nor before `earliest`. */
+static void insert_wait(const hs_model *model, hs_tail *tail, const hs_queue *queue, const hs_real *x, int64_t high,
+                        hs_real earliest) {
   int64_t low = 0;
   while (low < high) {
     const int64_t middle = low + (high - low) / 2;
-    if (x[queue->value[0]] < *wait_at(model, tail, middle))
+    if (x[queue->value[0]] < not_tied(*wait_at(model, tail, middle)))
       high = middle;
     else
       low = middle + 1;
   }
   hs_real *const place = wait_at(model, tail, low);
+  const hs_real ahead = low ? *wait_at(model, tail, low - 1) : earliest;
   memmove(place + model->queued, place, (size_t)((tail->count - low) * model->queued) * sizeof(hs_real));
   for (int i = 0; i < queue->values; i++) place[i] = x[queue->value[i]];
+  if (*place < ahead) *place = ahead;
   tail->count++;
 }
 
@@ -53,8 +60,8 @@ static int advance_queue(const hs_model *model, hs_tail *tail, hs_task *task, co
     tail->first++, tail->count--;
   } else if (1 <= had && had < has) {
     if (room_for_wait(model, tail, task)) return 1;
-    const int goes_first = z[queue->value[0]] < x[queue->value[0]];
-    insert_wait(model, tail, queue, goes_first ? x : z, goes_first ? 0 : tail->count);
+    const int goes_first = z[queue->value[0]] < not_tied(x[queue->value[0]]);
+    insert_wait(model, tail, queue, goes_first ? x : z, goes_first ? 0 : tail->count, x[queue->value[0]]);
     for (int i = 0; i < queue->values && !goes_first; i++) z[queue->value[i]] = x[queue->value[i]];
     return has > queue->most;
   }

@@ -4,6 +4,7 @@
 #include "functions.h"
 
 #define LEAST_FLIGHTS 3
+#define LAST_TIES 4
 #define MOST_CORRECTIONS_TO_GUARD 4
 #define MOST_ROUNDS 60
 #define MOST_LEAP 16
@@ -20,7 +21,7 @@ static int last_flights(const hs_run *run, int of_flow, hs_real *flight) {
   if (last->mode != last->target || last->entry) return 0;
   for (int i = 1; i < FREE && i < run->jump && flights < LEAST_FLIGHTS; i++) {
     const hs_made *const made = made_before(run, i);
-    if (made->mode != last->mode || made->mode != made->target || made->entry) break;
+    if (made->mode != last->mode || made->mode != made->target || (made->entry && made->edge == last->edge)) break;
     if (of_flow && made->resumed == made->resumed) waited = waited + (made->resumed - made->time);
     if (made->edge != last->edge) continue;
     flight[flights++] = later - (made->time + waited);
@@ -30,15 +31,34 @@ static int last_flights(const hs_run *run, int of_flow, hs_real *flight) {
 }
 
 /* Whether the flights of the last edge shrink: the last one, and the largest ratio of the last few. */
-static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) {
+static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *ratio) {
   hs_real flights[LEAST_FLIGHTS];
-  if (!last_flights(run, 0, flights)) return 0;
+  if (!last_flights(run, of_flow, flights)) return 0;
   *flight = flights[0], *ratio = 0.0;
   for (int i = 0; i < LEAST_FLIGHTS; i++) {
     if (!(flights[i] > 0)) return 0;
     if (i) *ratio = hs_max(*ratio, flights[i - 1] / flights[i]);
   }
   return *ratio < 1;
+}
+
+static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) { return shrinking(run, 0, flight, ratio); }
+
+static int has_place(const int *places, int count, int place) {
+  for (int i = 0; i < count; i++)
+    if (places[i] == place) return 1;
+  return 0;
+}
+
+/* Whether edge k makes executions that wait: they end, however close together they are. */
+static int empties(const hs_run *run, int k) {
+  const hs_mode *const mode = run->here.table;
+  const hs_edge *const edge = &mode->edge[k];
+  for (int q = 0; q < mode->queues; q++)
+    if (has_place(edge->change, edge->changes, mode->queue[q].waiting) &&
+        !has_place(edge->change, edge->changes, mode->queue[q].value[0]))
+      return 1;
+  return 0;
 }
 
 static hs_real accelerated(hs_real a, hs_real b, hs_real c) {
@@ -276,7 +296,7 @@ static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
   hs_time left;
   int touches = 1;
-  if (here->dimension != here->table->dimension || !here->dimension) return GOES_ON;
+  if (here->dimension != here->table->dimension || !here->dimension || empties(run, k)) return GOES_ON;
   const int count = nearly_over(run, k, &left);
   if (!count) return GOES_ON;
   const hs_time whole = here->t + left;
@@ -322,15 +342,18 @@ static int close_tail(hs_run *run, int k) {
 }
 
 /* Stop at the end of a tail of edge k that runs to no limit, where what is left of it is shorter than time can tell.
-   The relaxed scheme goes on with all but events, which might not be armed again there. */
+   Events might not be armed again there: they stop before. The relaxed scheme goes on with all others. */
 static int unresolved(hs_run *run, int k) {
   const hs_edge *const edge = &run->here.table->edge[k];
   const hs_time t = run->here.t;
   hs_real flights[LEAST_FLIGHTS], flight, ratio;
   int ends = 0;
+  if (empties(run, k)) return GOES_ON;
   if (run->task->settings.scheme == HS_LOCATED) {
     const int follows = edge->contact >= 0 && run->task->settings.contacts;
     ends = !follows && contraction(run, &flight, &ratio) && flight * ratio <= tie(t) * (1 - ratio);
+    if (edge->of_event && !ends && t == made_before(run, 0)->resumed)
+      ends = shrinking(run, 1, &flight, &ratio) && flight * ratio <= LAST_TIES * tie(t);
   } else if (edge->of_event && last_flights(run, 1, flights)) {
     ends = 1;
     for (int i = 0; i < LEAST_FLIGHTS; i++) ends &= flights[i] <= tie(t);

@@ -57,6 +57,7 @@ from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import Margins
 from hsdsl.simulate.verdict.shadow import has_shadow, is_compiled
 from hsdsl.simulate.verdict.strips import lost_in_strips
+from hsdsl.simulate.verdict.waiting_orders import waiting_orders
 
 __all__ = ["RunView", "assess", "margins_of"]
 
@@ -96,7 +97,7 @@ def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
 
 
 def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
-    left, unknown = list(departures(run, diagnostics)), [*diagnostics.undecided]
+    left, unknown = list(departures(run, diagnostics)), [*diagnostics.undecided, *waiting_orders(run)]
     if left:
         return Verdict("left", _once(left, unknown))
     screen = run.screen

@@ -12,6 +12,7 @@ from hsdsl.simulate.verdict.effort import crowded_steps
 from hsdsl.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.simulate.verdict.remarked import ends_beyond, may_end_beyond
 from hsdsl.simulate.verdict.screen import screens_of
+from hsdsl.simulate.verdict.waiting_orders import keep_values, waiting_orders
 
 if TYPE_CHECKING:
     from hsdsl.simulate.compiled import CompiledRun
@@ -24,7 +25,9 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
     if screens is None or columns.notes or crowded_steps(problem, execution) or not execution.stop.complete:
         return assess(RunView(problem, execution), under_way.diagnostics)
     screen = screens.take()
-    if not screen.decide(columns):
+    if not screen.decide(columns) or (
+        keep_values(problem.program) and any(waiting_orders(RunView(problem, execution, screen_made=screen)))
+    ):
         return assess(RunView(problem, execution, screen_made=screen), under_way.diagnostics)
     shown = problem.program, compiled.made, screen.margins, screen.commuting
     screens.leave(screen)

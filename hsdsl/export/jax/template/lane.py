@@ -222,11 +222,12 @@ def sampled(record, config, mask, mode, t0, t1, point):
 def contraction(model, lane):
     """Whether the last flights of the last edge, which leads back to its mode, shrink, the last, and the largest ratio.
 
-    Others that lead back to that mode may go meanwhile.
+    Others that lead back to that mode may go meanwhile, also as entries.
     """
     edge = lane.edges[-1]
     same = jnp.asarray(model.source)[lane.edges] == jnp.asarray(model.source)[edge]
-    loops = (lane.edges >= 0) & jnp.asarray(model.returns)[lane.edges] & same & ~lane.entries
+    begins = lane.entries & (lane.edges == edge)
+    loops = (lane.edges >= 0) & jnp.asarray(model.returns)[lane.edges] & same & ~begins
     own = jnp.cumprod(loops[::-1]).astype(bool) & (lane.edges[::-1] == edge)
     nth = jnp.cumsum(own)
     times = jax.vmap(lambda n: lane.times[::-1][jnp.argmax(own & (nth == n))])(jnp.arange(4, 0, -1))
