@@ -88,7 +88,15 @@ def _behind(
             names |= known | {x for x in changed - known if remembered_alike(run, chain, [x], error(chain[0].index))}
         except (Undecided, *DOMAIN_ERRORS):
             pass
-    return names & frozenset(made.after)
+    return (names - _taken_from_queues(run, made)) & frozenset(made.after)
+
+
+def _taken_from_queues(run: RecordedRun, made: Transition) -> set[str]:
+    """The times and values of executions that were behind the first before a transition, and are the first after it."""
+    target, after = run.problem.program.modes[run.index(made.target)], made.after or {}
+    counts = ((queue, target.states[queue.waiting]) for queue in target.queues)
+    made_one = (queue for queue, name in counts if 1 <= after.get(name, 0) < made.before.get(name, 0))
+    return {target.states[i] for queue in made_one for i in queue.values}
 
 
 def _is(value: Any, x: Any) -> bool:
