@@ -9,7 +9,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from hsdsl.arithmetic import Arithmetic, Number
+from hsdsl.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.enclosures import Range
 from hsdsl.execution import Arc, Execution, Stop, Transition
 from hsdsl.integrators.stepper import Polynomial, State
@@ -111,13 +111,23 @@ class RecordedRun:
         return place, self.edge_at(place, made.edge, made.entry)
 
     def edge_at(self, place: Place, name: str, entry: bool = False) -> int:
-        """The edge of a name at a place; of several the closest to its guard, on ``entry`` the furthest beyond."""
+        """The edge of a name at a place; of several the closest to its guard, on ``entry`` the furthest beyond.
+
+        Of comparisons of one event that are on their surfaces, the one that rises is crossed.
+        """
         found = [k for k, edge in enumerate(place.mode.edges) if edge.name == name]
         if len(found) == 1:
             return found[0]
         if entry:
             return max((k for k in found if not place.mode.edges[k].conditional), key=place.value)
-        return min(found, key=lambda k: abs(place.value(k)))
+        return min([k for k in found if self._rises(place, k)] or found, key=lambda k: abs(place.value(k)))
+
+    def _rises(self, place: Place, k: int) -> bool:
+        """Whether a state is on surface k, which rises there."""
+        try:
+            return self.is_on(place, k) and bool(place.rate(k) > 0)
+        except DOMAIN_ERRORS:
+            return False
 
     def state(self, arc: Arc, row: int) -> State:
         """The state at a row."""
