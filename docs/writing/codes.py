@@ -19,7 +19,7 @@ Examples may leave out the keys that every model has.
 
 WARNING_CODES = """# Warnings of runs
 
-What a run tells first: each is a line `warning` of its summary, an entry of `warnings` in `--json` (code, time, edge,
+What a run reports first: each is a line `warning` of its summary, an entry of `warnings` in `--json` (code, time, edge,
 message) and of `run.warnings` in Python, and a code in the column `warnings` of ensembles and sweeps. A run with
 warnings may be right, and its verdict may be `holds`: they are about what its author may not have meant.
 Several of one code about one transition are one line, with the first time and how often. Codes keep their meaning.

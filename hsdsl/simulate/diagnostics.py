@@ -28,7 +28,7 @@ TWO_STEP = (
 class Diagnostics:
     """What a run says of itself besides its transitions; of one kind only the first is kept.
 
-    ``remarks`` are what is to be told first, by the place of the departure that each is about; ``rough`` are surfaces,
+    ``remarks`` are reported first, by the place of the departure that each is about; ``rough`` are surfaces,
     by mode and number, that are followed roughly from a time on.
     """
 

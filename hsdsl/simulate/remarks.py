@@ -1,4 +1,4 @@
-"""What a run tells first: what was remarked about it, as warnings, one for each kind of thing and what it is about."""
+"""What a run reports first: remarks about it as warnings, one for each kind of thing and what it is about."""
 
 from __future__ import annotations
 

@@ -52,8 +52,8 @@ def too_many_wait(mode: ModeProgram, full: str, t: Number) -> Stop:
     """As many delayed executions of an event as may wait, and one more."""
     queue = next(queue for queue in mode.queues if queue.name == full)
     event = full.partition("@")[0]
-    asked = queue.most < MOST_WAITING
-    more = "allow more with its `waiting`" if asked else "its condition turns true too often for its delay"
+    capped = queue.most < MOST_WAITING
+    more = "allow more with its `waiting`" if capped else "its condition turns true too often for its delay"
     return Stop("waiting_limit", t, f"at t = {show(t)} more than {queue.most} executions of {event} wait: {more}")
 
 

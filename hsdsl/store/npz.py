@@ -39,8 +39,8 @@ _DAMAGED = "it is damaged, or not an execution that hsdsl saved"
 def save_npz(execution: Execution, file: BinaryIO) -> None:
     """Write an execution, everything but its ``output_function``."""
     columns = {name: getattr(execution, name) for name in COLUMNS}
-    told = execution.warnings
-    records = [asdict(record) for record in (execution.final, execution.stop, *execution.transitions, *told)]
+    warnings = execution.warnings
+    records = [asdict(record) for record in (execution.final, execution.stop, *execution.transitions, *warnings)]
     loose = numbers([records, execution.settings, execution.overrides])
     packed = (x for column in columns.values() if column.dtype == object for x in column.ravel())
     form = Lossless(max(decimals.bits(packed), decimals.bits(loose)), execution.digits)
@@ -57,7 +57,7 @@ def save_npz(execution: Execution, file: BinaryIO) -> None:
         "stop": form.pack_fields(execution.stop),
         "final": form.pack_fields(execution.final),
         "verdict": {name: form.pack(getattr(execution.verdict, name)) for name in _OF_VERDICT},
-        "warnings": [form.pack_fields(warning) for warning in told],
+        "warnings": [form.pack_fields(warning) for warning in warnings],
         "transitions": [form.pack_fields(transition) for transition in execution.transitions],
     }
     text = np.frombuffer(json.dumps(header, allow_nan=False).encode(), dtype=np.uint8)

@@ -26,13 +26,13 @@ allows itself.
 `landings`          does a reset land within the error of a surface, or jump?
 `misses`            surfaces that are almost reached or passed over; `endings`: what happens at the end
 `tangent`           arcs that leave a surface tangentially, as where sliding ends
-`remarked`          what a run tells first, whatever its verdict; `passings`: by its rows
+`remarked`          what a run reports first, whatever its verdict; `passings`: by its rows
 `transparent`       surfaces that are passed where their condition is false
 `flows`             does the flow vary unseen, jump, or have a slope without bound?
 `expansions`        operations along parts of steps, and what they leave unresolved; `expanded`: functions of these
 `commutation`       do transitions that are reached together commute?
 `accumulation`      Zeno points and rest, which the relaxed scheme goes through without a word
-`effort`            steps that crowd: no hypothesis, but said
+`effort`            steps that crowd: no hypothesis, but reported
 `strips`            transitions that are lost while another one waits in a strip
 ==================  =================================================================================================
 """

@@ -1,4 +1,4 @@
-"""What a run tells first, whatever its verdict: what the loop and the look along its steps have remarked, and its end.
+"""What a run reports first, for any verdict: remarks of the loop, of the look along its steps, and of its end.
 
 Surfaces passed while an `if` was false and walls that do not hold are remarked by the look along the steps where the
 verdict takes one, else by `passings`.
