@@ -1,13 +1,18 @@
 """Hybrid systems written as mathematics in YAML: checked, simulated, measured.
 
-One pipeline, each stage a module that imports only from below::
+Six storeys above a base; a module imports only from its own storey and those below::
 
-    text --source--> nodes --schema--> document --elaborate--> HybridSystem     SymPy, the mathematics
-         --lower--> Program --backends--> Kernel                                numbers, free of SymPy
-         --simulate--> Execution --report, plot, store--> what people see
+    interface      Model, the command line, charts of methods, models of other tools         what people touch
+    export         a model as C, FMI, Rust, MATLAB, JAX, a web page
+    analysis       questions about executions, and their answers as text, files, pictures
+    engine         Program -> Kernel -> Execution: code, methods, the schemes, verdicts       no SymPy
+    mathematics    HybridSystem -> Program: flows along guards, decisions, lowering
+    language       text -> nodes -> document -> HybridSystem: every error found
+    base           numbers, errors, names, cache, processes
 
-`hsdsl.interface.model` runs it from end to end; `hsdsl.engine.simulate.relaxed` is the algorithm of Burden, Gonzalez, Vasudevan,
-Bajcsy, Sastry, *Metrization and Simulation of Controlled Hybrid Systems* (2013).
+A run reads: `language.source`, `language.schema`, `language.elaborate`, `mathematics.lower`, `engine.backends`,
+`engine.simulate`. `engine.preparation.pipeline` calls them in this order; `engine.simulate.relaxed` is the algorithm of
+Burden, Gonzalez, Vasudevan, Bajcsy, Sastry, *Metrization and Simulation of Controlled Hybrid Systems* (2013).
 """
 
 from __future__ import annotations
@@ -36,7 +41,7 @@ _HOMES = {
     "load": "hsdsl.interface.model",
     "loads": "hsdsl.interface.model",
 }
-_MODULES = ("exact", "store", "sweep")  # those with functions for users
+_MODULES = {"chart": "interface", "exact": "analysis", "store": "analysis", "sweep": "analysis"}  # for users too
 
 
 def __dir__() -> list[str]:
@@ -48,7 +53,7 @@ def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     if name in _MODULES:
-        return import_module(f"hsdsl.{name}")
+        return import_module(f"hsdsl.{_MODULES[name]}.{name}")
     if name not in _HOMES:
         raise AttributeError(f"module 'hsdsl' has no attribute '{name}'")
     return getattr(import_module(_HOMES[name]), name)

@@ -20,8 +20,7 @@ from hsdsl.base.names import did_you_mean
 
 if TYPE_CHECKING:
     from hsdsl.base.atomic import New
-    from hsdsl.export.source import Source
-    from hsdsl.interface.model import Model
+    from hsdsl.export.source import ExportedModel, Source
 
 __all__ = ["TARGETS", "Modes", "check_folder", "check_scheme", "check_target", "files_of", "source_of", "write"]
 
@@ -43,7 +42,7 @@ DOCUMENTS = ("latex", "mermaid")  # targets that do not run
 OF_PARTS = ("c", "fmi2", "fmi3", "latex", "matlab", "mermaid", "rust", "web")  # targets that keep systems of parts
 
 
-def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
+def source_of(model: ExportedModel, arguments: Mapping[str, Any]) -> Source:
     """The source of a model with arguments of `Model.simulate` (`hsdsl.export.source`, imported when it is called)."""
     from hsdsl.export.source import source_of
 
@@ -72,11 +71,11 @@ def check_target(target: str) -> None:
         raise UsageError(f"there is no export target '{target}'", did_you_mean(target, TARGETS, _choices()))
 
 
-def check_scheme(model: Model, target: str, arguments: Mapping[str, Any]) -> None:
+def check_scheme(model: ExportedModel, target: str, arguments: Mapping[str, Any]) -> None:
     """Refuse a scheme that no code has, before anything else about it: the two documents of a model have none."""
     check_target(target)
     given = {"scheme": arguments.get("scheme"), "step": 1}  # a step, since some schemes are refused without one
-    scheme = model.resolve(arguments.get("settings"), given).values["scheme"].value
+    scheme = model.pipeline.resolve(arguments.get("settings"), given).values["scheme"].value
     if scheme == "paoli-schatzman" and target not in DOCUMENTS:
         raise UsageError(f"{target} has no scheme '{scheme}'", "--scheme relaxed or --scheme located")
 

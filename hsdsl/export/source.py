@@ -2,25 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from hsdsl import __version__
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.backends.python import PythonKernel
+from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.simulate import Problem
 from hsdsl.export.identifiers import ascii_name
-from hsdsl.interface.model import Model
 from hsdsl.language.system import HybridSystem, started
 from hsdsl.mathematics.lower import lower_constants
 
 LONGEST = 40  # letters of a name: some languages read 63 of an identifier, and something is put behind it
+
+
+class ExportedModel(Protocol):
+    """What an export needs of a model; `hsdsl.Model` has it."""
+
+    @property
+    def pipeline(self) -> Pipeline:
+        """From the file to a prepared run."""
+        ...
+
+    @property
+    def simulate(self) -> Callable[..., Execution]:
+        """Run the model with the arguments of the export."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -33,7 +47,7 @@ class Source:
 
     system: HybridSystem
     problem: Problem
-    model: Model
+    model: ExportedModel
     arguments: Mapping[str, Any]
 
     @property
@@ -65,7 +79,7 @@ class Source:
         return tuple(visible(line) for line in lines)
 
 
-def source_of(model: Model, arguments: Mapping[str, Any]) -> Source:
+def source_of(model: ExportedModel, arguments: Mapping[str, Any]) -> Source:
     """The source of a model with arguments of `Model.simulate`; no compiler is needed.
 
     Raises UsageError: a name, value or combination that a run would refuse, too.

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Literal
+from typing import Literal
 
 from hsdsl.base.parts import Part
+from hsdsl.base.samples import Hold
 from hsdsl.base.sparsity import Elimination, Variation, elimination, variation
 
 LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
@@ -28,7 +28,6 @@ STEEP = ("sqrt", "asin", "acos", "acosh")
 WHOLE = re.compile(r"q_m?\d+_1|\d+")
 NO_FLOW = "q_0_1"
 MOVING = re.compile(r"t|[xv]\d+")
-Hold = Literal["zero", "linear"]
 
 
 @dataclass(frozen=True)
@@ -96,12 +95,6 @@ class SampledInput:
     times: tuple[Fraction, ...] | None
     values: tuple[Fraction, ...] | None
     sloped: bool = False
-
-
-def in_order(hold: Hold, times: Sequence[Any], k: int) -> bool:
-    """Whether sample k may follow those before it: later, or at the same time as one of an input with ramps, a jump."""
-    again = hold == "linear" and times[k] == times[k - 1] and not (k > 1 and times[k - 2] == times[k])
-    return times[k - 1] < times[k] or again
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 An entry is found by the bytes of the model file, this package's own files, the limits in force and, where there are
 data files, the model's folder. It names the data files with their checksums, and is used only for the bytes that it was
-made from; their rules hold each time. JSON is read into the types that `hsdsl.mathematics.program` declares, and into nothing else.
+made from; their rules hold each time. JSON is read into the types that `program` declares, and into nothing else.
 
 Every piece of a program is a row of a table and is named by its number, and equal pieces are one row: the modes of a
 large model have much in common, which is then read once.

@@ -287,7 +287,7 @@ def test_nobody_s_matplotlib_is_disturbed(tmp_path):
 
 
 def test_importing_the_plot_costs_no_matplotlib():
-    code = "import sys, hsdsl.analysis.plot, hsdsl.analysis.report, hsdsl.analysis.store\nassert 'matplotlib' not in sys.modules\n"
+    code = "import sys\nfrom hsdsl.analysis import plot, report, store\nassert 'matplotlib' not in sys.modules\n"
     subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)})
 
 

@@ -1,6 +1,6 @@
 """Findings in legal models: probable mistakes (warnings), and remarks (notes).
 
-`lint` reads a model, lets every rule of `hsdsl.analysis.lint.rules` in the `selection` look at it as a `subject`, and sorts out
+`lint` reads a model, lets every rule of `lint.rules` in the `selection` look at it as a `subject`, and sorts out
 what comments in the file ask to ignore (`ignores`). A rule gives `finding`s, which `fix` remedies by `edits`.
 
 Rules decide by `analysis` for all states and by `numbers` at one, read `source_expressions` as they are written, and

@@ -1,6 +1,6 @@
 """What lint finds in a system of parts: names that nothing uses, and modes that no instance can be in.
 
-Each automaton is looked at in the whole file. Rules on the mathematics of modes are those of `hsdsl.analysis.lint.automata`.
+Each automaton is looked at in the whole file. Rules on the mathematics of modes are those of `lint.automata`.
 """
 
 from __future__ import annotations

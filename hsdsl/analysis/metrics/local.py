@@ -1,7 +1,7 @@
 """Distances where guards, resets or domains are not affine: the best path that local solves find.
 
 Its length is an upper bound: it is a path of the space, and whether its straight pieces stay in curved domains is
-proved where enclosures can (:mod:`hsdsl.analysis.metrics.guard_clearance`). Nothing here bounds from below: that comes from
+proved where enclosures can (`metrics.guard_clearance`). Nothing here bounds from below: that comes from
 :mod:`hsdsl.analysis.metrics.guard_clearance`, and from the affine part of the model.
 """
 

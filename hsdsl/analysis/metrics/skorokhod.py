@@ -2,7 +2,7 @@
 
     inf over increasing bijections r of the common span of  max(sup |r(t) - t|, sup D(x(t), y(r(t))))
 
-with D the distance of states with modes (:mod:`hsdsl.analysis.metrics.labelled_sup`), on right-continuous curves: of several
+with D the distance of states with modes (`metrics.labelled_sup`), on right-continuous curves: of several
 transitions at one instant only the last value counts. This is the variant of Gokhman (2008) and of Majumdar and Prabhu
 (HSCC 2015), without a bound on the retiming's slope.
 """

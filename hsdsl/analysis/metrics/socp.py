@@ -40,7 +40,7 @@ def _controller() -> Any:
 def solve(shape: ConeShape, offsets: Array, numbers: Array, rounds: int = ROUNDS) -> tuple[Array, Array, Array]:
     """Minimise B problems of one shape, with offsets (B, n) and numbers of sizes (B,), in at most so many rounds.
 
-    Returns lower and upper ends (B,), see :mod:`hsdsl.analysis.metrics.rounding`, and where the upper ones are attained, (B, N).
+    Returns lower and upper ends (B,), see `metrics.rounding`, and where the upper ones are attained, (B, N).
     """
     if not shape.matrices:
         return np.zeros(len(numbers)), np.zeros(len(numbers)), np.zeros((len(numbers), shape.size))

@@ -32,7 +32,7 @@ class CurvePair:
 
 @dataclass(frozen=True)
 class CurveMetric:
-    """A distance: its function, in a module of `hsdsl.analysis.metrics`, and which fields of a pair it takes beyond the runs.
+    """A distance: its function, in a module of `metrics`, and which fields of a pair it takes beyond the runs.
 
     The module is imported when the distance is computed: the command line needs the names alone.
     """

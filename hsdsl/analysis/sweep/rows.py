@@ -6,7 +6,7 @@
 a varied name                           its value; ``parameter.stop`` for a parameter with the name of a column
 ``stop``, ``message``                   why it ended, a sentence where it did not get to where it was going
 ``verdict``                             whether the theorem holds; null where that was not looked at
-``warnings``                            codes of `hsdsl.base.errors.WARNINGS`, with a space between two: what the run itself
+``warnings``                            codes of `errors.WARNINGS`, with a space between two: what the run itself
                                         noted, and with verdicts all of its warnings, but for those of the file alone
 ``time``, ``mode``, ``transitions``     when and where it ended, and how many transitions it made
 ``final.x``                             states and outputs at the end

@@ -1,6 +1,6 @@
 """Routines of a program in another language: the same operations in the same order.
 
-A routine's text is a small language (see `hsdsl.mathematics.program`) that happens to be Python's: assignments, arithmetic,
+A routine's text is a small language (see `program`) that happens to be Python's: assignments, arithmetic,
 comparisons, calls of known functions. It is read by Python's parser and printed again; a node that is not listed here
 is refused. Every operation has its own parentheses, so that a language's rules of precedence have no say.
 """

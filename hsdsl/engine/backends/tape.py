@@ -1,6 +1,6 @@
 """A tape's lines as text: what coefficient 0 of each is, and what coefficient k > 0 is, in Python and in C.
 
-Coefficient 0 is the operation itself, in the language of routines (`hsdsl.mathematics.program`). The others are the recurrences of
+Coefficient 0 is the operation itself, in the language of routines (`program`). The others are the recurrences of
 `recurrences.py`, in C those of `runtime/c/hs_series.h`; the text of both is the same up to how things are named. A
 division by k is a product with ``inverse[k]``, which is 1/k rounded: coefficients wait for each other, and a division
 takes long.

@@ -11,6 +11,7 @@ import numpy as np
 
 from hsdsl.base.calls import checks_methods
 from hsdsl.base.names import called, visible
+from hsdsl.base.shown import shown
 from hsdsl.engine.execution.parts import COMPLETE
 from hsdsl.engine.execution.run import Execution
 from hsdsl.engine.execution.samples import Array
@@ -20,7 +21,7 @@ from hsdsl.engine.execution.samples import Array
 class Failure:
     """An instance that did not get to where it was going.
 
-    ``reason`` is one of :data:`hsdsl.engine.execution.REASONS`, or ``refused``: it could not be started. ``message`` is the
+    ``reason`` is one of `execution.REASONS`, or ``refused``: it could not be started. ``message`` is the
     sentence for a person.
     """
 
@@ -65,7 +66,7 @@ class Ensemble:
     varied : dict
         Values of the parameters, and of initial states as ``initial.NAME``, that were varied.
     stop : array of str
-        Why each run ended: one of :data:`hsdsl.engine.execution.REASONS`; ``refused`` where an instance could not be started,
+        Why each run ended: one of `execution.REASONS`; ``refused`` where an instance could not be started,
         ``interrupted`` where Ctrl-C came first.
     time : array of float
         When it ended (not-a-number where it was not run).
@@ -76,7 +77,7 @@ class Ensemble:
     transitions : array of int
         How many were made.
     warnings : array of str
-        Codes of what the runs themselves noted (`hsdsl.base.errors.WARNINGS`), with a space between two; empty where nothing
+        Codes of what the runs themselves noted (`errors.WARNINGS`), with a space between two; empty where nothing
         was: walls followed roughly, motion along guards, limits of accumulating transitions, sliding, strips. The other
         codes take a verdict: ``ensemble.run(...).warnings``.
     transition_times : array, shape (..., n)
@@ -118,9 +119,7 @@ class Ensemble:
 
     def _repr_html_(self) -> str:
         """Show what was varied, how the runs ended, and a picture in notebooks."""
-        from hsdsl.analysis.plot.notebook import ensemble_html
-
-        return ensemble_html(self)
+        return shown("ensemble_html", self)
 
     def to_pandas(self, what: Literal["runs", "samples", "transitions"] = "runs") -> Any:
         """Make a pandas DataFrame with a row for each run, each sample, or each transition.

@@ -15,6 +15,7 @@ import numpy as np
 from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible, without_memory
+from hsdsl.base.shown import shown
 from hsdsl.engine.execution.parts import REASONS, Arc, Point, RunWarning, Stop, Transition, Verdict
 from hsdsl.engine.execution.records import Deferred, same
 from hsdsl.engine.execution.samples import Array, Samples
@@ -161,9 +162,7 @@ class Execution(Deferred):
 
     def _repr_html_(self) -> str:
         """Show a short summary and a picture in notebooks."""
-        from hsdsl.analysis.plot.notebook import run_html
-
-        return run_html(self)
+        return shown("run_html", self)
 
     if not TYPE_CHECKING:
 
@@ -191,9 +190,7 @@ class Execution(Deferred):
 
         Raises UsageError: an unknown name.
         """
-        from hsdsl.analysis.plot import axes
-
-        return axes(self, figure, **(self.view() | options))
+        return shown("axes", self, figure, **(self.view() | options))
 
     def view(self) -> dict[str, Any]:
         """Return what a picture shows of the model: units, levels of guards; nothing for a run read from a file."""
@@ -346,9 +343,7 @@ class Execution(Deferred):
 
         Raises UsageError: for an unknown suffix or column, a file that cannot be written, or a missing library.
         """
-        from hsdsl.analysis.store import save
-
-        return save(self, path, samples=self.sample_times if samples is None else samples, columns=columns)
+        return shown("save", self, path, samples=self.sample_times if samples is None else samples, columns=columns)
 
     @property
     def sample_times(self) -> Array | None:

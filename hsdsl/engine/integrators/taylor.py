@@ -1,6 +1,6 @@
 """Taylor series of any order: each step is the solution's own polynomial, from recurrences along the flow.
 
-The coefficients come from a model's tape (`hsdsl.mathematics.program.Tape`), so a flow must be smooth. The order follows from the
+The coefficients come from a model's tape (`program.Tape`), so a flow must be smooth. The order follows from the
 tolerance. Scheme `relaxed` chooses steps by the error estimate as for every method, `located` from the last term and
 the first that is left out: A. Jorba and M. Zou, A software package for the numerical integration of ODEs by means of
 high-order Taylor methods, Experimental Mathematics 14, 2005 (doi:10.1080/10586458.2005.10128904).

@@ -21,7 +21,7 @@ the curve: fast decays decay on it, and oscillations go on. It is one flight: wh
 sample or a switch of an input is passed, the mode is not stiff. An implicit method would begin again there, which costs
 as much as a few dozen times of decay by an explicit one.
 
-What lies far from the start is seen by the run itself (`hsdsl.engine.simulate.review`): where its steps are at least as long
+What lies far from the start is seen by the run itself (`simulate.review`): where its steps are at least as long
 as the fastest decay at its last row, and the mode is stiff from there on, the run is made again by `radau`.
 
 A run with a precision is not examined, and counts as not stiff.

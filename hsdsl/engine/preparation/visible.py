@@ -1,6 +1,6 @@
 """Executions of systems of parts as their readers see them: product modes by name, each with its own states.
 
-A run of such a system is one mode with the numbers of its parts' modes among its states (`hsdsl.base.parts`). What is shown
+A run of such a system is one mode with the numbers of its parts' modes among its states (`parts`). What is shown
 lacks these numbers, and states that the mode of their part does not have.
 """
 

@@ -1,7 +1,7 @@
 """Motion along guards: a state that its own resets keep while the flow pushes it out (M11).
 
 At such a point q the reset is the identity, the target is the same mode, and the flow leaves the domain. The execution
-follows the constrained flow (`hsdsl.mathematics.completion.overlay`), at rest where that is zero, until the flow no longer pushes
+follows the constrained flow (`completion.overlay`), at rest where that is zero, until the flow no longer pushes
 out. Other surfaces are crossed as along any flow.
 """
 

@@ -15,8 +15,9 @@ from itertools import accumulate, pairwise
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, TIE, Number
+from hsdsl.base.samples import in_order
 from hsdsl.engine.kernel import Kernel
-from hsdsl.mathematics.program import Program, SampledInput, in_order
+from hsdsl.mathematics.program import Program, SampledInput
 
 BEHIND = 4  # ties of time behind the end of a run, where inputs have the values behind a jump at the end
 

@@ -1,1 +1,1 @@
-"""interface/imports."""
+"""Models of other tools as model files of ours: `sbml`, `spaceex`."""

@@ -84,7 +84,7 @@ def distance_of_runs(
     run, other : Execution
         Of one model file; schemes, steps, engines, initial values and lengths may differ.
     metric : str
-        A key of `hsdsl.analysis.metrics.table.CURVE_METRICS`: rho, quotient, relaxed, rho-hat, sup, skorokhod or tau-epsilon.
+        A key of `table.CURVE_METRICS`: rho, quotient, relaxed, rho-hat, sup, skorokhod or tau-epsilon.
     relaxation : number or str, optional
         For ``rho`` and ``relaxed``: how deep the strips of the relaxed space are.
     model : Model or path, optional

@@ -178,7 +178,7 @@ class Model:
         until : number or str, optional
             End of the run.
         scheme, method : str, optional
-            A name of :data:`hsdsl.engine.simulate.SCHEMES`; a name of :data:`hsdsl.engine.integrators.METHODS`, or ``auto``.
+            A name of `simulate.SCHEMES`; a name of `integrators.METHODS`, or ``auto``.
         step, tolerance : number or str, optional
             Fixed step, or bound on the local error relative to the largest size each state has had; they exclude each
             other.
@@ -531,7 +531,7 @@ class Model:
         Parameters
         ----------
         vary : sequence of str or mapping
-            Texts such as ``"c=0.5:0.95:101"`` and ``"c~normal(0.9, 0.02)"`` (`hsdsl.analysis.sweep.variation`), or by name what
+            Texts such as ``"c=0.5:0.95:101"`` and ``"c~normal(0.9, 0.02)"`` (`sweep.variation`), or by name what
             follows the name, or an array of values. Names are parameters, and initial states as ``initial.NAME``.
         out : path
             The folder of the dataset: a new one, or that of the same sweep.

@@ -15,13 +15,13 @@ from typing import Any
 
 from hsdsl.base.errors import Diagnostic, Span
 from hsdsl.base.names import closest, counted, did_you_mean, is_identifier, shown
+from hsdsl.base.samples import Hold, in_order
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable
 from hsdsl.language.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.language.files import DataRefused
 from hsdsl.language.schema import InputFile, InputSamples
 from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import SampledInput
-from hsdsl.mathematics.program import Hold, in_order
 
 _STEP = "for a step leave out the first of the two; with `hold: linear` both count, as a jump between two ramps"
 _THIRD = "at a jump give two: the value before it and the one behind it"

@@ -1,7 +1,7 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """HybridSystem -> Program: every expression becomes a straight-line routine over numbered states, parameters and time.
 
-The pipeline is in :func:`lower`. `hsdsl.mathematics.program.ModeProgram` lists the routines. `switches` takes out what jumps with
+The pipeline is in :func:`lower`. `program.ModeProgram` lists the routines. `switches` takes out what jumps with
 time, `names` numbers, `mode` has the routines of a mode, `constants` those of parameters alone, `slopes` those that
 only exports need. `routines` writes each by `printer`, in steps that `straight` and `sharing` make small; `elimination`
 solves linear equations in them.

@@ -1,4 +1,4 @@
-"""A run screened in C (``hsdsl/engine/runtime/c/screen.c``): where there is surely nothing to find, Python takes no part.
+"""A run screened in C (`runtime/c/screen.c`): where there is surely nothing to find, Python takes no part.
 
 The screen holds for compiled runs by `located` with a tolerance, which noted nothing, end as the finer run does, and
 make the same transitions. Of others there is none, and Python decides every hypothesis.
