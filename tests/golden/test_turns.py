@@ -13,7 +13,7 @@ import pytest
 from engines import ENGINES
 
 import hsdsl
-from hsdsl.execution import Execution
+from hsdsl.engine.execution import Execution
 
 WHEEL = """hsdsl: 1
 parameters: {{gamma: {gamma}, alpha: {alpha}, w: {w}}}
