@@ -587,3 +587,19 @@ def test_an_order_of_executions_within_the_error_is_unknown(engine, shift, theor
     verdict = given.simulate(engine=engine, method="dopri5", tolerance=1e-4).verdict
     assert verdict.theorem == theorem
     assert any("the order of executions of go" in reason for reason in verdict.reasons) == (theorem == "unknown")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_value_taken_from_a_queue_is_not_known_because_the_one_before_was(engine):
+    """The second execution waits with 0, as the first does, but that is a comparison within the error of x = e^1.5."""
+    given = model(
+        "x: x, p: 1, y: 0, z: 0",
+        "{name: late, event: p >= 1, delay: 3, reset: {y: z}}, "
+        "{name: tick, when: p >= 3/2, to: m, reset: {p: 0, z: 'max(0, exp(3/2) + 1e-5 - x)'}}",
+        "x: 1, p: 0, y: 0, z: 0",
+        until="6.5",
+    )
+    run = given.simulate(engine=engine, method="dopri5", tolerance=1e-4)
+    assert times(run, "late") == pytest.approx([4, 5.5]) and run.final.state["y"] == 0
+    assert run.verdict.theorem == "unknown"
+    assert any("from t = 4 on: the error of late@to.y" in reason for reason in run.verdict.reasons)

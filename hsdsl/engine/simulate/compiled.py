@@ -225,7 +225,7 @@ class CompiledRun:
             return stops.interrupted(self.now)
         from hsdsl.engine.simulate.messages import stop
 
-        _ = self.diagnostics  # they may end the run
+        diagnostics = self.diagnostics  # they may end the run
         if reason == "accumulated" and self._accumulated is not None:
             return self._accumulated
-        return stop(self.plan.problem, self.workspace, reason)
+        return stop(self.plan.problem, self.workspace, reason, diagnostics)

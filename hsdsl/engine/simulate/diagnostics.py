@@ -5,11 +5,13 @@ A departure is where a run left what the theorem is about, undecided what could 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from hsdsl.base.names import without_memory
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Stop
+from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.remarks import Remark, of_edge
 from hsdsl.engine.simulate.stops import show
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram
@@ -29,13 +31,14 @@ class Diagnostics:
     """What a run says of itself besides its transitions; of one kind only the first is kept.
 
     ``remarks`` are reported first, by the place of the departure that each is about; ``rough`` are surfaces,
-    by mode and number, that are followed roughly from a time on.
+    by mode and number, that are followed roughly from a time on. ``turns`` are the edges that accumulate in turn.
     """
 
     departures: list[str] = field(default_factory=list[str])
     remarks: dict[int, Remark] = field(default_factory=dict[int, Remark])
     rough: dict[tuple[str, int], Number] = field(default_factory=dict[tuple[str, int], Number])
     undecided: list[str] = field(default_factory=list[str])
+    turns: list[str] = field(default_factory=list[str])
     _noted: set[object] = field(default_factory=set[object])
     _moved: dict[str, tuple[int, Number, Number]] = field(default_factory=dict[str, tuple[int, Number, Number]])
 
@@ -83,6 +86,16 @@ class Diagnostics:
             "one that goes on along it needs a mode of its own"
         )
         self.departures.append(f"Zeno at t = {show(end)}: {sentence}")
+        return Stop("zeno", t, sentence)
+
+    def takes_turns(self, states: Sequence[str], x: State, t: Number) -> Stop:
+        """The transitions whose edges are in ``turns`` accumulate at t, at the state x: the run stops there."""
+        where = ", ".join(f"{name} = {show(a)}" for name, a in zip(without_memory(states), x, strict=False))
+        sentence = (
+            f"the transitions of {', '.join(dict.fromkeys(self.turns))} take turns and accumulate at t = {show(t)}, "
+            f"where {where}: no motion is known at this limit, and one that goes on needs a mode of its own"
+        )
+        self.departures.append(f"Zeno at t = {show(t)}: {sentence}")
         return Stop("zeno", t, sentence)
 
     def coupled(self, edge: str, t: Number) -> Stop:

@@ -17,6 +17,7 @@ from hsdsl.engine.simulate.contact import behind_end, contact_at, holds_next, in
 from hsdsl.engine.simulate.dense_steps import Span, Stepping, stepping
 from hsdsl.engine.simulate.diagnostics import FREE, slides
 from hsdsl.engine.simulate.entry import enter
+from hsdsl.engine.simulate.flights import contraction, flown
 from hsdsl.engine.simulate.relaxed import Event, go_on, sizes, standing_on
 from hsdsl.engine.simulate.root_isolation import stays_below
 from hsdsl.engine.simulate.run import ModeState, Run, choose, reset
@@ -26,7 +27,7 @@ from hsdsl.engine.simulate.stops import LEFT, left_domain, reached, reached_in_s
 from hsdsl.engine.simulate.surface_polynomials import Rise, deflated, rises_along
 from hsdsl.engine.simulate.surfaces import NONE, Arrival, Crossing, StepFailure, close_bracket, joined
 from hsdsl.engine.simulate.touching import touched
-from hsdsl.engine.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts, unresolved
+from hsdsl.engine.simulate.zeno import at_limit, close_tail, held_exactly, of_contacts, unresolved
 
 MOST_CORRECTIONS = 8
 
@@ -269,10 +270,12 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
         return entered
     if run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
         return slides(edge.name, here.mode, entered.mode, entered.t)
+    if entered.mode is not here.mode:
+        return at_limit(run, entered) or entered
     closed = close_tail(run, entered, crossing.edge)
-    if isinstance(closed, Stop) or entered.mode is not here.mode:
+    if isinstance(closed, Stop):
         return closed
-    return unresolved(run, closed, crossing.edge) or closed
+    return at_limit(run, closed) or unresolved(run, closed, crossing.edge) or closed
 
 
 def still_on(here: ModeState, event: Event) -> Mapping[int, Number]:

@@ -32,12 +32,14 @@ def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | N
         return diagnostics.replaced(mode.edges[k], count, time, other)
     if kind == "slides":
         return slides(program.modes[count].edges[k].name, program.modes[count], mode, time)
+    if kind == "takes turn":
+        return diagnostics.turns.append(mode.edges[k].name)
     if kind == "coupled":
         return diagnostics.coupled(mode.edges[k].name, time)
     return diagnostics.accumulates(mode.edges[k].name, time, other)
 
 
-def stop(problem: Problem, workspace: Workspace, reason: str) -> Stop:
+def stop(problem: Problem, workspace: Workspace, reason: str, diagnostics: Diagnostics) -> Stop:
     """Say why a run stopped."""
     found = workspace.task.stop
     number, t = int(found.mode), found.time
@@ -55,6 +57,8 @@ def stop(problem: Problem, workspace: Workspace, reason: str) -> Stop:
     if reason in ("entered outside", "left"):
         return stops.left_domain(mode, found.surface, t, stops.LEFT if reason == "left" else stops.ENTERED)
     x, slope, scales = (column[: found.dimension].tolist() for column in workspace.stopped)
+    if reason == "accumulated":
+        return diagnostics.takes_turns(mode.states, tuple(x), t)
     here = Standstill(problem, number, segment, t, tuple(x), scales, found.h)
     if reason == "here not finite":
         return here.not_finite([(t, here.x)])

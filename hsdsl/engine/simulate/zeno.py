@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial, reduce
-from itertools import pairwise
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Number
 from hsdsl.engine.execution import Stop, Transition
@@ -29,44 +28,16 @@ from hsdsl.engine.simulate.contact import (
     reset_but_counts,
 )
 from hsdsl.engine.simulate.diagnostics import FREE
+from hsdsl.engine.simulate.flights import contraction, flown, last_flights, period, round_flights, shrinking
 from hsdsl.engine.simulate.root_isolation import total
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.surfaces import joined
+from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS, Surfaces, joined
 
-LEAST_FLIGHTS = 3
 LAST_TIES = 4  # what is tied with the flight of an event that is as short may keep it from being armed again
 MOST_CORRECTIONS_TO_GUARD = 4  # of a point towards a guard
 MOST_ROUNDS = 60  # of acceleration towards a fixed point
-MOST_LEAP = 16  # times a step
-
-
-def contraction(made: Sequence[Transition], of_flow: bool = False) -> tuple[Number, Number] | None:
-    """Return the last flight and the largest ratio of the last few of the last edge, if they shrink; else None."""
-    flights = last_flights(made, of_flow)
-    if not flights or not min(flights) > 0:
-        return None
-    ratio = max(b / a for a, b in pairwise(flights))
-    return (flights[-1], ratio) if ratio < 1 else None
-
-
-def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Number]:
-    """The last few flights between transitions of the last edge, in order; none where they are not as many.
-
-    Other edges that lead back to the same mode may fire meanwhile, also as entries; :data:`FREE` transitions are looked
-    at. Where they are ``of_flow`` time in strips does not count.
-    """
-    times: list[Number] = []
-    waited = made[-1].time * 0
-    for one in reversed(made[-FREE:]):
-        if one.source != made[-1].source or one.source != one.target or (one.entry and one.edge == made[-1].edge):
-            break
-        if of_flow and times and one.resumed is not None:
-            waited = waited + (one.resumed - one.time)
-        if one.edge == made[-1].edge:
-            times.append(one.time + waited)
-        if len(times) > LEAST_FLIGHTS:
-            break
-    return [a - b for a, b in pairwise(times)][::-1] if len(times) > LEAST_FLIGHTS else []
+MOST_LEAP = 4096  # times a step: rounds may take back as little as a four-thousandth
+Stage = tuple[ModeState, int]
 
 
 def unresolved(run: Run, here: ModeState, k: int) -> Stop | None:
@@ -94,14 +65,6 @@ def empties(here: ModeState, k: int) -> bool:
     """Whether edge k makes executions that wait: they end, however close together they are."""
     changes = here.mode.edges[k].changes
     return any(queue.waiting in changes and queue.values[0] not in changes for queue in here.mode.queues)
-
-
-def flown(made: Sequence[Transition], t: Number) -> Number:
-    """The time of flow since the first of some transitions, without that in strips."""
-    found = t - made[0].time
-    for one in made:
-        found = found - (one.resumed - one.time if one.resumed is not None else 0)
-    return found
 
 
 def nearly_over(run: Run, here: ModeState, k: int) -> tuple[list[int], Number] | None:
@@ -173,6 +136,86 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
     rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
     rest.surfaces.active.update(edges)
     return rest
+
+
+def at_limit(run: Run, here: ModeState) -> Stop | None:
+    """Stop at the limit of a tail of edges that take turns, which is nearly over: no motion is known to go on there.
+
+    A round leads through all of them, through other modes with the same states, too: the limit is on all their guards.
+    """
+    made = run.recorder.transitions
+    flights = round_flights(made)
+    found = shrinking(flights)
+    if found is None:
+        return None
+    left = found[0] * found[1] / (1 - found[1])
+    end = here.t + left
+    if not left <= run.settings.relaxation or not end < here.segment.end:
+        return None
+    stages = stages_of(run, here, made[-period(made) :])
+    if stages is None:
+        return None
+    try:
+        q = end_of_rounds(run, here, stages, made, left / flights[-1], end)
+    except DOMAIN_ERRORS:
+        return None
+    if q is None:
+        return None
+    if end > here.t:
+        here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
+    run.diagnostics.turns.extend(one.edge for one in made[-len(stages) :])
+    return run.diagnostics.takes_turns(here.mode.states, q, end)
+
+
+def stages_of(run: Run, here: ModeState, made: Sequence[Transition]) -> list[Stage] | None:
+    """The modes of a round, as places of the run, with their edges.
+
+    None where states differ, for an event, and where a guard can hold the state.
+    """
+    numbers = {mode.name: i for i, mode in enumerate(run.program.modes)}
+    stages, follows = list[Stage](), run.settings.completion != "none"
+    for one in made:
+        number = numbers[one.source]
+        mode, kernel = run.program.modes[number], run.kernel.bind(number, here.segment.data)
+        surfaces = Surfaces(kernel, mode.edges, here.surfaces.scale, run.arithmetic)
+        stage = replace(here, index=number, flow=number, mode=mode, kernel=kernel, surfaces=surfaces)
+        k = next(j for j, edge in enumerate(mode.edges) if edge.name == one.edge)
+        if mode.states != here.arc.states or mode.edges[k].of_event:
+            return None
+        if mode.edges[k].contact is not None and follows:
+            return None
+        stages.append((stage, k))
+    return stages
+
+
+def end_of_rounds(
+    run: Run, here: ModeState, stages: list[Stage], made: Sequence[Transition], share: Number, end: Number
+) -> State | None:
+    """The point that rounds run to: on all guards, and no further than the flow leads within the relaxation.
+
+    What is left of the tail has this ``share`` of each flight of the last round.
+    """
+
+    def around(t: Number, x: State) -> State:
+        for stage, k in stages:
+            x = reset_but_counts(run, stage, k, t, onto_guard(stage, k, t, x))
+        return x
+
+    point = q = limit(partial(around, here.t), here.x)
+    far: State = tuple(map(abs, here.kernel.flow(here.t, *here.x)))
+    for i, (stage, k) in enumerate(stages, -len(stages)):
+        slope, h = stage.kernel.flow(here.t, *point), share * (made[i].time - made[i - 1].time)
+        far = tuple(max(a, abs(f)) for a, f in zip(far, slope, strict=True))
+        q = reset_but_counts(run, stage, k, here.t, tuple(a + h * f for a, f in zip(q, slope, strict=True)))
+        point = reset_but_counts(run, stage, k, here.t, point)
+    q = point = limit(partial(around, end), q)
+    for stage, k in stages:
+        if not abs(stage.kernel.surfaces(end, *point)[k]) <= stage.surfaces.roundoff_bound(k, end, point, entry=True):
+            return None
+        point = reset_but_counts(run, stage, k, end, point)
+    noise = ROUNDOFF_UNITS * run.arithmetic.unit
+    reach = (run.settings.relaxation * f + noise * s for f, s in zip(far, here.sizes, strict=True))
+    return q if all(abs(a - b) <= most for a, b, most in zip(q, here.x, reach, strict=True)) else None
 
 
 def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], end: Number) -> State | None:

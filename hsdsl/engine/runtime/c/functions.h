@@ -249,13 +249,21 @@ static int in_touch(const hs_run *run, int k);
 static void after_contact(hs_run *run);
 static int behind_end(hs_run *run, int j, hs_time *t);
 
-/* zeno.c */
+/* flights.c */
+#define LEAST_FLIGHTS 3
 static const hs_made *made_before(const hs_run *run, int back);
+static int last_flights(const hs_run *run, int of_flow, hs_real *flight);
+static int period(const hs_run *run);
+static int round_flights(const hs_run *run, hs_real *flight);
+static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *ratio);
 static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio);
 static hs_time flown(const hs_run *run, hs_time t);
+
+/* zeno.c */
 static int of_contacts(hs_run *run);
 static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached);
 static int close_tail(hs_run *run, int k);
+static int at_limit(hs_run *run);
 static int unresolved(hs_run *run, int k);
 
 /* moving.c */

@@ -36,6 +36,7 @@
 #include "surface_polynomials.c"
 #include "dense_steps.c"
 #include "contact.c"
+#include "flights.c"
 #include "zeno.c"
 #include "touching.c"
 #include "located.c"

@@ -101,7 +101,16 @@ typedef struct {
   int32_t alternatives; /* how many of the chunk's are its */
 } hs_transition;
 
-typedef enum { HS_CROWDED, HS_IN_CONTACT, HS_REPLACED, HS_ACCUMULATES, HS_UNSETTLED, HS_SLIDES, HS_COUPLED } hs_notice;
+typedef enum {
+  HS_CROWDED,
+  HS_IN_CONTACT,
+  HS_REPLACED,
+  HS_ACCUMULATES,
+  HS_UNSETTLED,
+  HS_SLIDES,
+  HS_COUPLED,
+  HS_TAKES_TURN
+} hs_notice;
 
 #define HS_SLID (1 << 16) /* beside the bits of notices: the run slid between two modes */
 

@@ -404,8 +404,10 @@ static int jump(hs_run *run) {
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0, t);
   if (entered != GOES_ON) return entered;
   if (returns(run, flowed)) return slides(run, mode, k);
-  const int closed = close_tail(run, k);
-  return closed == GOES_ON && run->here.mode == mode ? unresolved(run, k) : closed;
+  if (run->here.mode != mode) return at_limit(run);
+  int closed = close_tail(run, k);
+  if (closed == GOES_ON) closed = at_limit(run);
+  return closed == GOES_ON ? unresolved(run, k) : closed;
 }
 
 /* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */

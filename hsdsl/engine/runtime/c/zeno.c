@@ -3,46 +3,13 @@
 
 #include "functions.h"
 
-#define LEAST_FLIGHTS 3
 #define LAST_TIES 4
 #define MOST_CORRECTIONS_TO_GUARD 4
 #define MOST_ROUNDS 60
-#define MOST_LEAP 16
+#define MOST_LEAP 4096
 
-/* Transition `back` before the last one. */
-static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
-
-/* The last few flights between transitions of the last edge, the last one first; 0 where they are not as many. Where
-   they are `of_flow`, time in strips does not count. */
-static int last_flights(const hs_run *run, int of_flow, hs_real *flight) {
-  const hs_made *const last = made_before(run, 0);
-  hs_time later = last->time, waited = 0.0;
-  int flights = 0;
-  if (last->mode != last->target || last->entry) return 0;
-  for (int i = 1; i < FREE && i < run->jump && flights < LEAST_FLIGHTS; i++) {
-    const hs_made *const made = made_before(run, i);
-    if (made->mode != last->mode || made->mode != made->target || (made->entry && made->edge == last->edge)) break;
-    if (of_flow && made->resumed == made->resumed) waited = waited + (made->resumed - made->time);
-    if (made->edge != last->edge) continue;
-    flight[flights++] = later - (made->time + waited);
-    later = made->time + waited;
-  }
-  return flights == LEAST_FLIGHTS;
-}
-
-/* Whether the flights of the last edge shrink: the last one, and the largest ratio of the last few. */
-static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *ratio) {
-  hs_real flights[LEAST_FLIGHTS];
-  if (!last_flights(run, of_flow, flights)) return 0;
-  *flight = flights[0], *ratio = 0.0;
-  for (int i = 0; i < LEAST_FLIGHTS; i++) {
-    if (!(flights[i] > 0)) return 0;
-    if (i) *ratio = hs_max(*ratio, flights[i - 1] / flights[i]);
-  }
-  return *ratio < 1;
-}
-
-static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) { return shrinking(run, 0, flight, ratio); }
+typedef int hs_taken(hs_run *run, int k, hs_time t);
+typedef int hs_round(hs_run *run, hs_taken *taken, hs_time t);
 
 static int has_place(const int *places, int count, int place) {
   for (int i = 0; i < count; i++)
@@ -120,32 +87,36 @@ static int onto_guard(hs_run *run, int k, hs_time t) {
 }
 
 /* run->z taken by each edge of the tail, in turn. */
-static int by_each(hs_run *run, int (*taken)(hs_run *, int, hs_time), hs_time t) {
+static int by_each(hs_run *run, hs_taken *taken, hs_time t) {
   for (int k = 0; k < run->here.table->edges; k++)
     if (run->tail[k] && taken(run, k, t)) return RAISED;
   return 0;
 }
 
-/* The point that run->z runs to, to run->z, which the edges of the tail, `count` of them, in turn take to what one of
-   them keeps. */
-static int in_turn(hs_run *run, int (*taken)(hs_run *, int, hs_time), int count, hs_time t) {
+/* The point that run->z runs to by repeated `rounds`, to run->z. */
+static int run_to(hs_run *run, hs_round *rounds, hs_taken *taken, hs_time t) {
   const int n = run->here.dimension;
   hs_real *const x = run->z, *const first = run->turn, *const one = first + n;
   hs_real *const two = run->nearby;
-  if (count == 1) return by_each(run, taken, t);
   for (int i = 0; i < MOST_ROUNDS; i++) {
     copy(first, x, n);
-    if (by_each(run, taken, t)) return RAISED;
+    if (rounds(run, taken, t)) return RAISED;
     if (same_state(first, x, n)) break;
     copy(one, x, n);
-    if (by_each(run, taken, t)) return RAISED;
+    if (rounds(run, taken, t)) return RAISED;
     copy(two, x, n);
     for (int s = 0; s < n; s++) x[s] = first[s] = accelerated(first[s], one[s], two[s]);
-    if (by_each(run, taken, t)) return RAISED;
+    if (rounds(run, taken, t)) return RAISED;
     if (!shorter(first, x, one, two, n)) copy(x, two, n);
     without_nothing(x, n);
   }
   return 0;
+}
+
+/* The point that run->z runs to, to run->z, which the edges of the tail, `count` of them, in turn take to what one of
+   them keeps. */
+static int in_turn(hs_run *run, hs_taken *taken, int count, hs_time t) {
+  return count == 1 ? by_each(run, taken, t) : run_to(run, by_each, taken, t);
 }
 
 /* Be in the mode itself again at t, the state x without what steps along its guards were off by: they may hold it
@@ -231,16 +202,6 @@ static int meets_another(hs_run *run, hs_time t, const hs_real *x, hs_time end, 
     if (!run->tail[j] && !(run->ahead[j] > before)) return 1;
   }
   return 0;
-}
-
-/* The time of flow up to t since the first of the last transitions, without that in strips. */
-static hs_time flown(const hs_run *run, hs_time t) {
-  hs_time found = t - made_before(run, FREE - 1)->time;
-  for (int i = FREE - 1; i >= 0; i--) {
-    const hs_made *made = made_before(run, i);
-    found = found - (made->resumed == made->resumed ? made->resumed - made->time : 0);
-  }
-  return found;
 }
 
 /* Mark in run->tail the edges of the last transitions, where each leads back to the present mode and its guard can hold a
@@ -339,6 +300,121 @@ static int close_tail(hs_run *run, int k) {
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j] && !run->active_surfaces[j]) run->active_surfaces[j] = 1, here->standing++;
   return GOES_ON;
+}
+
+/* Bind routines to the mode of transition `back` before the last one; return its edge. */
+static int bind_made(hs_run *run, int back) {
+  const hs_made *const made = made_before(run, back);
+  run->here.table = &run->model->mode[made->mode];
+  return made->edge;
+}
+
+/* run->z taken round once by the transitions of the last round, each at its guard, or `taken` to it. */
+static int around(hs_run *run, hs_taken *taken, hs_time t) {
+  const hs_mode *const own = run->here.table;
+  int raised = 0;
+  for (int back = period(run); back-- > 0 && !raised;) {
+    const int k = bind_made(run, back);
+    raised = taken(run, k, t) || reset_but_counts(run, k, t, run->z, run->after);
+    if (!raised) copy(run->z, run->after, run->here.dimension);
+  }
+  run->here.table = own;
+  return raised ? RAISED : 0;
+}
+
+/* Whether the modes of the last round have the state's own states, and no guard of its edges, none of events, holds a
+   state. */
+static int rounds_alike(const hs_run *run) {
+  const hs_mode *const own = run->here.table;
+  for (int back = period(run); back-- > 0;) {
+    const hs_made *const made = made_before(run, back);
+    const hs_mode *const mode = &run->model->mode[made->mode];
+    const hs_edge *const edge = &mode->edge[made->edge];
+    if (run->here.dimension != own->dimension || mode->dimension != own->dimension) return 0;
+    if (edge->of_event || (edge->contact >= 0 && run->task->settings.contacts)) return 0;
+    for (int s = 0; s < own->dimension; s++)
+      if (mode->state[s] != own->state[s]) return 0;
+  }
+  return 1;
+}
+
+/* Move run->z once round by the flow: by this `share` of each flight of the last round. To run->near how large the flow
+   is at the limit, which run->turn goes through. */
+static int moved_round(hs_run *run, hs_real share) {
+  const int n = run->here.dimension;
+  const hs_time t = run->here.t;
+  hs_real *const q = run->z, *const point = run->turn, *const slope = run->end, *const far = run->near;
+  if (run->here.table->flow(run->here.p, t, run->x, far)) return RAISED;
+  for (int s = 0; s < n; s++) far[s] = fabs(far[s]);
+  for (int back = period(run); back-- > 0;) {
+    const int k = bind_made(run, back);
+    const hs_real h = share * (made_before(run, back)->time - made_before(run, back + 1)->time);
+    if (run->here.table->flow(run->here.p, t, point, slope)) return RAISED;
+    for (int s = 0; s < n; s++) far[s] = hs_max(far[s], fabs(slope[s])), q[s] = q[s] + h * slope[s];
+    if (reset_but_counts(run, k, t, q, run->after)) return RAISED;
+    copy(q, run->after, n);
+    if (reset_but_counts(run, k, t, point, run->after)) return RAISED;
+    copy(point, run->after, n);
+  }
+  return 0;
+}
+
+/* Whether a round from run->z leads to all of its guards: 1, 0 or RAISED. */
+static int on_guards(hs_run *run, hs_time t) {
+  hs_real r, noise, *const point = run->turn;
+  copy(point, run->z, run->here.dimension);
+  for (int back = period(run); back-- > 0;) {
+    const int k = bind_made(run, back);
+    if (surface(run, k, t, point, &r) || roundoff_bound(run, k, t, point, 1, &noise)) return RAISED;
+    if (!(fabs(r) <= noise)) return 0;
+    if (reset_but_counts(run, k, t, point, run->after)) return RAISED;
+    copy(point, run->after, run->here.dimension);
+  }
+  return 1;
+}
+
+/* The point that rounds run to, to run->z: 1 where it is on all guards, and no further than the flow leads within the
+   relaxation. What is left of the tail has this `share` of each flight of the last round. */
+static int end_of_rounds(hs_run *run, hs_real share, hs_time end) {
+  const hs_mode *const own = run->here.table;
+  const int n = run->here.dimension;
+  copy(run->z, run->x, n);
+  if (run_to(run, around, onto_guard, run->here.t)) return RAISED;
+  copy(run->turn, run->z, n);
+  const int raised = moved_round(run, share);
+  run->here.table = own;
+  if (raised || run_to(run, around, onto_guard, end)) return RAISED;
+  const int on = on_guards(run, end);
+  run->here.table = own;
+  if (on != 1) return on;
+  for (int s = 0; s < n; s++) {
+    const hs_real reach = run->epsilon * run->near[s] + ROUNDOFF_UNITS * HS_UNIT * state_size(run, s);
+    if (!(fabs(run->z[s] - run->x[s]) <= reach)) return 0;
+  }
+  return 1;
+}
+
+/* Stop at the limit of a tail of edges that take turns, which is nearly over: no motion is known to go on there. A round
+   leads through all of them, through other modes with the same states, too: the limit is on all their guards. */
+static int at_limit(hs_run *run) {
+  hs_mode_state *const here = &run->here;
+  hs_real flights[LEAST_FLIGHTS], flight, ratio;
+  if (!round_flights(run, flights) || !shrinking(run, 0, &flight, &ratio)) return GOES_ON;
+  const hs_time left = flight * ratio / (1 - ratio), end = here->t + left;
+  if (!(left <= run->epsilon) || !(end < segment_end(run)) || end > run->pause) return GOES_ON;
+  if (!rounds_alike(run) || end_of_rounds(run, left / flight, end) != 1) return GOES_ON;
+  if (end > here->t) {
+    secant(run, &run->cubic);
+    append(run, end, run->z, &run->cubic);
+  }
+  swap(&run->x, &run->z);
+  const int own = here->mode;
+  for (int back = period(run); back-- > 0;) {
+    here->mode = made_before(run, back)->mode;
+    note(run, HS_TAKES_TURN, made_before(run, back)->edge, 0, end, end);
+  }
+  here->mode = own;
+  return stopped(run, HS_ACCUMULATED, end);
 }
 
 /* Stop at the end of a tail of edge k that runs to no limit, where what is left of it is shorter than time can tell.

@@ -31,7 +31,7 @@ from .steps import at
 from .surfaces import UNIT, after_reset, keeps
 
 ZERO_UNITS, FURTHER = 16, 16
-MOST_ROUNDS, MOST_CORRECTIONS_TO_GUARD, MOST_LEAP = 60, 4, 16
+MOST_ROUNDS, MOST_CORRECTIONS_TO_GUARD, MOST_LEAP = 60, 4, 4096
 PARALLEL = 1e-6
 
 

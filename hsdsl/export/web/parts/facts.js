@@ -52,6 +52,7 @@ function noted({kind, mode, surface, number, time: t, other}) {
     "in contact": `${number ? "at rest on" : "motion along"} the guard of ${edge} from ${time(t)} to ${time(other)}`,
     "replaced": `Zeno at ${time(t)}: the transitions of ${edge} after number ${number} are replaced by their limit`,
     "accumulates": `the transitions of ${edge} accumulate at ${time(t)}, and no motion along its guard is known there`,
+    "takes turn": `transitions, ${edge} the last of them, take turns and accumulate at ${time(t)}: no motion is known there`,
     "coupled": `several guards hold the state at ${time(t)}, that of ${edge} among them, and no one motion along them is known`,
     "unsettled": `surface ${surface} of mode ${modeOf(mode)} would not settle on a polynomial at ${time(t)}`,
     "slides": `sliding at ${time(t)}: the flows of ${modeOf(mode)} and ${modeOf(number)} lead into each other`,
