@@ -52,17 +52,19 @@ def contraction(made: Sequence[Transition], of_flow: bool = False) -> tuple[Numb
 def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Number]:
     """The last few flights between transitions of the last edge, in order; none where they are not as many.
 
-    Other edges that lead back to the same mode may fire meanwhile, also as entries; :data:`FREE` transitions are looked
-    at. Where they are ``of_flow`` time in strips does not count.
+    That is the last one that was reached: what it set off is no edge of a tail. Other edges that lead back to the same
+    mode may fire meanwhile, also as entries; :data:`FREE` transitions are looked at. Where they are ``of_flow`` time in
+    strips does not count.
     """
     times: list[Number] = []
     waited = made[-1].time * 0
+    last = next((one for one in reversed(made[-FREE:]) if not one.entry), made[-1])
     for one in reversed(made[-FREE:]):
-        if one.source != made[-1].source or one.source != one.target or (one.entry and one.edge == made[-1].edge):
+        if one.source != last.source or one.source != one.target or (one.entry and one.edge == last.edge):
             break
         if of_flow and times and one.resumed is not None:
             waited = waited + (one.resumed - one.time)
-        if one.edge == made[-1].edge:
+        if one.edge == last.edge:
             times.append(one.time + waited)
         if len(times) > LEAST_FLIGHTS:
             break
@@ -131,7 +133,10 @@ def of_contacts(run: Run, here: ModeState, made: Sequence[Transition]) -> list[i
 
 
 def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
-    """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
+    """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on.
+
+    What its last transition set off has no limit.
+    """
     made = run.recorder.transitions
     found = nearly_over(run, here, k)
     if found is None or empties(here, k) or here.mode.states != here.arc.states:
@@ -154,7 +159,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
             end, q = here.t, limit_of(run, here, touched, edges, here.t)
         if q is None or not all(keeps(run, there := here.moved(end, q), j) for j in edges):
             return here
-        if edge.contact is None or run.settings.completion == "none":
+        if edge.contact is None or run.settings.completion == "none" or made[-1].entry:
             possible = is_possible(run, here, k, end, q, touched)
             return run.diagnostics.accumulates(edge.name, end, here.t) if possible else here
         if keeping(run, there, edges) != edges:

@@ -12,20 +12,21 @@
 /* Transition `back` before the last one. */
 static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
 
-/* The last few flights between transitions of the last edge, the last one first; 0 where they are not as many. Where
-   they are `of_flow`, time in strips does not count. */
+/* The last few flights between transitions of the last edge that was reached, the last one first; 0 where they are not
+   as many. Where they are `of_flow`, time in strips does not count. */
 static int last_flights(const hs_run *run, int of_flow, hs_real *flight) {
-  const hs_made *const last = made_before(run, 0);
-  hs_time later = last->time, waited = 0.0;
-  int flights = 0;
-  if (last->mode != last->target || last->entry) return 0;
-  for (int i = 1; i < FREE && i < run->jump && flights < LEAST_FLIGHTS; i++) {
+  const int count = FREE < run->jump ? FREE : (int)run->jump;
+  int entries = 0, flights = -1;
+  while (entries < count - 1 && made_before(run, entries)->entry) entries++;
+  const hs_made *const last = made_before(run, entries);
+  hs_time later = 0.0, waited = 0.0;
+  for (int i = 0; i < count && flights < LEAST_FLIGHTS; i++) {
     const hs_made *const made = made_before(run, i);
     if (made->mode != last->mode || made->mode != made->target || (made->entry && made->edge == last->edge)) break;
-    if (of_flow && made->resumed == made->resumed) waited = waited + (made->resumed - made->time);
+    if (of_flow && flights >= 0 && made->resumed == made->resumed) waited = waited + (made->resumed - made->time);
     if (made->edge != last->edge) continue;
-    flight[flights++] = later - (made->time + waited);
-    later = made->time + waited;
+    if (flights >= 0) flight[flights] = later - (made->time + waited);
+    flights++, later = made->time + waited;
   }
   return flights == LEAST_FLIGHTS;
 }
@@ -291,7 +292,7 @@ static int is_held(hs_run *run, hs_time end, const hs_real *q, int count, int in
 }
 
 /* Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on. The last
-   transition was that of edge k. */
+   transition was that of edge k; what it set off has no limit. */
 static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
   hs_time left;
@@ -320,7 +321,7 @@ static int close_tail(hs_run *run, int k) {
   }
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j] && keeps(run, end, q, j) != 1) return GOES_ON;
-  if (own->edge[k].contact < 0 || !run->task->settings.contacts) {
+  if (own->edge[k].contact < 0 || !run->task->settings.contacts || made_before(run, 0)->entry) {
     if (!is_possible(run, k, end, q, run->held)) return GOES_ON;
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);
