@@ -1,0 +1,191 @@
+# pyright: basic
+"""An event as mathematics: its condition, the states that remember what it did, and the executions that can wait."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from hsdsl.base.functions import below, replaced
+from hsdsl.base.names import memory
+from hsdsl.language.expression.scope import symbol
+from hsdsl.language.expression.selection import either, is_mode, select, total, whole
+from hsdsl.language.expression.trigger import Reached, comparisons, number, reached
+from hsdsl.language.system import HALF, ONE, TIME, ZERO, Edge, Mode, Queue, Surface
+
+Values = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event as it was written, ``edge``, and the names of the states that remember what it did.
+
+    ``timed`` says that `since` is the time since the mode was entered, and ``jumps`` that the condition may turn true
+    by a reset, or hold where the mode is entered. ``flow`` has the rates of symbols; ``constants`` are parameters.
+    """
+
+    edge: Edge
+    mode: Mode
+    timed: bool
+    flow: Mapping[Any, Any]
+    constants: frozenset[Any]
+    jumps: bool = False
+
+    @cached_property
+    def names(self) -> dict[str, str]:
+        parts = ["armed", *(["due"] if self.jumps else []), *([] if self.delay is None else ["waiting"])]
+        return {part: memory(self.edge.name, part) for part in parts}
+
+    @cached_property
+    def stored(self) -> dict[str, str]:
+        """States that the execution that waits gives values, and the states that have these; numbers need no memory."""
+        given = self.edge.values
+        own = () if self.delay is None or self.event.at_execution else self.event.given
+        return {x: memory(self.edge.name, f"to.{x}") for x in own if x in given and given[x].free_symbols}
+
+    @property
+    def at(self) -> Any:
+        """The time at which the execution that waits is made."""
+        return symbol(self._at)
+
+    @property
+    def _at(self) -> str:
+        return memory(self.edge.name, "at")
+
+    @property
+    def queue(self) -> Queue | None:
+        """Where several executions can wait: one that is not persistent is gone before it is triggered again."""
+        if self.delay is None or not self.event.persistent:
+            return None
+        return Queue(self.names["waiting"], (self._at, *self.stored.values()), self.event.waiting)
+
+    @cached_property
+    def symbols(self) -> frozenset[Any]:
+        """What its condition depends on, and how that changes along the flow."""
+        return frozenset().union(*(part.free_symbols for one in self.rates.items() for part in one))
+
+    @cached_property
+    def rates(self) -> dict[Any, Any]:
+        """How fast its surface functions change along the flow of the mode."""
+        known, done = number_left(self.edge), dict[Any, Any]()
+
+        def rate(residual: Any) -> Any:
+            moving = ((s, self.flow[s]) for s in sorted(residual.free_symbols, key=str) if s in self.flow)
+            return sum((residual.diff(s) * replaced(flow, known, done) for s, flow in moving), ZERO)
+
+        return {part.residual: rate(part.residual) for part in comparisons(self.event.trigger)}
+
+    @property
+    def delay(self) -> Any | None:
+        return self.event.delay
+
+    @cached_property
+    def priority(self) -> Any:
+        """The number that decides which event goes first; 0 where its part is in another mode."""
+        given, here = self.event.priority, self.here({}, {})
+        return whole(self.edge.priority) if given is None else select(here, self.guarded(given, here), ZERO)
+
+    @cached_property
+    def ready(self) -> Any:
+        """1 where it is to be made at this instant, else 0."""
+        if self.delay is not None:
+            ready = below(self.symbol("waiting"), HALF, ZERO, ONE) * reached(TIME, self.at)
+        else:
+            ready = self.symbol("armed") * self.rises()
+            ready = either([ready, self.symbol("due")]) if self.jumps else ready
+        here = self.here({}, {})
+        return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
+
+    def goes_before(self, other: Event) -> bool:
+        """Whether it goes before another one, of those that are made at one instant, by M6."""
+        names = [edge.name for edge in self.mode.edges]
+        ranks = [(-each.edge.priority, names.index(each.edge.name)) for each in (self, other)]
+        return ranks[0] < ranks[1]
+
+    @property
+    def event(self) -> Any:
+        assert self.edge.event is not None
+        return self.edge.event
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        return (*self.names.values(), *(() if self.delay is None else (self._at, *self.stored.values())))
+
+    def symbol(self, part: str) -> Any:
+        return symbol(self.names[part])
+
+    def here(self, meaning: Mapping[Any, Any], known: Mapping[Any, Any]) -> Any:
+        """1 where its part is in its mode, at new values of states."""
+        if self.edge.part is None:
+            return ONE
+        number = symbol(self.edge.part[0])
+        return is_mode(meaning.get(number, number).xreplace(known), self.edge.part[1])
+
+    def guarded(self, expression: Any, truth: Any) -> Any:
+        """An expression that has a value also where something is not true."""
+        return total(expression, lambda a, b: select(truth, a, b), self.constants)
+
+    def surface(self, left: Any, right: Any, text: str) -> Surface:
+        """A surface of its mode; inside everywhere where its part is in another one."""
+        here = self.here({}, {})
+        if here == 1:
+            return Surface(left, right, left - right, text)
+        rest = ((left, ZERO), (right, ZERO), (left - right, -ONE))
+        left, right, residual = (select(here, self.guarded(side, here), other) for side, other in rest)
+        return Surface(left, right, residual, text)
+
+    def touched(self, meaning: Mapping[Any, Any]) -> bool:
+        """Whether new values of states change its condition."""
+        return any(c.residual.xreplace(meaning) != c.residual for c in comparisons(self.event.trigger))
+
+    def after(self, meaning: Mapping[Any, Any]) -> Any:
+        """1 where the condition holds at new values of states."""
+        return number(self.event.trigger, lambda part: part.holds(meaning))
+
+    def going_on(self, meaning: Mapping[Any, Any], reached: Reached | None, next_along: bool = False) -> Any:
+        """1 where the condition holds at new values of states in a mode that goes on.
+
+        A comparison that stays is on its surface, as that which was ``reached`` is, or has its value. There strict ones
+        are what they are next along the flow; with ``next_along`` others are, too.
+        """
+
+        def of(part: Reached) -> Any:
+            if part.residual.xreplace(meaning) != part.residual:
+                return part.holds(meaning)
+            turns, rate = part.turns(reached), self.rates[part.residual]
+            if not part.strict and not next_along:
+                return part.holds(meaning) if turns is None else ONE
+            if turns is None:
+                return part.holds(meaning) if rate == 0 else part.goes_on(rate, TIME).xreplace(meaning)
+            return part.holds_next(turns and next_along, rate, rate.xreplace(meaning))
+
+        return number(self.event.trigger, of)
+
+    def leaves(self, meaning: Mapping[Any, Any]) -> bool:
+        """Whether new values of states change how its comparisons change along the flow."""
+        return any(rate.xreplace(meaning) != rate for rate in self.rates.values())
+
+    def rises(self, reached: Reached | None = None) -> Any:
+        """1 where the flow turns the condition true at this instant, at which a surface was ``reached``, else 0."""
+
+        def of(part: Reached, one: Callable[[Any, Any], Any]) -> Any:
+            turns = part.turns(reached)
+            return one(self.rates[part.residual], TIME) if turns is None else ONE if turns else ZERO
+
+        parts = comparisons(self.event.trigger)
+        crossed = either([of(part, part.crosses) for part in parts]) if parts else ZERO
+        return crossed if len(parts) < 2 else crossed * number(self.event.trigger, lambda part: of(part, part.goes_on))
+
+
+def number_left(edge: Edge) -> dict[Any, Any]:
+    """The number of the part's mode that an edge leaves."""
+    return {} if edge.part is None else {symbol(edge.part[0]): whole(edge.part[1])}
+
+
+def chosen(event: Event, truth: Any, values: Values, others: Values) -> Values:
+    """Values where something is true, and others elsewhere."""
+    if truth == 1:
+        return values
+    return {name: select(truth, event.guarded(value, truth), others[name]) for name, value in values.items()}
