@@ -247,7 +247,9 @@ class Simulator:
         self.found.made.append((self.t, event.name))
         changed = {x for x in values if self.x[x] != before[x]}
         for other, its in zip(self.system.events, self.memory, strict=True):
-            if other is not event and not changed & {name for part in other.parts for name, _ in part.left.terms}:
+            read = {name for part in other.parts for name, _ in part.left.terms}
+            if other is not event and not changed & read:
+                self.turn_back(other, its, changed & {name for x in read for name in self.drivers(x)})
                 continue
             if not self.holds(other, changed):
                 its.armed = True
@@ -259,6 +261,20 @@ class Simulator:
                 its.due = "reset"
         if self.system.ball is not None:
             self.rest(k, changed)
+
+    def drivers(self, name: str) -> list[str]:
+        """What the rate of a state depends on."""
+        return [other for other, _ in self.system.flow[name].terms] if name in self.system.flow else []
+
+    def turn_back(self, event: RandomEvent, memory: Memory, changed: set[str]) -> None:
+        """Another reset changed rates alone: a strict comparison on its surface is what it is next along the flow."""
+        if not changed:
+            return
+        memory.due = "reset" if memory.due else ""
+        if all(part.strict for part in event.parts) and not self.holds(event, set()):
+            memory.armed = True
+            if not event.persistent:
+                memory.due, memory.waits = "", []
 
     def rest(self, k: int, changed: set[str]) -> None:
         """Take a ball whose flights are short to its rest, and from it where something moves it."""
@@ -397,7 +413,40 @@ def random_system(seed: int) -> EventSystem:
             "kick", (Comparison(Linear("0", (("t", "1"),)), ">=", number(5, 8)),), {"v": Linear(number(1, 4))}
         )
         events.append(kick)
-    return EventSystem(flow, initial, tuple(events), number(8, 25), ball, frozenset(counts))
+    until = number(8, 25)
+    if random.Random(f"surfaces {seed}").random() < 0.4:
+        flow |= {"p": Linear("0", (("u", "1"),)), "u": Linear("0"), "m": Linear("0")}
+        initial |= {"p": number(-0.9, 0.9), "u": number(0.3, 1.5), "m": "0"}
+        events += _on_one_surface(rng, moved, number)
+    return EventSystem(flow, initial, tuple(events), until, ball, frozenset(counts))
+
+
+def _on_one_surface(
+    rng: random.Random, moved: Sequence[str], number: Callable[[float, float], str]
+) -> Iterator[RandomEvent]:
+    """Events on the two ends of the way of p, which goes to and fro at the speed u: one of each turns it back."""
+    for end, sign in (("low", -1), ("high", 1)):
+        place = mpmath.mpf(sign * rng.randint(10, 20)) / 10
+        back = Linear(f"{-sign * rng.uniform(0.3, 1.5):.3f}")
+        resets = [{"u": back}, *({} for _ in range(rng.choice((0, 1, 1, 2))))]
+        for k in range(1, len(resets)):
+            kinds = ({"m": Linear("1", (("m", "1"),))}, {rng.choice(moved): _kick(rng, moved, number)})
+            resets[k] = rng.choice((*kinds, {"u": Linear("0", (("u", rng.choice(("0.5", "1.25"))),))}))
+        rng.shuffle(resets)
+        for k, reset in enumerate(resets):
+            share = rng.choice((1, 1, 2, -1, -0.5))
+            operator = ("<" if share * sign < 0 else ">") + rng.choice(("=", "=", ""))
+            part = Comparison(Linear("0", (("p", str(share)),)), operator, str(float(share * place)))
+            wait = rng.choice((None, None, None, Linear("0"), Linear("0.125"))) if reset.get("u") != back else None
+            yield RandomEvent(
+                f"{end}{k}",
+                (part,),
+                reset,
+                delay=wait,
+                at_execution=wait is not None and ("u" in reset or rng.random() < 0.4),  # no stored u turns it forward
+                persistent=reset.get("u") == back or rng.random() < 0.7,
+                priority=rng.choice((0, 0, 0, 1, -1)),
+            )
 
 
 def _kick(rng: random.Random, moved: Sequence[str], number: Callable[[float, float], str]) -> Linear:

@@ -46,17 +46,19 @@ def round_flights(made: Sequence[Transition]) -> list[Number]:
 def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Number]:
     """The last few flights between transitions of the last edge, in order; none where they are not as many.
 
-    Other edges that lead back to the same mode may fire meanwhile, also as entries; :data:`FREE` transitions are looked
-    at. Where they are ``of_flow`` time in strips does not count.
+    That is the last one that was reached: what it set off is no edge of a tail. Other edges that lead back to the same
+    mode may fire meanwhile, also as entries; :data:`FREE` transitions are looked at. Where they are ``of_flow`` time in
+    strips does not count.
     """
     times: list[Number] = []
     waited = made[-1].time * 0
+    last = next((one for one in reversed(made[-FREE:]) if not one.entry), made[-1])
     for one in reversed(made[-FREE:]):
-        if one.source != made[-1].source or one.source != one.target or (one.entry and one.edge == made[-1].edge):
+        if one.source != last.source or one.source != one.target or (one.entry and one.edge == last.edge):
             break
         if of_flow and times and one.resumed is not None:
             waited = waited + (one.resumed - one.time)
-        if one.edge == made[-1].edge:
+        if one.edge == last.edge:
             times.append(one.time + waited)
         if len(times) > LEAST_FLIGHTS:
             break

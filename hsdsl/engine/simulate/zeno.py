@@ -94,7 +94,10 @@ def of_contacts(run: Run, here: ModeState, made: Sequence[Transition]) -> list[i
 
 
 def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
-    """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
+    """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on.
+
+    What its last transition set off has no limit.
+    """
     made = run.recorder.transitions
     found = nearly_over(run, here, k)
     if found is None or empties(here, k) or here.mode.states != here.arc.states:
@@ -117,7 +120,7 @@ def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
             end, q = here.t, limit_of(run, here, touched, edges, here.t)
         if q is None or not all(keeps(run, there := here.moved(end, q), j) for j in edges):
             return here
-        if edge.contact is None or run.settings.completion == "none":
+        if edge.contact is None or run.settings.completion == "none" or made[-1].entry:
             possible = is_possible(run, here, k, end, q, touched)
             return run.diagnostics.accumulates(edge.name, end, here.t) if possible else here
         if keeping(run, there, edges) != edges:

@@ -58,10 +58,15 @@ class Reached:
         margin = self._reach(rate, time)
         return sp.Or(sp.Gt(self.residual, margin), sp.And(sp.Ge(self.residual, -margin), rises))
 
-    def rises(self, rate: Any, time: Any) -> Any:
-        """1 where it holds beyond round-off, or is on its surface and rises; 0 elsewhere."""
+    def crosses(self, rate: Any, time: Any) -> Any:
+        """1 where it holds, or counts as reached, and rises; 0 elsewhere."""
+        return self.nearly_holds(rate, time) * _positive(rate)
+
+    def goes_on(self, rate: Any, time: Any) -> Any:
+        """1 where it holds beyond round-off, or is on its surface and holds next; 0 elsewhere."""
         beyond = _positive(self.residual - self._reach(rate, time))
-        return either([beyond, self.nearly_holds(rate, time) * _positive(rate)])
+        keeps = self.crosses(rate, time) if self.strict else self.nearly_holds(rate, time) * _not_negative(rate)
+        return either([beyond, keeps])
 
     def holds_next(self, turned: bool, before: Any, after: Any) -> Any:
         """1 where it holds next along the flow on its surface, where it has just turned true or false; 0 elsewhere.
@@ -70,10 +75,12 @@ class Reached:
         """
         return _not_negative(after) * (1 - _positive(-before) * _positive(after)) if turned else _positive(after)
 
-    def turns(self, other: Reached) -> bool | None:
+    def turns(self, other: Reached | None) -> bool | None:
         """Whether it turns true where another one does, or false; None where their surfaces are not the same."""
-        same = self.residual == other.residual
-        return same if same or self.residual == -other.residual else None
+        if other is None:
+            return None
+        own, others = self.residual.primitive()[1], other.residual.primitive()[1]
+        return own == others if own in (others, -others) else None
 
 
 def _positive(value: Any) -> Any:

@@ -6,20 +6,21 @@
 /* Transition `back` before the last one. */
 static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
 
-/* The last few flights between transitions of the last edge, the last one first; 0 where they are not as many. Where
-   they are `of_flow`, time in strips does not count. */
+/* The last few flights between transitions of the last edge that was reached, the last one first; 0 where they are not
+   as many. Where they are `of_flow`, time in strips does not count. */
 static int last_flights(const hs_run *run, int of_flow, hs_real *flight) {
-  const hs_made *const last = made_before(run, 0);
-  hs_time later = last->time, waited = 0.0;
-  int flights = 0;
-  if (last->mode != last->target || last->entry) return 0;
-  for (int i = 1; i < FREE && i < run->jump && flights < LEAST_FLIGHTS; i++) {
+  const int count = FREE < run->jump ? FREE : (int)run->jump;
+  int entries = 0, flights = -1;
+  while (entries < count - 1 && made_before(run, entries)->entry) entries++;
+  const hs_made *const last = made_before(run, entries);
+  hs_time later = 0.0, waited = 0.0;
+  for (int i = 0; i < count && flights < LEAST_FLIGHTS; i++) {
     const hs_made *const made = made_before(run, i);
     if (made->mode != last->mode || made->mode != made->target || (made->entry && made->edge == last->edge)) break;
-    if (of_flow && made->resumed == made->resumed) waited = waited + (made->resumed - made->time);
+    if (of_flow && flights >= 0 && made->resumed == made->resumed) waited = waited + (made->resumed - made->time);
     if (made->edge != last->edge) continue;
-    flight[flights++] = later - (made->time + waited);
-    later = made->time + waited;
+    if (flights >= 0) flight[flights] = later - (made->time + waited);
+    flights++, later = made->time + waited;
   }
   return flights == LEAST_FLIGHTS;
 }

@@ -252,7 +252,7 @@ static int is_held(hs_run *run, hs_time end, const hs_real *q, int count, int in
 }
 
 /* Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on. The last
-   transition was that of edge k. */
+   transition was that of edge k; what it set off has no limit. */
 static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
   hs_time left;
@@ -281,7 +281,7 @@ static int close_tail(hs_run *run, int k) {
   }
   for (int j = 0; j < own->edges; j++)
     if (run->tail[j] && keeps(run, end, q, j) != 1) return GOES_ON;
-  if (own->edge[k].contact < 0 || !run->task->settings.contacts) {
+  if (own->edge[k].contact < 0 || !run->task->settings.contacts || made_before(run, 0)->entry) {
     if (!is_possible(run, k, end, q, run->held)) return GOES_ON;
     note(run, HS_ACCUMULATES, k, 0, end, here->t);
     return stopped(run, HS_ACCUMULATED, here->t);

@@ -43,10 +43,12 @@ def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
     edges = [_at_once(edge, mode, timed) for edge in mode.edges if edge.event is not None]
     drafts = [Event(edge, mode, timed, flow, constants) for edge in edges]
     index, jumps = Memory(drafts), set[str]()
-    changes = [new_values(edge, timed) for edge in mode.edges if edge.target == mode.name and drafts]
-    stored = [event.stored for event in drafts]  # which may be that of a state itself
-    for meaning in [*changes, *({symbol(x): symbol(name) for x, name in values.items()} for values in stored)]:
-        jumps |= {event.edge.name for event in index.concerned(meaning) if event.touched(meaning)}
+    changes = [(edge.name, new_values(edge, timed)) for edge in mode.edges if edge.target == mode.name and drafts]
+    for event in drafts:  # what is stored may be that of a state itself
+        changes.append((event.edge.name, {symbol(x): symbol(name) for x, name in event.stored.items()}))
+    for name, meaning in changes:
+        concerned = index.concerned(meaning)
+        jumps |= {e.edge.name for e in concerned if e.touched(meaning) or (e.edge.name != name and e.leaves(meaning))}
     return tuple(replace(e, jumps=not e.event.initially or e.edge.name in jumps) for e in drafts)
 
 

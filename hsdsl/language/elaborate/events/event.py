@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -63,14 +63,19 @@ class Event:
 
     @cached_property
     def symbols(self) -> frozenset[Any]:
-        """What its condition depends on."""
-        return frozenset().union(*(c.residual.free_symbols for c in comparisons(self.event.trigger)))
+        """What its condition depends on, and how that changes along the flow."""
+        return frozenset().union(*(part.free_symbols for one in self.rates.items() for part in one))
 
-    def rate(self, expression: Any) -> Any:
-        """How fast an expression changes along the flow of the mode."""
+    @cached_property
+    def rates(self) -> dict[Any, Any]:
+        """How fast its surface functions change along the flow of the mode."""
         known, done = number_left(self.edge), dict[Any, Any]()
-        moving = ((s, self.flow[s]) for s in sorted(expression.free_symbols, key=str) if s in self.flow)
-        return sum((expression.diff(s) * replaced(flow, known, done) for s, flow in moving), ZERO)
+
+        def rate(residual: Any) -> Any:
+            moving = ((s, self.flow[s]) for s in sorted(residual.free_symbols, key=str) if s in self.flow)
+            return sum((residual.diff(s) * replaced(flow, known, done) for s, flow in moving), ZERO)
+
+        return {part.residual: rate(part.residual) for part in comparisons(self.event.trigger)}
 
     @property
     def delay(self) -> Any | None:
@@ -135,36 +140,43 @@ class Event:
         """Whether new values of states change its condition."""
         return any(c.residual.xreplace(meaning) != c.residual for c in comparisons(self.event.trigger))
 
-    def after(self, meaning: Mapping[Any, Any], reached: Reached | None = None, going_on: bool = False) -> Any:
-        """1 where the condition holds at new values of states.
+    def after(self, meaning: Mapping[Any, Any]) -> Any:
+        """1 where the condition holds at new values of states."""
+        return number(self.event.trigger, lambda part: part.holds(meaning))
 
-        Of the comparisons that stay the one that was ``reached`` holds while the flow does not lead back, and so do
-        those that counted as reached with it. Where the mode is ``going_on``, comparisons that stay are on their
-        surfaces what they are next.
+    def going_on(self, meaning: Mapping[Any, Any], reached: Reached | None, next_along: bool = False) -> Any:
+        """1 where the condition holds at new values of states in a mode that goes on.
+
+        A comparison that stays is on its surface, as that which was ``reached`` is, or has its value. There strict ones
+        are what they are next along the flow; with ``next_along`` others are, too.
         """
 
         def of(part: Reached) -> Any:
-            stays = part.residual.xreplace(meaning) == part.residual
-            if stays and going_on and part.strict and (rate := self.rate(part.residual)) != 0:
-                return part.rises(rate, TIME).xreplace(meaning)
-            if reached is None or not stays:
+            if part.residual.xreplace(meaning) != part.residual:
                 return part.holds(meaning)
-            turns = part.turns(reached)
-            rate = self.rate(part.residual)
-            return (
-                part.nearly_holds(rate, TIME) if turns is None else part.holds_next(turns, rate, rate.xreplace(meaning))
-            )
+            turns, rate = part.turns(reached), self.rates[part.residual]
+            if not part.strict and not next_along:
+                return part.holds(meaning) if turns is None else ONE
+            if turns is None:
+                return part.holds(meaning) if rate == 0 else part.goes_on(rate, TIME).xreplace(meaning)
+            return part.holds_next(turns and next_along, rate, rate.xreplace(meaning))
 
         return number(self.event.trigger, of)
 
     def leaves(self, meaning: Mapping[Any, Any]) -> bool:
         """Whether new values of states change how its comparisons change along the flow."""
-        rates = (self.rate(c.residual) for c in comparisons(self.event.trigger))
-        return any(rate.xreplace(meaning) != rate for rate in rates)
+        return any(rate.xreplace(meaning) != rate for rate in self.rates.values())
 
-    def rises(self) -> Any:
-        """1 where the flow turns the condition true at this instant, else 0."""
-        return number(self.event.trigger, lambda part: part.rises(self.rate(part.residual), TIME))
+    def rises(self, reached: Reached | None = None) -> Any:
+        """1 where the flow turns the condition true at this instant, at which a surface was ``reached``, else 0."""
+
+        def of(part: Reached, one: Callable[[Any, Any], Any]) -> Any:
+            turns = part.turns(reached)
+            return one(self.rates[part.residual], TIME) if turns is None else ONE if turns else ZERO
+
+        parts = comparisons(self.event.trigger)
+        crossed = either([of(part, part.crosses) for part in parts]) if parts else ZERO
+        return crossed if len(parts) < 2 else crossed * number(self.event.trigger, lambda part: of(part, part.goes_on))
 
 
 def number_left(edge: Edge) -> dict[Any, Any]:

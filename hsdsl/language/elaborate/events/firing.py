@@ -76,7 +76,7 @@ def _when_due(edge: Edge, event: Event, truth: Any) -> Edge:
 def _with(event: Event, reached: Reached, value: bool, part: Reached) -> Any:
     """The Boolean of a comparison where another one turns to a value."""
     turns = part.turns(reached)
-    return part.follows(event.rate(part.residual), TIME) if turns is None else TRUTH[value == turns]
+    return part.follows(event.rates[part.residual], TIME) if turns is None else TRUTH[value == turns]
 
 
 def _text(event: Event) -> str:

@@ -14,6 +14,7 @@ from hsdsl.language.elaborate.events.event import Event, Values, chosen, number_
 from hsdsl.language.elaborate.events.firing import Draft
 from hsdsl.language.elaborate.events.waiting import dropped
 from hsdsl.language.expression.scope import symbol
+from hsdsl.language.expression.selection import select
 from hsdsl.language.expression.trigger import Reached
 from hsdsl.language.system import ONE, ZERO, Edge
 
@@ -76,7 +77,7 @@ def _stayed(edge: Edge, fired: Event | None, reached: Reached | None, index: Mem
         if fired is not None and event.edge is fired.edge:
             stays = _after_firing(event, meaning, reached)
         else:
-            stays = _changed(event, meaning) if event.touched(meaning) else {}
+            stays = _changed(event, meaning, reached)
         entering = after * (1 - before) if event.edge.part is not None and after != before else ZERO
         values |= chosen(event, before, stays, {name: symbol(name) for name in stays})
         if entering != 0:
@@ -89,29 +90,33 @@ def _stayed(edge: Edge, fired: Event | None, reached: Reached | None, index: Mem
 def entered(event: Event, meaning: Mapping[Any, Any]) -> Values:
     """The memory where the mode is entered from another one, or a run starts."""
     holds = event.after(meaning)
-    if event.event.initially:
-        return {event.names["armed"]: ONE - holds} | ({event.names["due"]: ZERO} if event.jumps else {})
-    return {event.names["armed"]: ONE, event.names["due"]: holds}
+    due = ZERO if event.event.initially else holds
+    return {event.names["armed"]: ONE - holds} | ({event.names["due"]: due} if event.jumps else {})
 
 
 def _after_firing(event: Event, meaning: Mapping[Any, Any], reached: Reached | None) -> Values:
     """The memory after the event fired: at a surface it holds, unless it is changed or the flow is turned back there.
 
-    Then its condition is false however short the flow goes back for. Where it was due it need not hold.
+    Then its condition is false however short the flow goes back for, unless that drops what waits. Where it was due it
+    need not have held: a reset that makes it true then sets it off again.
     """
-    known = reached is not None and not event.touched(meaning) and not event.leaves(meaning)
-    armed = ZERO if known else ONE - event.after(meaning, reached, reached is None)
-    return {event.names["armed"]: armed} | ({event.names["due"]: ZERO} if event.jumps else {})
+    changed, armed, due = event.touched(meaning), ZERO, ZERO
+    if reached is None or changed or event.leaves(meaning):
+        holds = event.going_on(meaning, reached, not dropped(event))
+        armed, due = ONE - holds, event.symbol("armed") * holds if changed and reached is None else ZERO
+    return {event.names["armed"]: armed} | ({event.names["due"]: due} if event.jumps else {})
 
 
-def _changed(event: Event, meaning: Mapping[Any, Any]) -> Values:
-    """The memory after another edge changed the condition."""
-    armed, due, holds = event.symbol("armed"), event.symbol("due"), event.after(meaning, going_on=True)
-    now = armed * holds
-    if event.event.persistent:  # it also goes where the flow turns it true at this instant
-        now = maximum(now, armed * event.rises())
+def _changed(event: Event, meaning: Mapping[Any, Any], reached: Reached | None) -> Values:
+    """The memory after another edge changed the condition, or how it changes along the flow."""
+    touched, persistent = event.touched(meaning), event.event.persistent
+    if not touched and not event.leaves(meaning):
+        return {}
+    armed, holds, rises = event.symbol("armed"), event.going_on(meaning, reached), event.rises(reached)
+    now = (maximum(holds, rises) if persistent else holds) if touched else rises  # the flow may turn it true at once
+    due = maximum(event.symbol("due"), armed * now)
     values = {
-        event.names["armed"]: maximum(armed, ONE - holds),
-        event.names["due"]: maximum(due, now) if event.event.persistent else maximum(due * holds, now),
+        event.names["armed"]: ONE - holds if touched else select(rises, ONE - holds, armed),
+        event.names["due"]: due if persistent else due * holds,
     }
     return values | {name: symbol(name) * holds for name in dropped(event)}
