@@ -52,7 +52,7 @@ from hsdsl.simulate.verdict.commutation import together
 from hsdsl.simulate.verdict.crossings import summary
 from hsdsl.simulate.verdict.effort import crowded_steps
 from hsdsl.simulate.verdict.finding import Finding
-from hsdsl.simulate.verdict.remarked import remarked
+from hsdsl.simulate.verdict.remarked import WARNINGS, remarked
 from hsdsl.simulate.verdict.run_view import RunView
 from hsdsl.simulate.verdict.screen import Margins
 from hsdsl.simulate.verdict.shadow import has_shadow, is_compiled
@@ -77,7 +77,8 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """
     verdict, looked_at = _judged(run, diagnostics)
     reasons = _once(verdict.reasons, crowded_steps(run.problem, run.execution))
-    return Verdict(verdict.theorem, reasons, remarked(looked_at, diagnostics))
+    told = remarked(looked_at, diagnostics), run.problem.program
+    return Verdict.deferred(WARNINGS, theorem=verdict.theorem, reasons=reasons, _told=told)
 
 
 def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
