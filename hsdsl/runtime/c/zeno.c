@@ -42,7 +42,13 @@ static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *r
   return *ratio < 1;
 }
 
-static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) { return shrinking(run, 0, flight, ratio); }
+/* The same with all time, looked at once behind each transition. */
+static int contraction(hs_run *run, hs_real *flight, hs_real *ratio) {
+  if (run->contracted != run->jump) run->contracts = shrinking(run, 0, &run->flight, &run->flight_ratio);
+  run->contracted = run->jump;
+  *flight = run->flight, *ratio = run->flight_ratio;
+  return run->contracts;
+}
 
 static int has_place(const int *places, int count, int place) {
   for (int i = 0; i < count; i++)
@@ -296,9 +302,9 @@ static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
   hs_time left;
   int touches = 1;
-  if (here->dimension != here->table->dimension || !here->dimension || empties(run, k)) return GOES_ON;
+  if (here->dimension != here->table->dimension || !here->dimension) return GOES_ON;
   const int count = nearly_over(run, k, &left);
-  if (!count) return GOES_ON;
+  if (!count || empties(run, k)) return GOES_ON;
   const hs_time whole = here->t + left;
   hs_time end = earlier(whole, segment_end(run));
   const int instant = count > 1 && end == here->t;
@@ -348,7 +354,6 @@ static int unresolved(hs_run *run, int k) {
   const hs_time t = run->here.t;
   hs_real flights[LEAST_FLIGHTS], flight, ratio;
   int ends = 0;
-  if (empties(run, k)) return GOES_ON;
   if (run->task->settings.scheme == HS_LOCATED) {
     const int follows = edge->contact >= 0 && run->task->settings.contacts;
     ends = !follows && contraction(run, &flight, &ratio) && flight * ratio <= tie(t) * (1 - ratio);
@@ -358,7 +363,7 @@ static int unresolved(hs_run *run, int k) {
     ends = 1;
     for (int i = 0; i < LEAST_FLIGHTS; i++) ends &= flights[i] <= tie(t);
   }
-  if (!ends) return GOES_ON;
+  if (!ends || empties(run, k)) return GOES_ON;
   note(run, HS_ACCUMULATES, k, 0, t, t);
   return stopped(run, HS_ACCUMULATED, t);
 }
