@@ -76,7 +76,8 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
         What the loop itself noted.
     """
     verdict, looked_at = _judged(run, diagnostics)
-    reasons = _once(verdict.reasons, crowded_steps(run.problem, run.execution))
+    crowded = crowded_steps(run.problem, run.execution)
+    reasons = _once(verdict.reasons, crowded) if crowded else verdict.reasons
     told = remarked(looked_at, diagnostics), run.problem.program
     return Verdict.deferred(WARNINGS, theorem=verdict.theorem, reasons=reasons, _told=told)
 
