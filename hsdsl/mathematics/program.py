@@ -378,7 +378,7 @@ class Program:
         """The names of the modes."""
         return tuple(mode.name for mode in self.modes)
 
-    @property
+    @cached_property
     def edges(self) -> tuple[EdgeProgram, ...]:
         """The edges of all modes."""
         return tuple(edge for mode in self.modes for edge in mode.edges)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 import re
 
 import numpy as np
@@ -18,6 +19,7 @@ from hsdsl.analysis.report.summary import summary
 from hsdsl.analysis.report.words import MOST_WORDS, conclusion
 from hsdsl.analysis.store import load
 from hsdsl.base.errors import WARNINGS
+from hsdsl.engine.simulate import remarks
 
 # A foot over ground that swings through it while x < 2 a second in: z = 1 - 4 t**2, and at t = 1 it lands where it may.
 FOOT = """
@@ -81,6 +83,20 @@ def test_a_foot_that_swings_through_the_ground_says_so_before_a_verdict_that_hol
     assert again == run and again.warnings == run.warnings
     assert summary(again) == summary(run)
     assert codes(hsdsl.loads(FOOT).simulate(parameters={"ready": 0})) == []
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("text", [FOOT, BALL, SLIDER], ids=["foot", "ball", "slider"])
+def test_the_text_of_a_warning_is_written_when_it_is_read(engine, text, monkeypatch):
+    written = []
+    message = remarks._message
+    monkeypatch.setattr(remarks, "_message", lambda group: written.append(group) or message(group))
+    run = hsdsl.loads(text).simulate(engine=engine)
+    assert run.verdict.theorem and run.verdict.reasons and run.warnings
+    assert len(run.warnings) == len(codes(run)) and not written
+    assert all(warning.code in warning.message for warning in run.warnings)
+    assert len(written) == len(run.warnings)
+    assert pickle.loads(pickle.dumps(run)).warnings == run.warnings and len(written) == len(run.warnings)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -76,7 +76,7 @@ REASONS = (*COMPLETE, *LEFT, *INCOMPLETE)
 
 
 @dataclass(frozen=True)
-class RunWarning:
+class RunWarning(Deferred):
     """Something about a run that its reader should know first.
 
     Attributes

@@ -64,6 +64,11 @@ class Gathered:
         return self._arrays[name]
 
     @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return len(self._arrays["times"])
+
+    @property
     def notes(self) -> int:
         """How many notes there are."""
         return len(self._arrays["note"])
@@ -134,6 +139,11 @@ class Packed:
         if name in ("before", "after"):
             return raw.reshape(k, shape.width)
         return raw.reshape(n, shape.degree, self._width) if name == "coefficients" else raw
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return self._counts.rows
 
     @property
     def notes(self) -> int:

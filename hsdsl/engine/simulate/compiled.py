@@ -9,6 +9,7 @@ import ctypes
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,8 @@ from hsdsl.engine.simulate.settings import Settings
 from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.engine.simulate.workspace import Workspace, Workspaces
 from hsdsl.mathematics.program import Program
+
+NOTHING: Mapping[str, Number] = MappingProxyType({})  # to call a generic alias takes longer than a short run has
 
 
 class CompiledPlan:
@@ -142,7 +145,7 @@ class CompiledRun:
     plan: CompiledPlan
     workspace: Workspace
     review: Review | None = None
-    waits: Mapping[str, Number] = field(default_factory=dict[str, Number])  # at its end, as states
+    waits: Mapping[str, Number] = field(default_factory=lambda: NOTHING)  # at its end, as states
     _columns: Columns | None = None
     _accumulated: Stop | None = None
 

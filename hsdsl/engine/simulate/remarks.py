@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Execution, RunWarning, Stop
@@ -27,8 +26,7 @@ SENTENCES: dict[str, tuple[str, str]] = {
 }
 
 
-@dataclass(frozen=True)
-class Remark:
+class Remark(NamedTuple):
     """One thing to tell.
 
     Attributes
@@ -104,6 +102,12 @@ def wall_of(mode: ModeProgram, k: int) -> str:
 
 
 def _warning(group: Sequence[Remark]) -> RunWarning:
+    first = group[0]
+    return RunWarning.deferred(_LATER, code=SENTENCES[first.kind][0], time=first.time, edge=first.edge, _group=group)
+
+
+def _message(group: Sequence[Remark]) -> str:
+    """The text of a warning: most are counted and never read."""
     first, count = group[0], len(group)
     code, sentence = SENTENCES[first.kind]
     when = "" if first.time is None else f"at t = {show(first.time)}"
@@ -113,8 +117,10 @@ def _warning(group: Sequence[Remark]) -> RunWarning:
         when = f"from t = {show(first.time)}"
     if count > 1 and when:
         when = f"{count:,} times, first {when}"
-    message = sentence.format(of=first.of, when=when)
-    return RunWarning(code, first.time, first.edge, f"{message} (hsdsl explain {code})")
+    return f"{sentence.format(of=first.of, when=when)} (hsdsl explain {code})"
+
+
+_LATER: dict[str, Callable[[Any], Any]] = {"message": lambda warning: _message(warning._group)}
 
 
 def _time(remark: Remark) -> Number:

@@ -187,8 +187,7 @@ def choose(here: ModeState, crossings: Sequence[Crossing], run: Run) -> tuple[Cr
     edges, first = here.mode.edges, min(crossings, key=lambda c: c.time)
     since = run.tie(first.time)
     tied = {c.edge: c for c in crossings if c.time - first.time <= since}
-    for k in here.surfaces.standing(first.time, first.state, since):
-        tied.setdefault(k, first)
+    tied |= dict.fromkeys(here.surfaces.standing(first.time, first.state, since, known=tied), first)
     edge = min(tied, key=lambda k: (-edges[k].priority, k))
     chosen = replace(first, edge=edge, depth=tied[edge].depth)
     return chosen, tuple(edges[k].name for k in sorted(tied) if k != edge)

@@ -231,14 +231,16 @@ class Surfaces:
             total = total + g * g
         return self.arithmetic.sqrt(total)
 
-    def standing(self, t: Number, x: State, since: Number) -> list[int]:
+    def standing(self, t: Number, x: State, since: Number, known: Collection[int] = ()) -> list[int]:
         """Edges on whose guards the state is, with the flow pointing out and `if` true, which are not only touched.
+
+        Those that are ``known`` are left out.
 
         On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that.
         """
         found: list[int] = []
         for k in range(len(self.edges)):
-            if self.releases(k):
+            if k in known or self.releases(k):
                 continue
             try:
                 r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]

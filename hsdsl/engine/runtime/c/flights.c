@@ -59,7 +59,13 @@ static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *r
   return *ratio < 1;
 }
 
-static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio) { return shrinking(run, 0, flight, ratio); }
+/* The same with all time, looked at once behind each transition. */
+static int contraction(hs_run *run, hs_real *flight, hs_real *ratio) {
+  if (run->contracted != run->jump) run->contracts = shrinking(run, 0, &run->flight, &run->flight_ratio);
+  run->contracted = run->jump;
+  *flight = run->flight, *ratio = run->flight_ratio;
+  return run->contracts;
+}
 
 /* The time of flow up to t since the first of the last transitions, without that in strips. */
 static hs_time flown(const hs_run *run, hs_time t) {

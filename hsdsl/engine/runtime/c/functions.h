@@ -137,7 +137,8 @@ static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_
 static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside);
 static void leave(hs_run *run, hs_time t, const hs_real *x);
 static int condition(hs_run *run, int k, hs_time t, const hs_real *x);
-static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found);
+static void standing(hs_run *run, hs_time t, const hs_real *x, hs_real since);
+static void untie(hs_run *run);
 static int ends(hs_run *run, hs_trial *trial);
 static int piece_of(hs_run *run, hs_trial *trial);
 static hs_found excursion(hs_run *run, hs_trial *trial, hs_found found);
@@ -256,7 +257,7 @@ static int last_flights(const hs_run *run, int of_flow, hs_real *flight);
 static int period(const hs_run *run);
 static int round_flights(const hs_run *run, hs_real *flight);
 static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *ratio);
-static int contraction(const hs_run *run, hs_real *flight, hs_real *ratio);
+static int contraction(hs_run *run, hs_real *flight, hs_real *ratio);
 static hs_time flown(const hs_run *run, hs_time t);
 
 /* zeno.c */

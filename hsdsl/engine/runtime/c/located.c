@@ -126,7 +126,8 @@ static int guards_at(hs_run *run, const hs_crossing *wall) {
   const hs_time time = wall->time, theta = wall->theta, depth = wall->depth;
   int count = 0;
   copy(run->q, wall->state, run->here.dimension);
-  standing(run, time, run->q, tie(time), run->tied);
+  untie(run);
+  standing(run, time, run->q, tie(time));
   for (int k = 0; k < run->here.table->edges; k++) {
     if (!run->tied[k]) continue;
     hs_crossing *const crossing = &run->crossings[count++];

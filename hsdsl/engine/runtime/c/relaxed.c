@@ -46,7 +46,8 @@ static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int stays) {
 /* Guards on which the state is, to round-off or a tie, as crossings. */
 static int standing_on(hs_run *run) {
   int count = 0;
-  standing(run, run->here.t, run->x, tie(run->here.t), run->tied);
+  untie(run);
+  standing(run, run->here.t, run->x, tie(run->here.t));
   for (int k = 0; k < run->here.table->edges; k++) {
     if (!run->tied[k]) continue;
     hs_crossing *crossing = &run->crossings[count++];

@@ -117,6 +117,7 @@ static hs_rounded rounded_below(hs_rounded a, hs_rounded b, hs_rounded one, hs_r
 HS_INLINE hs_rounded rounded_of(const hs_operation *o, const hs_rounded *v, int traced) {
   const hs_rounded a = v[o->a], b = v[o->kind == HS_POWER ? o->a : o->b];
   const double x = a.value, y = b.value, least = x - a.off;
+  const int moves = a.error != 0.0, wide = a.off > 0.0; /* else the slope, or the steepest, is not asked for */
   switch (o->kind) {
   case HS_ADD: return rounded_sum(a, b, traced);
   case HS_SUB: return rounded_sum(a, opposite(b), traced);
@@ -129,10 +130,10 @@ HS_INLINE hs_rounded rounded_of(const hs_operation *o, const hs_rounded *v, int 
   case HS_MIN: return rounded_extreme(a, b, 0);
   case HS_MAX: return rounded_extreme(a, b, 1);
   case HS_SQRT: return rounded_root(a, traced);
-  case HS_EXP: return rounded_function(exp(x), a, exp(x), exp(x + a.off));
+  case HS_EXP: return rounded_function(exp(x), a, exp(x), wide ? exp(x + a.off) : 0.0);
   case HS_LOG: return rounded_function(log(x), a, 1 / x, least > 0.0 ? 1 / least : INFINITY);
-  case HS_SIN: return rounded_function(sin(x), a, cos(x), 1.0);
-  case HS_COS: return rounded_function(cos(x), a, -sin(x), 1.0);
+  case HS_SIN: return rounded_function(sin(x), a, moves ? cos(x) : 0.0, 1.0);
+  case HS_COS: return rounded_function(cos(x), a, moves ? -sin(x) : 0.0, 1.0);
   case HS_TANH: return rounded_function(tanh(x), a, 1 - tanh(x) * tanh(x), 1.0);
   case HS_ATAN: return rounded_function(atan(x), a, 1 / (1 + x * x), 1.0);
   case HS_ASIN: return rounded_smooth(asin(x), a, over_number(1.0, sqrt(1 - x * x)));

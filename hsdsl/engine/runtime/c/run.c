@@ -64,6 +64,11 @@ static int goes_before(const hs_mode *mode, int a, int b) {
   return p != q ? p > q : a < b;
 }
 
+/* Let no edge be marked. */
+static void untie(hs_run *run) {
+  for (int k = 0; k < run->here.table->edges; k++) run->tied[k] = 0;
+}
+
 /* Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
    Tied are also guards that the earliest crossing's point stands on. The chosen edge goes from that point. */
 static void choose(hs_run *run, int count) {
@@ -74,9 +79,10 @@ static void choose(hs_run *run, int count) {
   const hs_real since = tie(first->time);
   hs_real depth = first->depth;
   int chosen = first->edge;
-  standing(run, first->time, first->state, since, run->tied);
+  untie(run);
   for (int i = 0; i < count; i++)
     if (run->crossings[i].time - first->time <= since) run->tied[run->crossings[i].edge] = 2 + i;
+  standing(run, first->time, first->state, since);
   for (int k = 0; k < mode->edges; k++)
     if (run->tied[k] && goes_before(mode, k, chosen)) chosen = k;
   if (run->tied[chosen] >= 2) depth = run->crossings[run->tied[chosen] - 2].depth;

@@ -259,6 +259,9 @@ typedef struct {
   hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
   int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */
   hs_made made[FREE];
+  int64_t contracted; /* behind how many transitions contraction() was last asked; what it found */
+  hs_real flight, flight_ratio;
+  int contracts;
   hs_time pause; /* see pause.c: when to pause, and whether to do so behind a transition */
   int after_jump;
   int64_t jumps_before;

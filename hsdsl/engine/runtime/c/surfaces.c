@@ -198,24 +198,24 @@ static int turns_back(hs_run *run, int k, hs_time t, const hs_real *x, hs_real r
   return bend > 0 && rate * rate <= 2 * bend * room;
 }
 
-/* Mark the edges on whose guards the state stands, with the flow pointing out and `if` true, which are not only touched.
-   On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that. */
-static int standing(hs_run *run, hs_time t, const hs_real *x, hs_real since, int *found) {
+/* Mark in run->tied, beside the edges that are marked, those on whose guards the state stands, with the flow pointing out
+   and `if` true, which are not only touched. On the guard means to round-off, or within the time `since`: sums of steps
+   are no more exact than that. */
+static void standing(hs_run *run, hs_time t, const hs_real *x, hs_real since) {
   const hs_mode *const mode = run->here.table;
-  const int raised = mode->edges && (mode->values(run->here.p, t, x, run->values) ||
-                                     magnitudes_at(run, t, x, run->magnitudes));
-  int count = 0;
+  int known = 0; /* whether run->values and run->magnitudes are those at x */
   for (int k = 0; k < mode->edges; k++) {
     hs_real rate;
-    found[k] = 0;
-    if (raised || releases(run, k) || mode->rates[k](run->here.p, t, x, &rate)) continue;
+    if (run->tied[k]) continue;
+    if (!known && (mode->values(run->here.p, t, x, run->values) || magnitudes_at(run, t, x, run->magnitudes))) return;
+    known = 1;
+    if (releases(run, k) || mode->rates[k](run->here.p, t, x, &rate)) continue;
     const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
     const int near = fabs(run->values[k]) <= hs_max(noise, rate * since);
     if (!near || !points_out(run, k, t, x, rate)) continue;
     if (turns_back(run, k, t, x, rate, since, noise - run->values[k])) continue;
-    if (condition(run, k, t, x) == 1) found[k] = 1, count++;
+    run->tied[k] = condition(run, k, t, x) == 1;
   }
-  return count;
 }
 
 /* Ask for the flow at a trial's end once; beyond a guard it need not have a value. */

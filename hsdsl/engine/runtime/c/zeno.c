@@ -257,9 +257,9 @@ static int close_tail(hs_run *run, int k) {
   hs_mode_state *const here = &run->here;
   hs_time left;
   int touches = 1;
-  if (here->dimension != here->table->dimension || !here->dimension || empties(run, k)) return GOES_ON;
+  if (here->dimension != here->table->dimension || !here->dimension) return GOES_ON;
   const int count = nearly_over(run, k, &left);
-  if (!count) return GOES_ON;
+  if (!count || empties(run, k)) return GOES_ON;
   const hs_time whole = here->t + left;
   hs_time end = earlier(whole, segment_end(run));
   const int instant = count > 1 && end == here->t;
@@ -424,7 +424,6 @@ static int unresolved(hs_run *run, int k) {
   const hs_time t = run->here.t;
   hs_real flights[LEAST_FLIGHTS], flight, ratio;
   int ends = 0;
-  if (empties(run, k)) return GOES_ON;
   if (run->task->settings.scheme == HS_LOCATED) {
     const int follows = edge->contact >= 0 && run->task->settings.contacts;
     ends = !follows && contraction(run, &flight, &ratio) && flight * ratio <= tie(t) * (1 - ratio);
@@ -434,7 +433,7 @@ static int unresolved(hs_run *run, int k) {
     ends = 1;
     for (int i = 0; i < LEAST_FLIGHTS; i++) ends &= flights[i] <= tie(t);
   }
-  if (!ends) return GOES_ON;
+  if (!ends || empties(run, k)) return GOES_ON;
   note(run, HS_ACCUMULATES, k, 0, t, t);
   return stopped(run, HS_ACCUMULATED, t);
 }

@@ -51,7 +51,7 @@ from hsdsl.engine.simulate.verdict.commutation import together
 from hsdsl.engine.simulate.verdict.crossings import summary
 from hsdsl.engine.simulate.verdict.effort import crowded_steps
 from hsdsl.engine.simulate.verdict.finding import Finding
-from hsdsl.engine.simulate.verdict.remarked import remarked
+from hsdsl.engine.simulate.verdict.remarked import WARNINGS, remarked
 from hsdsl.engine.simulate.verdict.run_view import RunView
 from hsdsl.engine.simulate.verdict.screen import Margins
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
@@ -76,8 +76,10 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
         What the loop itself noted.
     """
     verdict, looked_at = _judged(run, diagnostics)
-    reasons = _once(verdict.reasons, crowded_steps(run.problem, run.execution))
-    return Verdict(verdict.theorem, reasons, remarked(looked_at, diagnostics))
+    crowded = crowded_steps(run.problem, run.execution)
+    reasons = _once(verdict.reasons, crowded) if crowded else verdict.reasons
+    told = remarked(looked_at, diagnostics), run.problem.program
+    return Verdict.deferred(WARNINGS, theorem=verdict.theorem, reasons=reasons, _told=told)
 
 
 def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:

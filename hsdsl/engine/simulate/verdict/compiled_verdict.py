@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl.engine.execution import Execution, Verdict
 from hsdsl.engine.simulate.verdict import RunView, assess, margins_of
-from hsdsl.engine.simulate.verdict.effort import crowded_steps
+from hsdsl.engine.simulate.verdict.effort import MANY, crowded_steps
 from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
-from hsdsl.engine.simulate.verdict.remarked import ends_beyond, may_end_beyond
+from hsdsl.engine.simulate.verdict.remarked import WARNINGS, at_the_end, may_end_beyond
 from hsdsl.engine.simulate.verdict.screen import screens_of
 from hsdsl.engine.simulate.verdict.waiting_orders import keep_values, waiting_orders
-from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
     from hsdsl.engine.simulate.compiled import CompiledRun
@@ -22,7 +21,8 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
     """Decide whether the theorem's hypotheses hold for a compiled run, are left, or are unknown."""
     compiled: Any = execution.compiled
     columns, problem, screens = compiled.columns, under_way.plan.problem, screens_of(under_way.plan, True)
-    if screens is None or columns.notes or crowded_steps(problem, execution) or not execution.stop.complete:
+    crowded = columns.rows > MANY and crowded_steps(problem, execution)
+    if screens is None or columns.notes or crowded or not execution.stop.complete:
         return assess(RunView(problem, execution), under_way.diagnostics)
     screen = screens.take()
     if not screen.decide(columns) or (
@@ -31,13 +31,9 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
         return assess(RunView(problem, execution, screen_made=screen), under_way.diagnostics)
     shown = problem.program, compiled.made, screen.margins, screen.commuting
     screens.leave(screen)
-    warnings = ends_beyond(RecordedRun(problem, execution)) if _has_more(problem.program, execution) else ()
-    return Verdict.deferred(_LATER, theorem="holds", warnings=warnings, _shown=shown)
+    ends_beyond = may_end_beyond(execution, problem.program)
+    found = list(at_the_end(RecordedRun(problem, execution))) if ends_beyond else []
+    return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=(found, problem.program))
 
 
-def _has_more(program: Program, execution: Execution) -> bool:
-    """Whether a run may have warnings though nothing is undecided."""
-    return bool(program.assumptions) or may_end_beyond(execution, program)
-
-
-_LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: margins_of(*verdict._shown)}
+_LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: margins_of(*verdict._shown), **WARNINGS}

@@ -6,11 +6,12 @@ verdict takes one, else by `passings`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
+from typing import Any
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS
-from hsdsl.engine.execution import Execution, RunWarning
+from hsdsl.engine.execution import Execution
 from hsdsl.engine.simulate.diagnostics import Diagnostics
 from hsdsl.engine.simulate.remarks import Remark, loop_remarks, may_be_passed, wall_of, warnings_of
 from hsdsl.engine.simulate.verdict.accumulation import sliding_spans
@@ -21,8 +22,12 @@ from hsdsl.mathematics.program import Program
 BEYOND = 4  # times its round-off: a wall that does not hold
 
 
-def remarked(run: RunView, diagnostics: Diagnostics) -> tuple[RunWarning, ...]:
-    """The warnings of a run."""
+# The warnings of a `Verdict.deferred` that has its remarks and its program as `_told`.
+WARNINGS: dict[str, Callable[[Any], Any]] = {"warnings": lambda verdict: warnings_of(*verdict._told)}
+
+
+def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
+    """The remarks about a run."""
     program = run.problem.program
     found = [*loop_remarks(program, diagnostics, run.stop), *_slidings(run)]
     looked, walls = run.remarks is not None, any(mode.walls for mode in program.modes)
@@ -34,12 +39,7 @@ def remarked(run: RunView, diagnostics: Diagnostics) -> tuple[RunWarning, ...]:
 
         known = {remark.of for remark in found if remark.kind == "beyond"}
         found += (one for one in passings(run, walls_alone=looked) if one.kind != "beyond" or one.of not in known)
-    return warnings_of([*found, *_final(run)], program)
-
-
-def ends_beyond(run: RecordedRun) -> tuple[RunWarning, ...]:
-    """The warnings of a run of which only the end is to be looked at."""
-    return warnings_of(_final(run), run.problem.program)
+    return [*found, *at_the_end(run)] if may_end_beyond(run.execution, program) else found
 
 
 def may_end_beyond(execution: Execution, program: Program) -> bool:
@@ -51,10 +51,8 @@ def _slidings(run: RunView) -> Iterator[Remark]:
     return (Remark("sliding", " and ".join(modes), start, end) for modes, start, end in sliding_spans(run))
 
 
-def _final(run: RecordedRun) -> Iterator[Remark]:
+def at_the_end(run: RecordedRun) -> Iterator[Remark]:
     """Walls of the final mode that a run ended in: nothing flows there, so nothing has checked them."""
-    if not may_end_beyond(run.execution, run.problem.program):
-        return
     final = run.execution.final
     mode = run.problem.program.modes[run.index(final.mode)]
     if tuple(final.state) != mode.states:
