@@ -103,7 +103,8 @@ def relaxed_crossing(model, config, p, lane):
     verdict = Verdict(jnp.asarray(False), failed, kind, blocked, jnp.asarray(False), ratio)
 
     def sizes(first, state):  # those of the entry count for what has not moved since, and on a guard not left
-        return sizes_of(still, trial.x, trial.z, (state == still.entered_x) | still.active[first])
+        last = jnp.where(points[1][first] > 0, trial.z, trial.x)
+        return sizes_of(still, trial.x, last, (last == still.entered_x) | still.active[first])
 
     crossing = Crossing(
         goes, *points, trial.t1, depth, still.trial, trial, jnp.asarray(False), trial.t, sizes,
