@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from hsdsl.errors import Diagnostic, ModelError
+from hsdsl.base.errors import Diagnostic, ModelError
 from hsdsl.export.automata import document_of
 from hsdsl.export.source import Source
-from hsdsl.program import ModeProgram, Queue
+from hsdsl.mathematics.program import ModeProgram, Queue
 
 LACKING = "HS341"
 
