@@ -232,6 +232,8 @@ CODES: dict[str, str] = {
     "HS332": "a part of a SpaceEx model that no model of this language can keep",
     "HS333": "a configuration of SpaceEx that does not say where a run starts",
     "HS334": "a part of an SBML model that no model of this language can keep",
+    # what is exported
+    "HS341": "a model that needs a rule which the target of an export lacks",
 }
 
 # One line a code of the warnings of runs, as for errors. Their pages are in hsdsl/analysis/lint/warnings.md.

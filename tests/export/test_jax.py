@@ -125,6 +125,7 @@ def test_texts_of_a_model_stay_strings(tmp_path: Path) -> None:
 
 def test_generated_text() -> None:
     content = files_of(source_of(hsdsl.load(MODELS / "thermostat.yaml"), {}), "jax")["thermostat.py"].decode()
+    assert content.partition("\n")[0].endswith("Of the rules of docs/meaning.md it lacks these:")
     found = content.partition("# The model\n")[2]
     assert_golden(found, Path(__file__).parent / "golden" / "thermostat.jax.txt")
 

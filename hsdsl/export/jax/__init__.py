@@ -13,6 +13,7 @@ from pathlib import Path
 from hsdsl.export.explicit import explicit
 from hsdsl.export.identifiers import identifiers
 from hsdsl.export.jax.model import model_text
+from hsdsl.export.jax.refusals import check
 from hsdsl.export.jax.template import PARTS
 from hsdsl.export.source import Source
 
@@ -42,16 +43,28 @@ RESERVED = {*sys.stdlib_module_names, "jax", "jaxlib", "numpy", "scipy", "ml_dty
 def files(source: Source) -> dict[str, bytes]:
     """One module.
 
-    Raises UsageError: a scheme or method that it cannot keep.
+    Raises UsageError: a scheme or method that it cannot keep. Raises ModelError: a rule that it lacks.
     """
+    check(source)
     source, table = explicit(source, "jax")
     imports, template = template_text()
-    comments = "".join(f"# {line}\n" for line in source.heading)
+    comments = LACKS + "".join(f"# {line}\n" for line in source.heading)
     parts = (comments, DOCUMENTATION, imports, template, model_text(source, table))
     name = identifiers([source.name], RESERVED)[source.name]
     return {f"{name}.py": "\n".join(parts).encode()}
 
 
+LACKS = """\
+# This loop differentiates and vectorises. Of the rules of docs/meaning.md it lacks these:
+# - M13: one execution of an event waits at a time. A model that may need more is refused, and so are systems of parts.
+# - The located scheme, 2 and 3: a step is looked at in nine points, its ends and seven between. Of two crossings of a
+#   surface within an eighth of a step both may be missed, and nothing says so: compare with a shorter step.
+# - The located scheme, 4: a guard beyond which the flow has no value fires where no step is short enough.
+# - The step: the pace of a run is not looked at. One that creeps ends with `steps`, after ten million rounds, as may
+#   one that goes to and fro where the flow jumps.
+# - M5: a chain of entries is held against its last sixteen states. One that returns later ends with `transition_limit`.
+# - M6 and the verdict: there are no `alternatives`, no warnings and no verdict.
+"""
 DOCUMENTATION = '''"""A hybrid system for JAX: `simulate` runs it from `parameters()` and an `initial` state.
 
     run = jax.jit(lambda p: simulate(p))(parameters({"NAME": 1.5}))

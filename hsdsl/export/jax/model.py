@@ -13,7 +13,7 @@ from hsdsl.export.jax.language import function, literal
 from hsdsl.export.parameters import derived, followed
 from hsdsl.export.routines import data_names, definitions, mode_definitions, parameters_in
 from hsdsl.export.source import Source
-from hsdsl.mathematics.program import ModeProgram, Program
+from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 
 
 def values_text(source: Source) -> list[str]:
@@ -84,16 +84,24 @@ def _tables(source: Source) -> str:
         numbers.append(tuple(range(len(edges), len(edges) + len(mode.edges))))
         for k, edge in enumerate(mode.edges):
             target = tuple(map(states.index, edge.target_states))
-            queues = tuple(queue.waiting for queue in mode.queues if edge.target == j)
+            head = (
+                edge.name, j, edge.target, target, edge.conditional, edge.priority, edge.counts, edge.changes,
+                tuple((q.waiting, *q.values) for q in mode.queues if edge.target == j), _tails(mode, edge),
+            )  # fmt: skip
             edges.append(
-                f"    edge_of({edge.name!a}, {j}, {edge.target}, {target}, {edge.conditional}, {edge.priority}, "
-                f"{edge.counts}, {edge.changes}, {queues}, SIZES[0],\n            mode_{j}_reset_{k}, "
+                f"    edge_of({head!a}, SIZES[0],\n            mode_{j}_reset_{k}, "
                 f"mode_{j}_spread_{k}, mode_{mode.held if edge.branched else j}_reset_{k}),"
             )
     found = flows(source)
     texts = [_mode(j, program, own, numbers, len(found)) for j, own in enumerate(found)]
     lines += ["MODES = (", *texts, ")", "EDGES = (", *edges, ")"]
     return "\n".join(lines) + "\n"
+
+
+def _tails(mode: ModeProgram, edge: EdgeProgram) -> int:
+    """The field ``tails`` of an edge."""
+    waits = any(q.waiting in edge.changes and q.values[0] not in edge.changes for q in mode.queues)
+    return 0 if waits else 2 if edge.of_event else 1
 
 
 def flows(source: Source) -> list[int]:
@@ -110,7 +118,7 @@ def _mode(j: int, program: Program, owner: int, numbers: list[tuple[int, ...]], 
     parts = "".join(f"{_names(j, names)}, " for names in mode.conditions)
     contact = _contact(program.modes[owner], mode, owner, numbers[owner], count)
     return (
-        f"    mode_of({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {contact},\n"
+        f"    mode_of(({mode.name!a}, {tuple(map(states.index, mode.states))}, {mode.final}, {contact}, {mode.idle}),\n"
         f"            SIZES, mode_{j}_flow, mode_{j}_surfaces, mode_{j}_magnitudes, {', '.join(listed)},\n"
         f"            ({parts}), mode_{j}_outputs),"
     )

@@ -18,6 +18,7 @@ from .lane import (
     ZENO,
     contraction,
     flown,
+    last_flights,
     noticed,
     of_contacts,
     releasing,
@@ -28,10 +29,10 @@ from .lane import (
 )
 from .model import HELD, LOOKED_AT, Bound, noise_of
 from .steps import at
-from .surfaces import UNIT, after_reset, keeps
+from .surfaces import UNIT, after_reset, keeps, ties
 
 ZERO_UNITS, FURTHER = 16, 16
-MOST_ROUNDS, MOST_CORRECTIONS_TO_GUARD, MOST_LEAP = 60, 4, 4096
+MOST_ROUNDS, MOST_CORRECTIONS_TO_GUARD, MOST_LEAP, LAST_TIES = 60, 4, 4096, 4
 PARALLEL = 1e-6
 
 
@@ -69,6 +70,17 @@ def is_possible(model, bound, lane, k, t, x, touched=False):
     owner, next_to = model.of(model.owner, lane.mode), pressed(model, bound, lane, k, t, x, touched)
     both = bound.facts(owner, jnp.stack([t, t]), jnp.stack([x, next_to]))
     return both.conditions[:, k].any()
+
+
+def may_hold_next(model, bound, lane, returning, times, states):
+    """Which of some edges that lead back, on whose surfaces the state is, have an `if` that holds next."""
+    returning = returning & model.of(model.loops, lane.mode)
+
+    def look():
+        each = jnp.arange(model.M), times, states
+        return jax.vmap(lambda k, t, x: is_possible(model, bound, lane, k, t, x))(*each)
+
+    return returning & when(returning.any(), look, returning)
 
 
 def pressed(model, bound, lane, k, t, x, touched=False):
@@ -360,6 +372,24 @@ def nearly_over(model, config, lane):
     return found, jnp.where(shrinks, k, edges), jnp.where(shrinks, left, late)
 
 
+def unresolved(model, config, lane):
+    """Whether a tail of the last edge without a limit is shorter than time can tell; of an event, before that.
+
+    It might not be armed again there. The relaxed scheme goes on with all others.
+    """
+    k = (model.of(model.edge, lane.mode) == lane.edges[-1]) & model.of(model.is_edge, lane.mode)
+    tails, tie = jnp.asarray(model.tails)[lane.edges[-1]], ties(lane.t)
+    if config.scheme == "relaxed":
+        enough, flights = last_flights(model, lane, True)
+        return k.any() & (tails == 2) & enough & (flights.max() <= tie)
+    shrinks, flight, ratio = contraction(model, lane)
+    follows = (k & (model.of(model.contact, lane.mode) >= 0)).any()
+    ends = ~follows & shrinks & (flight * ratio <= tie * (1 - ratio))
+    shrinks, flight, ratio = contraction(model, lane, True)
+    of_event = (tails == 2) & (lane.t == lane.resumed) & shrinks & (flight * ratio <= LAST_TIES * tie)
+    return k.any() & (tails > 0) & (ends | of_event)
+
+
 def kept_next(model, p, lane, edges, t, x):
     """Where repeated resets lead, for its derivatives."""
     bound = Bound(model, p, lane.segment)
@@ -377,6 +407,7 @@ def close_tail(model, config, p, lane, record, touched, mask):
     """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on."""
     bound, still = Bound(model, frozen(p), lane.segment), frozen(lane)
     found, edges, left = nearly_over(model, config, still)
+    found = found & (jnp.asarray(model.tails)[still.edges[-1]] > 0)
     end = jnp.minimum(still.t + left, bound.end)
     instant = (edges.sum() > 1) & (end == still.t)
     k = jnp.argmax((model.of(model.edge, lane.mode) == still.edges[-1]) & model.of(model.is_edge, lane.mode))

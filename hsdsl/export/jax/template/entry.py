@@ -6,7 +6,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from .contact import close_tail, in_touch, into_contact, takes_back
+from .contact import close_tail, in_touch, into_contact, takes_back, unresolved
 from .functions import NAN, chosen, frozen
 from .lane import (
     BOUNDARY,
@@ -41,7 +41,7 @@ def boundary(model, config, p, lane, here, held):
     touches = TOUCH if config.scheme == "located" and model.holds else STEP
     jump = lane._replace(
         phase=jnp.int32(ENTER), inside=plain & (here.values < -noise), since=jnp.asarray(0.0),
-        reset_at=jnp.asarray(NAN), made=jnp.asarray(False), visited=lane.visited._replace(room=jnp.int32(0)),
+        reset_at=jnp.asarray(NAN), made=jnp.asarray(False), visited_modes=jnp.full_like(lane.visited_modes, -1),
         stood=jnp.where(lane.active & ~lane.emerging, jnp.abs(values), 0.0),
     )  # fmt: skip
     kink = lane._replace(
@@ -85,13 +85,18 @@ def enter(model, config, p, lane):
     )  # fmt: skip
     bound, still = Bound(model, frozen(p), placed.segment, placed.contacts), frozen(placed)
     values, beyond, active, emerging = met(model, bound, still)
-    visited, again = repeats(still.visited, jnp.asarray(False), still.mode, still.x)
+    decides = model.decisive(still.mode, still.x)
+    again = ((still.visited_modes == still.mode) & (still.visited == decides).all(axis=1)).any()
     own, priority = model.of(model.is_edge, lane.mode), model.of(model.priority, lane.mode)
     fires = beyond & own & ~model.of(model.conditional, lane.mode)
     walls = beyond & model.of(model.is_wall, lane.mode)
     first = jnp.argmax(jnp.where(fires, priority, jnp.iinfo(jnp.int32).min)).astype(jnp.int32)
     placed = placed._replace(
-        active=active, emerging=emerging, visited=visited, blocked=jnp.where(fires.any(), first, lane.blocked)
+        visited_modes=jnp.append(still.visited_modes[1:], still.mode),
+        visited=jnp.concatenate([still.visited[1:], decides[None]]),
+        active=active,
+        emerging=emerging,
+        blocked=jnp.where(fires.any(), first, lane.blocked),
     )
     stop = jnp.where(walls.any() & ~fires.any(), LEFT_DOMAIN, RUNNING)
     stop = jnp.where(jnp.isfinite(values.sum()), stop, NOT_FINITE)
@@ -104,7 +109,7 @@ def enter(model, config, p, lane):
 def flowing(model, config, bound, lane, mask):
     """Let a run flow that has been entered, unless its cascade returns. Returns which flow after a transition, too."""
     still = frozen(lane)
-    cascade, same = repeats(still.cascade, still.flowed, still.mode, still.x)
+    cascade, same = repeats(still.cascade, still.flowed, still.mode, model.decisive(still.mode, still.x))
     slides = same & lane.made
     if config.scheme == "relaxed":
         other = bound.flow(still.mode, still.t, still.x)
@@ -124,11 +129,14 @@ def flowing(model, config, bound, lane, mask):
 def held_on(model, config, p, lane, record, flows):
     """Guards may hold runs that flow on; those that flow after a transition go to the end of a tail of them."""
     entered, touched = lane, jnp.zeros_like(lane.active)
-    if model.holds:
+    if model.holds and config.scheme == "located":
         lane = into_contact(model, p, lane, lane.phase == TOUCH)
         touched = in_touch(model, lane)
     if model.loops.any():
-        after = flows & lane.made & (lane.stop == RUNNING)
-        ended, record, mask = close_tail(model, config, p, entered, record, touched, after)
-        lane = chosen(mask, ended, lane)
+        after = flows & lane.made & (lane.stop == RUNNING) & (lane.mode_before == entered.mode)
+        over = after & unresolved(model, config, frozen(entered))
+        if config.scheme == "located":
+            ended, record, mask = close_tail(model, config, p, entered, record, touched, after)
+            lane, over = chosen(mask, ended, lane), over & ~mask
+        lane = stopped(lane, over, ZENO)
     return lane, record

@@ -23,7 +23,7 @@ TIE = 1e-12
 
 
 class Brent(NamedTuple):
-    """One of the states that a chain of transitions led to, with which those after it are compared."""
+    """One of the states that a cascade led to, with which those after it are compared."""
 
     mode: Any
     x: Any
@@ -40,7 +40,8 @@ class Lane(NamedTuple):
     ``trial`` the one under way, halved ``halvings`` times. ``terms`` has the sizes of the terms of the last step.
     ``contacts`` has the numbers of contacts, `HELD` for those that hold the state since ``began``. ``stood`` is how far
     off the surfaces of the mode the state was that it comes from. ``edge`` is that of the last transition, after which
-    it ``resumed``, and ``slope`` the flow before it; ``times``, ``waits``, ``edges`` and ``entries`` are of the last
+    it ``resumed``, and ``slope`` the flow before it. A chain of entries has ``visited`` the last states in
+    ``visited_modes``; ``times``, ``waits``, ``edges`` and ``entries`` are of the last
     ones.
     """
 
@@ -83,7 +84,8 @@ class Lane(NamedTuple):
     slope: Any
     mode_before: Any
     cascade: Brent
-    visited: Brent
+    visited_modes: Any
+    visited: Any
     times: Any
     waits: Any
     edges: Any
@@ -120,7 +122,8 @@ def start(model, config, mode, x0):
         integer(0), integer(0), integer(0),
         number(NAN), integer(0), integer(0), number(NAN), jnp.asarray(False), integer(0), integer(0), number(0.0),
         jnp.zeros(model.C), number(0.0), jnp.zeros(m), jnp.asarray(False), jnp.asarray(False), integer(-1),
-        jnp.zeros(w), integer(-1), brent, brent, jnp.full(free, -INF), jnp.zeros(free), jnp.full(free, -1, jnp.int32),
+        jnp.zeros(w), integer(-1), brent, jnp.full(free, -1, jnp.int32), jnp.zeros((free, w)), jnp.full(free, -INF),
+        jnp.zeros(free), jnp.full(free, -1, jnp.int32),
         jnp.zeros(free, bool), integer(0), integer(0),
     )  # fmt: skip
     kept, sampled = config.transitions, len(config.times)
@@ -178,7 +181,7 @@ def stopped(lane, mask, reason):
 
 
 def repeats(brent, flowed, mode, x):
-    """Count a state; say whether one of the same chain was the same before."""
+    """Count a state of a cascade; say whether one of the same was the same before."""
     begins = flowed | (brent.room == 0)
     same = ~begins & (brent.mode == mode) & (brent.x == x).all()
     length = brent.length + 1
@@ -219,10 +222,10 @@ def sampled(record, config, mask, mode, t0, t1, point):
     )
 
 
-def contraction(model, lane):
-    """Whether the last flights of the last edge, which leads back to its mode, shrink, the last, and the largest ratio.
+def last_flights(model, lane, of_flow=False):
+    """The last flights of the last edge, which leads back to its mode, and whether there are three.
 
-    Others that lead back to that mode may go meanwhile, also as entries.
+    Others that lead back to that mode may go meanwhile, also as entries. Time in strips is none ``of_flow``.
     """
     edge = lane.edges[-1]
     same = jnp.asarray(model.source)[lane.edges] == jnp.asarray(model.source)[edge]
@@ -230,11 +233,17 @@ def contraction(model, lane):
     loops = (lane.edges >= 0) & jnp.asarray(model.returns)[lane.edges] & same & ~begins
     own = jnp.cumprod(loops[::-1]).astype(bool) & (lane.edges[::-1] == edge)
     nth = jnp.cumsum(own)
-    times = jax.vmap(lambda n: lane.times[::-1][jnp.argmax(own & (nth == n))])(jnp.arange(4, 0, -1))
-    flights = jnp.diff(times)
+    times = lane.times[::-1]
+    times = times + jnp.cumsum(lane.waits[::-1]) - lane.waits[-1] if of_flow else times
+    return nth[-1] > 3, jnp.diff(jax.vmap(lambda n: times[jnp.argmax(own & (nth == n))])(jnp.arange(4, 0, -1)))
+
+
+def contraction(model, lane, of_flow=False):
+    """Whether these flights shrink, the last, and the largest ratio."""
+    enough, flights = last_flights(model, lane, of_flow)
     before, after = flights[:-1], flights[1:]
     ratio = jnp.where(before > 0, after / jnp.where(before > 0, before, 1.0), INF).max()
-    return (nth[-1] > 3) & (flights > 0).all() & (ratio < 1), after[-1], ratio
+    return enough & (flights > 0).all() & (ratio < 1), after[-1], ratio
 
 
 def flown(lane, t):

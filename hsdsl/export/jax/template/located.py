@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
+from .contact import may_hold_next
 from .functions import INF, chosen, frozen
 from .lane import CROSS, LEFT_DOMAIN, joined, scaled, scales_here, sizes_of, stopped
 from .model import Bound, noise_of
@@ -101,12 +102,15 @@ def first_rises(model, bound, lane, trial, needed):
         rises = open_ & (height - base > level)
         on = lane.active & (low == 0)
         begins = jnp.where(on, slopes[0], taken_out(values[part, numbers], low))
-        small = jnp.where(on, 0.0, level / 16)
-        ends_at = top, taken_out(height, top)
-        root = closed(lambda s: taken_out(values_at(s), s), (low, begins), ends_at, small, rises & (begins <= 0))
+        bracket, small = ((low, begins), (top, taken_out(height, top))), jnp.where(on, 0.0, level / 16)
+        root = closed(lambda s: taken_out(values_at(s), s), *bracket, small, rises & (begins <= 0))
+        flat = small * trial.h > jnp.abs(slopes_at(bound, lane, trial, root)) * ties(trial.t1)
+        flat = flat & rises & (begins <= 0)  # round-off hides the root: its sign does not
+        root = jnp.where(flat, closed(lambda s: taken_out(values_at(s), s), *bracket, 0 * small, flat), root)
         root = jnp.where(begins > 0, low, root)
         settled_at = settled(model, bound, lane, trial, jnp.where(rises, root, 0.0))
-        new = rises & jnp.diagonal(bound.facts(lane.mode, *settled_at[1:]).conditions)
+        holds = jnp.diagonal(bound.facts(lane.mode, *settled_at[1:]).conditions)
+        new = rises & (holds | may_hold_next(model, bound, lane, rises & lane.active & ~holds, *settled_at[1:]))
         rows = rows & (jnp.arange(SCAN)[:, None] > part) & ~new
         return rows, found | new, chosen_rows(new, settled_at, points)
 
@@ -127,7 +131,7 @@ def located_crossing(model, config, p, lane):
     wall = jnp.argmin(jnp.where(walls, times, INF))
     hits = walls.any() & ~(guards & (times <= times[wall] + ties(times[wall]))).any()
     at_wall = jax.tree.map(lambda rows: rows[wall], (facts, times, points[2]))
-    on = standing(model, still, *at_wall, ties(times[wall]))
+    on = standing(model, bound, still, *at_wall, ties(times[wall]))
     leaves = mask & hits & ~on.any()
     guards = jnp.where(hits, on, guards)
     rows = jax.tree.map(lambda rows: jnp.where(hits, rows[wall], rows), (*points, facts))

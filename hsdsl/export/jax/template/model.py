@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
-from typing import Any
+from types import SimpleNamespace
 
 import jax
 import jax.numpy as jnp
@@ -38,19 +37,6 @@ def plainly(branches):
     return jax.jit(lambda index, *arguments: jax.lax.switch(index, branches, *arguments))
 
 
-@dataclass(frozen=True)
-class Routines:
-    """All that a run calls, by the number of the mode or edge."""
-
-    flow: Any
-    surfaces: Any
-    facts: Any
-    outputs: Any
-    reset: Any
-    spread: Any
-    slow: Any
-
-
 LOOKED_AT, HELD = 1.0, 2.0  # what the number of a contact is, 0 for none
 
 
@@ -62,14 +48,14 @@ class Model:
         self.method, self.timeline, self.until = method, timeline, until
         self.W, self.S, self.C = max(width, 1), max(len(states), 1), contacts
         self.M = max(1, *(len(mode.edges) + mode.walls for mode in modes))
-        self.routines = Routines(
-            with_derivatives([mode.flow for mode in modes]),
-            with_derivatives([mode.surfaces for mode in modes]),
-            plainly([mode.facts for mode in modes]),
-            with_derivatives([mode.outputs for mode in modes]),
-            with_derivatives([edge.reset for edge in edges] or [lambda p, t, x: x]),
-            plainly([edge.spread for edge in edges] or [lambda p, t, x, s: s]),
-            with_derivatives([edge.slow for edge in edges] or [lambda p, t, x: x]),
+        self.routines = SimpleNamespace(  # by the number of the mode or edge
+            flow=with_derivatives([mode.flow for mode in modes]),
+            surfaces=with_derivatives([mode.surfaces for mode in modes]),
+            facts=plainly([mode.facts for mode in modes]),
+            outputs=with_derivatives([mode.outputs for mode in modes]),
+            reset=with_derivatives([edge.reset for edge in edges] or [lambda p, t, x: x]),
+            spread=plainly([edge.spread for edge in edges] or [lambda p, t, x, s: s]),
+            slow=with_derivatives([edge.slow for edge in edges] or [lambda p, t, x: x]),
         )
         self._tabulate()
 
@@ -81,12 +67,12 @@ class Model:
         self.is_edge, self.is_wall, self.conditional, self.loops = np.zeros((4, *shape), bool)
         self.priority, self.edge, self.order = np.zeros((3, *shape), int)
         self.contact, self.releases, self.of_owner, self.of_held = np.full((4, *shape), -1)
-        self.place = np.full((len(modes), self.W), -1)
+        self.place, self.idle = np.full((len(modes), self.W), -1), np.zeros((len(modes), self.W), bool)
         for j, mode in enumerate(modes):
             own, count = len(mode.edges), len(mode.edges) + mode.walls
             self.is_edge[j, :own] = True
             self.is_wall[j, own:count] = True
-            self.place[j, : len(mode.states)] = mode.states
+            self.place[j, : len(mode.states)], self.idle[j, list(mode.idle)] = mode.states, True
             plain = len(mode.contacts)
             self.contact[j, :plain], self.order[j, :plain] = mode.contacts, mode.orders
             self.releases[j, :own] = mode.releases
@@ -100,12 +86,15 @@ class Model:
                 self.of_owner[j, own + k], self.of_held[mode.owner, plain + k] = plain + k, own + k
         self.holds = bool((self.contact >= 0).any())
         self.target = np.array([edge.target for edge in edges] or [0])
-        self.counts, self.changes, self.queues = np.zeros((3, max(1, len(edges)), self.W), bool)
+        self.counts, self.changes = np.zeros((2, max(1, len(edges)), self.W), bool)
+        self.waiting, self.at = np.full((2, max(1, len(edges)), self.W), -1)
+        self.tails = np.array([edge.tails for edge in edges] or [0])
         self.returns = np.array([edge.source == edge.target for edge in edges] or [False])
         self.source = np.array([edge.source for edge in edges] or [0])
         for k, edge in enumerate(edges):
             self.counts[k, list(edge.counts)] = self.changes[k, list(edge.changes)] = True
-            self.queues[k, list(edge.queues)] = True
+            for waiting, *values in edge.queues:
+                self.waiting[k, values], self.at[k, values] = waiting, values[0]
         # whose outputs a run has behind an edge: a final mode without a flow keeps the states before, and these
         keepers = [e.source if e.states and not modes[e.target].states else e.target for e in edges]
         self.keeper = np.array(keepers or [0])
@@ -118,6 +107,10 @@ class Model:
     def of(self, table, mode):
         """A row of a table that has one for each mode."""
         return jnp.asarray(table)[mode]
+
+    def decisive(self, mode, x):
+        """What of a state decides how a run goes on: a cascade that only counts comes back to it."""
+        return jnp.where(self.of(self.idle, mode), 0.0, x)
 
     def segment(self, p, t):
         """The number of the segment of inputs that a time is in; at a boundary the later one."""

@@ -18,7 +18,7 @@ class Mode:
 
     ``owner`` is another mode's number where this one is that with its motions along guards, ``held`` the number of that
     one, or -1. ``contacts`` are the numbers of contacts of the owner's edges, -1 for none, ``releases`` of those that
-    this mode's edges end; ``orders`` say which derivative presses.
+    this mode's edges end; ``orders`` say which derivative presses. States that are ``idle`` decide no transition.
 
     A routine takes (p, t, x); vectors are as wide as in the widest mode. ``edges`` are numbers among all
     edges.
@@ -34,6 +34,7 @@ class Mode:
     contacts: tuple[int, ...]
     releases: tuple[int, ...]
     orders: tuple[int, ...]
+    idle: tuple[int, ...]
     flow: Callable
     surfaces: Callable
     facts: Callable
@@ -54,27 +55,8 @@ class Facts(NamedTuple):
     conditions: Any
 
 
-def mode_of(
-    name,
-    states,
-    final,
-    edges,
-    walls,
-    owner,
-    held,
-    contacts,
-    releases,
-    orders,
-    sizes,
-    flow,
-    surfaces,
-    magnitudes,
-    gradients,
-    rates,
-    conditions,
-    outputs,
-):
-    """A mode of plain routines, which return a tuple each, padded to ``sizes`` (W, M, outputs)."""
+def mode_of(head, sizes, flow, surfaces, magnitudes, gradients, rates, conditions, outputs):
+    """A mode of its fields up to the routines, and plain routines, which return tuples, padded to (W, M, outputs)."""
     width, count, results = sizes
     rest = count - len(rates)
 
@@ -95,36 +77,14 @@ def mode_of(
         spans = jnp.abs(slopes[:, 0]) + jnp.abs(slopes[:, 1:]) @ jnp.abs(padded(flow(p, t, x), width))
         return Facts(values(p, t, x), along, spans, slopes, terms, all_conditions(p, t, x))
 
-    return Mode(
-        name,
-        states,
-        final,
-        edges,
-        walls,
-        owner,
-        held,
-        contacts,
-        releases,
-        orders,
-        lambda p, t, x: padded(flow(p, t, x), width),
-        values,
-        facts,
-        lambda p, t, x: padded(outputs(p, t, x), results),
-    )
+    results_of = (lambda p, t, x: padded(flow(p, t, x), width)), values, facts
+    return Mode(*head, *results_of, lambda p, t, x: padded(outputs(p, t, x), results))
 
 
-def edge_of(name, source, target, states, conditional, priority, counts, changes, queues, width, reset, spread, slow):
-    """An edge of plain routines; ``slow`` is its reset, or the branch of that which slow impacts take."""
+def edge_of(head, width, reset, spread, slow):
+    """An edge of its fields up to the routines, and plain ones; ``slow`` is the branch of slow impacts."""
     return Edge(
-        name,
-        source,
-        target,
-        states,
-        conditional,
-        priority,
-        counts,
-        changes,
-        queues,
+        *head,
         lambda p, t, x: padded(reset(p, t, x), width),
         lambda p, t, x, s: padded(spread(p, t, x, s), width),
         lambda p, t, x: padded(slow(p, t, x), width),
@@ -135,7 +95,8 @@ def edge_of(name, source, target, states, conditional, priority, counts, changes
 class Edge:
     """An edge between modes, given by their numbers; the states of its target, those it counts with, and changes.
 
-    ``queues`` are the states of its mode with the number of executions of an event that wait.
+    ``queues`` are states of its mode: the number of executions of an event that wait, the time and values of the first.
+    ``tails`` is 0 where it makes one of these, since that ends, 2 of another event, 1 else.
     """
 
     name: str
@@ -146,7 +107,8 @@ class Edge:
     priority: int
     counts: tuple[int, ...]
     changes: tuple[int, ...]
-    queues: tuple[int, ...]
+    queues: tuple[tuple[int, ...], ...]
+    tails: int
     reset: Callable
     spread: Callable
     slow: Callable

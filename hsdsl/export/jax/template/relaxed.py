@@ -7,9 +7,9 @@ import jax
 import jax.numpy as jnp
 from jax import lax
 
-from .contact import is_possible
+from .contact import may_hold_next
 from .control import accepted, error_ratio
-from .functions import frozen, when
+from .functions import frozen
 from .lane import CROSS, DEEP, FLAT, INWARD, scaled, sizes_of
 from .model import Bound, noise_of, norm_of
 from .steps import at, error_of, hermite
@@ -78,18 +78,11 @@ def crossings(model, config, bound, lane, trial):
 
 def holds_next(model, bound, lane, trial, pieces, share, values, found, facts):
     """Whether an `if` holds next, of a surface that the state is on: where a hop ends that round-off hides."""
-    returns = model.of(model.loops, lane.mode) & ((share == 0) | lane.active)
-    returning = found & returns & ~jnp.diagonal(facts.conditions)
+    returning = found & ((share == 0) | lane.active) & ~jnp.diagonal(facts.conditions)
     back = -jnp.diagonal(facts.rates) * trial.h
     hop = share + jnp.where(back > 0, (1 - share) * back / (jnp.where(back > 0, back, 0.0) + values), 0.0)
     points = states_at(trial.x, pieces, jnp.where(returning, hop, share))
-
-    def look():
-        times = trial.t + hop * trial.h
-        each = jnp.arange(model.M), times, points
-        return jax.vmap(lambda k, t, x: is_possible(model, bound, lane, k, t, x))(*each)
-
-    return returning & when(returning.any(), look, returning)
+    return may_hold_next(model, bound, lane, returning, trial.t + hop * trial.h, points)
 
 
 def relaxed_crossing(model, config, p, lane):
@@ -105,11 +98,13 @@ def relaxed_crossing(model, config, p, lane):
     if config.tolerance is not None:
         error = error_of(model.method, trial.h, trial.stages, trial.end)
         ratio = error_ratio(model, config, still, motion(bound, still), trial.h, error, trial.z)[1]
-        lane = lane._replace(h=jnp.where(goes & (lane.halvings == 0), grown(config, lane, trial, ratio), lane.h))
+        longer = accepted(config, lane, trial.h, ratio, jnp.isfinite(ratio)).h
+        lane = lane._replace(h=jnp.where(goes & (lane.halvings == 0), longer, lane.h))
     verdict = Verdict(jnp.asarray(False), failed, kind, blocked, jnp.asarray(False), ratio)
 
     def sizes(first, state):  # those of the entry count for what has not moved since, and on a guard not left
-        return sizes_of(still, trial.x, trial.z, (state == still.entered_x) | still.active[first])
+        last = jnp.where(points[1][first] > 0, trial.z, trial.x)
+        return sizes_of(still, trial.x, last, (last == still.entered_x) | still.active[first])
 
     crossing = Crossing(
         goes, *points, trial.t1, depth, still.trial, trial, jnp.asarray(False), trial.t, sizes,
@@ -127,8 +122,3 @@ def on_step(method, bound, lane, length, share):
         cubic = hermite(made.h, made.x, made.z, made.stages[0], jnp.where(made.ends, made.end, 0.0))
         piece = jnp.where(made.ends, cubic, jnp.zeros_like(cubic).at[:1].set(piece))
     return made.t + share * made.h, at(made.x, piece, share)
-
-
-def grown(config, lane, trial, ratio):
-    """The next step after one into a strip."""
-    return accepted(config, lane, trial.h, ratio, jnp.isfinite(ratio)).h

@@ -95,7 +95,7 @@ def look(model, config, p, lane, record):
     lane = boundary(model, config, p, lane, crossing.here, event.held)
     lane, record = transit(model, config, p, lane, record, event)
     lane, flows = enter(model, config, p, lane)
-    return held_on(model, config, p, lane, record, flows) if config.scheme == "located" else (lane, record)
+    return held_on(model, config, p, lane, record, flows)
 
 
 def one_round(model, config, p, state):

@@ -33,12 +33,18 @@ def ties(t):
     return TIE * jnp.abs(t)
 
 
-def standing(model, lane, facts, t, x, since):
-    """Edges on whose guards a state is, to round-off or within a time, the flow pointing out and the `if` true."""
+def standing(model, bound, lane, facts, t, x, since):
+    """Edges on whose guards a state is, to round-off or within a time, the flow pointing out and the `if` true.
+
+    One that bends as it does in that time, and falls again before it has risen above round-off, is only touched.
+    """
     noise = noise_of(facts, t, x, scaled(model, lane))
     near = jnp.abs(facts.values) <= jnp.maximum(noise, facts.rates * since)
     out = facts.rates > 32 * UNIT * facts.spans
-    return near & out & facts.conditions & model.of(model.is_edge, lane.mode) & ~releasing(model, lane)
+    later = bound.facts(lane.mode, t + since, x + since * bound.flow(lane.mode, t, x)).rates
+    bend = (facts.rates - later) / jnp.where(since > 0, since, 1.0)
+    turns = (since > 0) & (bend > 0) & (facts.rates * facts.rates <= 2 * bend * (noise - facts.values))
+    return near & out & ~turns & facts.conditions & model.of(model.is_edge, lane.mode) & ~releasing(model, lane)
 
 
 def after_reset(model, bound, lane, k, t, x):
@@ -53,7 +59,7 @@ def keeps(model, bound, lane, k, t, x):
     return (off <= SAME_UNITS * UNIT * sizes_here(model, lane)).all()
 
 
-def choose(model, config, lane, found, facts, times, states):
+def choose(model, bound, lane, found, facts, times, states):
     """Choose which crossing goes: the number of the first one, that of the edge, and whether others are tied.
 
     The earliest goes; of tied ones, and of those whose guard its point is on, the highest priority, then the first.
@@ -63,7 +69,7 @@ def choose(model, config, lane, found, facts, times, states):
     since = ties(times[first])
     tied = found & (times - times[first] <= since)
     here = jax.tree.map(lambda rows: rows[first], facts)
-    tied = tied | standing(model, lane, here, times[first], states[first], since)
+    tied = tied | standing(model, bound, lane, here, times[first], states[first], since)
     priority = model.of(model.priority, lane.mode)
     edge = jnp.argmax(jnp.where(tied, priority, jnp.iinfo(jnp.int32).min))
     return first, edge, (tied & ~releasing(model, lane)).sum() > 1

@@ -104,13 +104,14 @@ def facts_here_and_at(bound, lane, found, times, states):
 def decided(model, config, p, lane, crossing):
     """The event of a crossing, of guards that a state is on where no step leads on or the run ends, or on entry."""
     still, goes, fires = frozen(lane), crossing.mask, lane.phase == FIRE
+    bound = Bound(model, frozen(p), still.segment, still.contacts)
     may = (lane.failure == VALUE) | ((config.scheme == "relaxed") & (lane.failure >= 1) & (lane.failure <= INWARD))
     may = jnp.where(lane.phase == STUCK, may, lane.phase == END)
-    on = may & standing(model, still, crossing.here, still.t, still.x, 1e-12 * still.t)
+    on = may & standing(model, bound, still, crossing.here, still.t, still.x, ties(still.t))
     found, times = jnp.where(goes, crossing.found, on), jnp.where(goes, crossing.times, still.t)
     states = jnp.where(goes, crossing.states, still.x)
     facts = jax.tree.map(lambda ours, own: jnp.where(goes, ours, own), crossing.facts, crossing.here)
-    first, k, tied = choose(model, config, still, found, facts, times, states)
+    first, k, tied = choose(model, bound, still, found, facts, times, states)
 
     def point(p, lane, t, x, first, length, share):
         bound = Bound(model, p, lane.segment, lane.contacts)
@@ -165,15 +166,24 @@ def transit(model, config, p, lane, record, event):
         record, config, mask & waits, lane.mode, event.t, jnp.minimum(resumed, config.until),
         lambda times: jnp.broadcast_to(x, (len(times), model.W)),
     )  # fmt: skip
-    crowd = (model.of(model.queues, edge) & (frozen(x) >= 1) & (frozen(after) > frozen(x))).any()  # one can wait
-    stops = mask & (late | bad | crowd)
-    halted = stopped(lane, stops, jnp.where(late, UNTIL, jnp.where(bad, NOT_FINITE, WAITING)))
+    stops = mask & (late | bad)
+    halted = stopped(lane, stops, jnp.where(late, UNTIL, NOT_FINITE))
     halted = halted._replace(
         t=jnp.where(late, config.until, event.t), x=jnp.where(before.phase == END, lane.x, x),
         count=lane.count + jnp.where(late, 1, 0),
     )  # fmt: skip
+    crowd, first = two_wait(model, edge, frozen(x), frozen(after))
+    after = jnp.where(first, x, after)
     made = entered_next(model, config, bound, lane, event, edge, x, after, scale, resumed, entry)
+    made = stopped(made, crowd, WAITING)
     return chosen(mask & ~stops, made, chosen(stops, halted, lane)), record
+
+
+def two_wait(model, edge, x, after):
+    """Whether a reset lets a second execution of an event wait, and the values of the first one that it keeps."""
+    waiting, at = model.of(model.waiting, edge), model.of(model.at, edge)
+    more = (waiting >= 0) & (x[waiting] >= 1) & (after[waiting] > x[waiting])
+    return more.any(), more & ~(after[at] < x[at] - ties(x[at]))
 
 
 def entered_next(model, config, bound, lane, event, edge, x, after, scale, resumed, entry):
@@ -182,7 +192,7 @@ def entered_next(model, config, bound, lane, event, edge, x, after, scale, resum
     def kept(old, new):
         return jnp.where(entry, old, new)
 
-    relaxed, last = config.scheme == "relaxed", lane.visited.room
+    relaxed = config.scheme == "relaxed"
     slope = frozen(bound.flow(lane.mode, event.t, x)) if relaxed else lane.slope  # only the relaxed scheme reads it
     owner = model.of(model.owner, lane.mode).astype(jnp.int32)
     on = event.held | (lane.active & ~event.held.any() & (event.t == lane.t))
@@ -199,7 +209,7 @@ def entered_next(model, config, bound, lane, event, edge, x, after, scale, resum
         waits=jnp.append(lane.waits[1:], frozen(resumed - event.t)),
         edges=jnp.append(lane.edges[1:], edge), entries=jnp.append(lane.entries[1:], entry), count=lane.count + 1,
         trial=lane.h, clear=jnp.asarray(False), halvings=jnp.zeros_like(lane.halvings),
-        visited=lane.visited._replace(room=kept(last, 0).astype(jnp.int32)),
+        visited_modes=kept(lane.visited_modes, -1).astype(jnp.int32),
     )  # fmt: skip
 
 

@@ -48,8 +48,8 @@ def shortened(config, lane, verdict, trial, mask):
     lane = rejected(config, lane, trial.h, verdict.ratio, whole) if config.tolerance is not None else lane
     halvings = jnp.where(mask & ~whole, lane.halvings + 1, lane.halvings)
     length = jnp.where(whole, lane.h, trial.h / 2)
-    never = ~(lane.t + length > lane.t)
-    ends = (halvings > MOST_HALVINGS) | (verdict.wrong & struggles(lane)) | (never & located_or(config, verdict.wrong))
+    never = ~(lane.t + length > lane.t) & (verdict.wrong | (config.scheme == "located"))
+    ends = (halvings > MOST_HALVINGS) | (verdict.wrong & struggles(lane)) | never
     return lane._replace(
         trial=jnp.where(mask, length, lane.trial),
         halvings=halvings,
@@ -58,11 +58,6 @@ def shortened(config, lane, verdict, trial, mask):
         blocked=jnp.where(mask, jnp.where(verdict.wrong, -1, verdict.blocked), lane.blocked),
         phase=jnp.where(mask, jnp.where(ends, STUCK, STEP), lane.phase),
     )
-
-
-def located_or(config, mask):
-    """True in the located scheme, which ends where time cannot go on; the relaxed one there only where it is wrong."""
-    return True if config.scheme == "located" else mask
 
 
 def counted(model, config, p, lane, record, tried, ends, ratio, mask):

@@ -6,6 +6,7 @@ What decides is computed from frozen numbers.
 
 from __future__ import annotations
 
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import jax
@@ -64,15 +65,7 @@ def attempted(model, bound, lane, h):
     return Trial(lane.t, h, t1, lane.x, z, stages, end, ends, piece, at_limit)
 
 
-class Made(NamedTuple):
-    """A step from (t, x) to (t1, z) and its interpolant, with derivatives."""
-
-    t: Any
-    h: Any
-    t1: Any
-    x: Any
-    z: Any
-    piece: Any
+Made = namedtuple("Made", "t h t1 x z piece")  # a step from (t, x) to (t1, z) and its interpolant, with derivatives
 
 
 def followed(model, p, lane, trial, length, mask):
