@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-RUNTIME = ROOT / "hsdsl" / "runtime" / "c"
+RUNTIME = ROOT / "hsdsl" / "engine" / "runtime" / "c"
 FLOAT32 = re.compile(r"#if defined\(HS_FLOAT32\).*?#else", re.DOTALL)
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 DEFINED = re.compile(r"#define (\w+) (.+)")
@@ -39,7 +39,7 @@ def in_c() -> Iterator[tuple[str, str, float]]:
 
 def in_python() -> dict[str, dict[str, float]]:
     """The values of the constants of modules, by their names."""
-    files = (path for folder in FOLDERS for path in (ROOT / "hsdsl" / folder).glob("[a-z]*.py"))
+    files = (path for folder in FOLDERS for path in (ROOT / "hsdsl" / "engine" / folder).glob("[a-z]*.py"))
     modules = (*PROGRAM, *(".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files))
     found: dict[str, dict[str, float]] = {}
     for module in modules:
