@@ -3,8 +3,7 @@
 A target is a package of the same name with a function ``files(source)``. It returns every file by its path relative to
 the output folder, or raises `UsageError` where the target cannot keep the model: nothing is written before that.
 
-Targets begin with `source`, a model and its problem. They share its `routines` as syntax trees, `parameters` and what
-follows from them, `identifiers` for its names, and `explicit`, the table of a method. Documents share `automata`.
+Targets begin with `source`: a model, its problem, and what all of them read of it. Documents share `automata`.
 """
 
 from __future__ import annotations

@@ -1,8 +1,15 @@
-"""The source of an export: a model's mathematics, and the problem that a run with the same settings would solve."""
+"""The source of an export: a model's mathematics, and the problem that a run with the same settings would solve.
+
+Besides what all targets read of it: parameters and initial values by what a change of them needs, routines as syntax
+trees, distinct ASCII identifiers for the model's names, and the table of an explicit method.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import ast
+import re
+import unicodedata
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -12,13 +19,15 @@ from hsdsl import __version__
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible
 from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.base.parts import numbered
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.execution import Execution
+from hsdsl.engine.integrators import AUTO, INTEGRATORS, ButcherTableau
 from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.simulate import Problem
-from hsdsl.export.identifiers import ascii_name
 from hsdsl.language.system import HybridSystem, started
 from hsdsl.mathematics.lower import lower_constants
+from hsdsl.mathematics.program import ModeProgram, Program, Routines
 
 LONGEST = 40  # letters of a name: some languages read 63 of an identifier, and something is put behind it
 
@@ -118,3 +127,159 @@ def drivable(source: Source) -> Source:
     """The same source with inputs of time that can be driven from outside; see `hsdsl.language.elaborate.drivable`."""
     system, problem = _prepared(source.model.pipeline.drivable(), source.arguments)
     return replace(source, system=system, problem=problem)
+
+
+def derived(problem: Problem) -> set[str]:
+    """The parameters that are expressions of others, and not overridden."""
+    program = problem.program
+    used = used_by(program)
+    return {
+        name
+        for i, name in enumerate(program.parameters)
+        if used[f"parameter_{i}"] and name not in problem.settings.overrides
+    }
+
+
+def structural(problem: Problem) -> set[str]:
+    """The parameters that decide the samples of inputs or when switches of time change; such times are data."""
+    program = problem.program
+    used = used_by(program)
+    direct = {i for name, needed in used.items() if name.startswith("input_") for i in needed}
+    direct |= parameters_in(*definitions(program.switching).values())
+    return {program.parameters[i] for i in with_sources(program, used, derived(problem), direct)}
+
+
+def used_by(program: Program) -> dict[str, set[int]]:
+    """The parameters that each constant is computed from."""
+    return {name: parameters_in(routine) for name, routine in definitions(program.constants).items()}
+
+
+def with_sources(program: Program, used: dict[str, set[int]], own: set[str], direct: set[int]) -> set[int]:
+    """Parameters with those that they are derived from, which come before them."""
+    found = set(direct)
+    for i in reversed(range(len(program.parameters))):
+        if i in found and program.parameters[i] in own:
+            found |= used[f"parameter_{i}"]
+    return found
+
+
+def given(problem: Problem) -> set[str]:
+    """The states whose initial values the call gives: by name, or as numbers of the modes of parts."""
+    overrides = problem.settings.overrides
+    parts = problem.program.parts
+    numbers = {name for name in numbered(parts) if not {"initial.mode", f"initial.{name}.mode"}.isdisjoint(overrides)}
+    return numbers | {name for name in problem.states if f"initial.{name}" in overrides}
+
+
+def followed(problem: Problem) -> list[int | None]:
+    """For each state of the start the place of its initial value among those of the file; None where it has another."""
+    known, own = problem.program.initial_states, given(problem)
+    return [known.index(name) if name in known and name not in own else None for name in problem.states]
+
+
+def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:
+    """The functions of a text of routines; what names the parameters that one is given is left out."""
+    bind = ast.parse(routines.source).body[0]
+    assert isinstance(bind, ast.FunctionDef)
+    found = {node.name: node for node in bind.body if isinstance(node, ast.FunctionDef)}
+    for node in found.values():
+        node.body = [part for part in node.body if not _names_a_parameter(part)]
+    return found
+
+
+def mode_definitions(mode: ModeProgram) -> dict[str, ast.FunctionDef]:
+    """The routines of a mode; gradients, resets, spreads have all states."""
+    found, n = definitions(mode.routines), len(mode.states)
+    states, sizes = [f"x{i}" for i in range(n)], [f"s{i}" for i in range(n)]
+    for name, definition in found.items():
+        names = ["t", *states, *(sizes if name.startswith("spread") else [])]
+        definition.args = ast.arguments([], [ast.arg(name) for name in names], None, [], [], None, [])
+    for k, places in enumerate(mode.slopes):
+        _fill(found[f"gradient_{k}"], places, [_name("q_0_1")] * (n + 1))
+    for k, edge in enumerate(mode.edges):
+        count = len(edge.target_states)
+        for name, letter in ((f"reset_{k}", "x"), (f"spread_{k}", "s")):
+            _fill(found[name], edge.changes, [_name(f"{letter}{i}") for i in range(count)])
+    return found
+
+
+def _name(name: str) -> ast.expr:
+    return ast.Name(name, ast.Load())
+
+
+def _fill(definition: ast.FunctionDef, places: Sequence[int], whole: list[ast.expr]) -> None:
+    """Put a routine's results in their places among others."""
+    last = definition.body[-1]
+    assert isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
+    for place, value in zip(places, last.value.elts, strict=True):
+        whole[place] = value
+    last.value.elts = whole
+
+
+def _names_a_parameter(part: ast.stmt) -> bool:
+    return isinstance(part, ast.Assign) and isinstance(part.value, ast.Subscript)
+
+
+def data_names(program: Program) -> list[str]:
+    """Names of the numbers that a mode is bound to: parameters, lines of segments of inputs, switches, contacts."""
+    names = [f"p{i}" for i in range(len(program.parameters))]
+    names += [f"{letter}{i}" for i in range(len(program.inputs)) for letter in "abc"]
+    names += [f"k{i}" for i in range(len(program.switches))]
+    return names + [f"d{i}" for i in range(program.contact_count)]
+
+
+def parameters_in(*nodes: ast.AST) -> set[int]:
+    """The numbers of the parameters that parts of routines name."""
+    names = [node.id for part in nodes for node in ast.walk(part) if isinstance(node, ast.Name)]
+    return {int(name[1:]) for name in names if name[0] == "p" and name[1:].isdigit()}
+
+
+_GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
+
+
+def identifiers(names: Iterable[str], reserved: Collection[str] = ()) -> dict[str, str]:
+    """An identifier for each name, in order; one that is taken or reserved gets underscores at its end."""
+    taken: dict[str, str] = {}
+    used = set(reserved)
+    for name in dict.fromkeys(names):
+        identifier = ascii_name(name)
+        while identifier in used:
+            identifier += "_"
+        used.add(identifier)
+        taken[name] = identifier
+    return taken
+
+
+def ascii_name(text: str) -> str:
+    """An ASCII identifier that resembles a text: Greek letters by name, other signs as underscores."""
+    letters = "".join(map(_letters, unicodedata.normalize("NFKD", text)))
+    return letters if letters[:1].isalpha() else f"n{letters}"
+
+
+def _letters(sign: str) -> str:
+    if sign.isascii():
+        return sign if sign.isalnum() else "_"
+    if unicodedata.combining(sign):
+        return ""
+    greek = _GREEK.fullmatch(unicodedata.name(sign, ""))
+    return greek.group(1).lower() if greek else "_"
+
+
+def explicit(source: Source, target: str) -> tuple[Source, ButcherTableau]:
+    """The source with an explicit method, and its table: where `auto` is Taylor's method, `AUTO` in its place.
+
+    Raises UsageError: the target cannot keep the scheme or the method.
+    """
+    settings = source.problem.settings
+    method = settings.method
+    if method is None:
+        raise UsageError(f"{target} has no scheme '{settings.scheme}'", "--scheme relaxed or --scheme located")
+    known = ", ".join(INTEGRATORS)
+    if method.implicit:
+        stiff = "the model is stiff: an explicit one takes many small steps, if you want it with "
+        hint = f"{'' if settings.method_chosen is None else stiff}--method {AUTO}"
+        raise UsageError(f"{target} has explicit methods ({known}), not {method.name}", hint)
+    if method.kind != "table" and settings.method_chosen is None:
+        raise UsageError(f"{target} has the methods {known}, not {method.name}", f"--method {AUTO}")
+    table = method if method.kind == "table" else INTEGRATORS[AUTO]
+    return replace(source, problem=source.problem.with_settings(replace(settings, method=table))), table

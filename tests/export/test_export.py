@@ -15,7 +15,7 @@ from shipped import MODELS
 import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.export import TARGETS, files_of, source_of, write
-from hsdsl.export.identifiers import identifiers
+from hsdsl.export.source import identifiers
 from hsdsl.interface.cli.export import only_text
 from hsdsl.interface.cli.verbs import obey
 

@@ -14,8 +14,7 @@ from shipped import assert_golden
 
 import hsdsl
 from hsdsl.export import files_of, source_of
-from hsdsl.export.latex.escaping import escaped
-from hsdsl.export.latex.mathematics import Mathematics
+from hsdsl.export.latex.mathematics import Mathematics, escaped
 
 MODELS = sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))
 HOSTILE = """

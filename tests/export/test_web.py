@@ -28,7 +28,7 @@ from hsdsl.analysis.report import as_json
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import without_memory
 from hsdsl.export import files_of, source_of
-from hsdsl.export.web import numbers as page_numbers
+from hsdsl.export.web import model as page
 from hsdsl.export.web import wasm
 from hsdsl.export.web.model import model_of
 from hsdsl.interface.cli.verbs import obey
@@ -456,13 +456,13 @@ def test_numbers_and_data_of_a_page_are_as_they_were():
     source = source_of(model, {})
     data = model_of(source, source, model.simulate())
     del data["about"]  # it names the version
-    found = page_numbers.page_numbers(source.problem) + json.dumps(data, indent=1) + "\n"
+    found = page.page_numbers(source.problem) + json.dumps(data, indent=1) + "\n"
     assert_golden(found, Path(__file__).parent / "golden" / "thermostat.web.txt")
 
 
 def test_fixed_parameters_are_those_that_curved_switches_and_tolerances_depend_on():
     def fixed(text: str, **arguments: Any) -> set[str]:
-        return page_numbers.fixed(source_of(hsdsl.loads(text), arguments).problem)
+        return page.fixed(source_of(hsdsl.loads(text), arguments).problem)
 
     assert fixed(FOLLOWING) == set()
     assert fixed(CURVED) == {"w", "phase", "T"}

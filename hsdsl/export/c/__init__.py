@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from textwrap import wrap
 
-from hsdsl.export.c.readme import readme
-from hsdsl.export.c.sources import EXACT_FLAGS, PARTS, c_sources
+from hsdsl.export.c.sources import EXACT_FLAGS, PARTS, c_sources, readme
 from hsdsl.export.source import Source
 
 

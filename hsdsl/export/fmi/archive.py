@@ -15,7 +15,7 @@ from hsdsl.engine.runtime.compiler import FLAGS, NoCompiler, find_compiler
 from hsdsl.engine.runtime.library import EFFORT, loop_object
 from hsdsl.engine.runtime.process import workshop
 from hsdsl.export.c.sources import c_sources
-from hsdsl.export.fmi import tables
+from hsdsl.export.fmi import variables
 from hsdsl.export.fmi.variables import Unit
 
 FOLDER = Path(__file__).parent
@@ -35,8 +35,8 @@ def token_of(unit: Unit, version: int) -> str:
 def sources_of(unit: Unit, version: int) -> dict[str, bytes]:
     """The sources in one folder, by their names; see :func:`compiled_names` for those that are compiled."""
     flat = {Path(name).name: text for name, text in c_sources(unit.source, tunable=True).items()}
-    flat["variables.h"] = tables.header(unit, token_of(unit, version)).encode()
-    flat["variables.c"] = tables.numbers(unit).encode()
+    flat["variables.h"] = variables.header(unit, token_of(unit, version)).encode()
+    flat["variables.c"] = variables.numbers(unit).encode()
     flat["fmi_version.h"] = f'#include "fmi{version}.h"\n'.encode()
     names = ("fmu", "surfaces", "events", "fmi", f"fmi{version}")
     parts = (f"{name}.{kind}" for name in names for kind in "hc")

@@ -1,15 +1,20 @@
-"""What the model descriptions of both versions of FMI share: the root, and what a variable is to the caller."""
+"""What the model descriptions of both versions of FMI share: the root, and what a variable is to the caller.
+
+Texts of elements cannot be markup, and units are written by their base units.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
+from xml.etree import ElementTree
 
 from hsdsl import __version__
+from hsdsl.analysis.lint.units import unit as units
+from hsdsl.analysis.lint.units.unit import UnknownUnit, read
+from hsdsl.base.names import visible
 from hsdsl.export.fmi.archive import token_of
-from hsdsl.export.fmi.dependencies import dependencies, initial_dependencies
-from hsdsl.export.fmi.variables import Unit, Variable
-from hsdsl.export.fmi.xml import Element, element, per_time
+from hsdsl.export.fmi.variables import Unit, Variable, dependencies, initial_dependencies
 
 _KINDS = {  # causality, variability, initial
     "time": ("independent", "continuous", None),
@@ -108,3 +113,62 @@ def structure(
         for unknown in unknowns:
             numbers = " ".join(str(i + first) for i in known[unknown])
             element(around, tag, **{reference: str(unknown + first)}, dependencies=numbers)
+
+
+Element = ElementTree.Element
+_BASE = {
+    "[mass]": "kg",
+    "[length]": "m",
+    "[time]": "s",
+    "[current]": "A",
+    "[temperature]": "K",
+    "[substance]": "mol",
+    "[luminosity]": "cd",
+}
+
+
+def element(parent: Element | None, tag: str, **attributes: str | float | bool | None) -> Element:
+    """A new element; attributes that are None are left out."""
+    given = {name.rstrip("_"): _text(value) for name, value in attributes.items() if value is not None}
+    return Element(tag, given) if parent is None else ElementTree.SubElement(parent, tag, given)
+
+
+def _text(value: str | float | bool) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return visible(value) if isinstance(value, str) else repr(value)
+
+
+def written(root: Element) -> str:
+    """The document."""
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def define_units(root: Element, names: Iterable[str | None]) -> None:
+    """The definitions of these units, each once; one that has no whole powers of base units is a name alone."""
+    used = sorted({name for name in names if name})
+    if not used:
+        return
+    definitions = element(root, "UnitDefinitions")
+    for name in used:
+        unit = element(definitions, "Unit", name=name)
+        try:
+            meaning = read(name)
+        except UnknownUnit:
+            continue
+        _define(unit, meaning)
+
+
+def _define(unit: Element, meaning: units.Unit) -> None:
+    powers = dict(meaning.powers)
+    if powers.keys() - _BASE.keys() or any(power.denominator != 1 for power in powers.values()):
+        return
+    base = {_BASE[name]: str(power) for name, power in powers.items()}
+    factor = None if meaning.factor == 1 else meaning.factor
+    element(unit, "BaseUnit", **base, factor=factor)
+
+
+def per_time(unit: str | None, time: str | None) -> str | None:
+    """The unit of a derivative by time."""
+    return None if unit is None else f"({unit})/({time or 's'})"

@@ -1,10 +1,14 @@
-"""The variables of a unit: time, states, derivatives, parameters, inputs, outputs and the mode, by their references."""
+"""The variables of a unit: time, states, derivatives, parameters, inputs, outputs and the mode, by their references.
+
+Tools build sparse matrices from what each unknown depends on, by references. `parts/fmu.c` reads the variables and
+their derivatives as tables of C.
+"""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -13,13 +17,15 @@ import numpy as np
 
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import numbered
+from hsdsl.engine.backends.c import constant_bodies, routine_functions
+from hsdsl.engine.backends.c.printer import literal
 from hsdsl.engine.backends.text import compile_routines
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.simulate import Problem
 from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.export import Modes
-from hsdsl.export.parameters import derived, structural
-from hsdsl.export.source import Source, drivable
+from hsdsl.export.c.problem import array, comment, function, string
+from hsdsl.export.source import Source, derived, drivable, structural, used_by, with_sources
 from hsdsl.language.elaborate.inputs import switch_name
 from hsdsl.mathematics.lower.slopes import Slopes, lower_given, lower_slopes
 
@@ -255,3 +261,221 @@ def _input_size(source: Source, index: int) -> float:
             ends = (segment.start, min(float(segment.end), until))
             values += [float(start + slope * (float(time) - since)) for time in ends]
     return max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+
+
+def dependencies(unit: Unit) -> dict[int, list[int]]:
+    """States, inputs and time that unknowns depend on in any mode."""
+    found = {i: set[int]() for i in unit.references("derivative", "output", "mode", "indicator")}
+    for mode in range(len(unit.slopes)):
+        for unknown, columns in _rows(unit, mode):
+            found[unknown] |= _knowns(unit, mode, columns, set())
+    return {i: sorted(known) for i, known in found.items()} | {i: [i] for i in unit.references("state")}
+
+
+def initial_dependencies(unit: Unit) -> dict[int, list[int]]:
+    """What unknowns depend on in the initial mode: states, inputs, time and parameters; and parameters on others."""
+    problem = unit.problem
+    program, own = problem.program, derived(problem)
+    used = used_by(program)
+    shown = {v.index: i for i, v in enumerate(unit.variables) if v.kind == "parameter" and v.start is not None}
+    found = {i: list[int]() for i in unit.references("derivative", "output", "mode")}
+    for unknown, columns in _rows(unit, problem.mode):
+        width = _first_parameter(unit, problem.mode)
+        needed = with_sources(program, used, own, {k - width for k in columns if k >= width})
+        found[unknown] = sorted(_knowns(unit, problem.mode, columns, {shown[i] for i in needed & shown.keys()}))
+    for i, variable in enumerate(unit.variables):
+        if variable.kind == "parameter" and variable.start is None:
+            needed = with_sources(program, used, own, {variable.index})
+            found[i] = sorted(shown[k] for k in needed & shown.keys())
+    return found
+
+
+def _first_parameter(unit: Unit, mode: int) -> int:
+    """The column of the first parameter."""
+    return len(unit.problem.program.flows[mode].states) + len(unit.source.system.inputs) + 1
+
+
+def _rows(unit: Unit, mode: int) -> Iterator[tuple[int, frozenset[int]]]:
+    """The unknowns of a mode that there are variables of, each with the columns that it uses."""
+    program = unit.problem.program
+    states, derivatives = program.flows[mode].states, unit.references("derivative")
+    own = [program.all_states.index(name) for name in states]
+    rows = [derivatives[i] if i < len(derivatives) else None for i in own]
+    rows += [*unit.references("output"), *unit.references("indicator")]
+    uses = unit.slopes[mode].uses
+    for row, (unknown, columns) in enumerate(zip(rows, uses, strict=False)):  # a mode may have fewer surfaces
+        surface = row >= len(rows) - len(unit.references("indicator"))
+        rates = [uses[column] for column in columns if column < len(states)] if surface else []
+        if unknown is not None:
+            yield unknown, columns.union(*rates)  # the indicator of a surface has its rate along the flow
+
+
+def _knowns(unit: Unit, mode: int, columns: frozenset[int], further: set[int]) -> set[int]:
+    """The references of states, inputs and time among columns; an input that cannot be set is one of time."""
+    program, variables = unit.problem.program, unit.variables
+    names = program.flows[mode].states
+    places: Mapping[Kind, list[int]] = {kind: unit.references(kind) for kind in ("time", "state", "input")}
+    (time,), known = places["time"], set(further)
+    for column in columns:
+        if column < len(names):
+            index = program.all_states.index(names[column])
+            known |= {places["state"][index]} if index < len(places["state"]) else set()
+        elif column < len(names) + len(places["input"]):
+            reference = places["input"][column - len(names)]
+            known.add(time if variables[reference].fixed else reference)
+        elif column == len(names) + len(places["input"]):
+            known.add(time)
+    return known
+
+
+_HEADER = """
+#ifndef VARIABLES_H
+#define VARIABLES_H
+
+#include "hs.h"
+
+enum {{ FMU_TIME, FMU_STATE, FMU_DERIVATIVE, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT, FMU_MODE, FMU_INDICATOR }};
+
+#define FMU_VARIABLES {variables}
+#define FMU_STATES {states} /* those that flow, before the numbers of the modes of parts */
+#define FMU_INPUTS {inputs}
+#define FMU_SLOPES {slopes}
+#define FMU_TOKEN {token}
+
+/* A variable by its reference: its kind, and its place among those of the kind. */
+typedef struct {{
+  int kind, index;
+}} fmu_variable;
+
+/* An input: its place among sampled ones, the parameter that turns its expression off (-1: samples), whether it stays
+   as given, and whether it changes at events alone. */
+typedef struct {{
+  int samples, given, fixed, held;
+}} fmu_input_place;
+
+/* The slopes of a mode that are not zero everywhere, by references of unknown and known. */
+typedef struct {{
+  hs_routine *values;
+  int count;
+  const unsigned *row, *column;
+}} fmu_slope_table;
+
+extern const fmu_variable fmu_variables[];
+extern const fmu_input_place fmu_input[];
+extern const double fmu_input_start[], fmu_input_nominal[], fmu_nominal[];
+extern const fmu_slope_table fmu_slopes[];
+extern const char *const fmu_moves[]; /* for each mode: of each surface whether each input moves it */
+
+/* Which parameter is beyond a bound of its own; 0 for none. */
+const char *fmu_beyond(const double *p);
+
+/* The value of the expression of an input. */
+double fmu_given(int input, const double *p, double t);
+
+#endif
+"""
+_BEYOND = """
+const char *fmu_beyond(const double *p) {{
+  double bound;
+  (void)p, (void)bound;
+{tests}
+  return 0;
+}}
+"""
+_GIVEN = """
+double fmu_given(int input, const double *p, double t) {{
+  double out[1] = {{NAN}};
+  (void)input, (void)p, (void)t;
+{calls}
+  return out[0];
+}}
+"""
+
+
+def header(unit: Unit, token: str) -> str:
+    """The text of ``variables.h``."""
+    return comment(unit.source.heading) + _HEADER.format(
+        variables=len(unit.variables),
+        states=len(unit.references("state")),
+        inputs=len(unit.source.system.inputs),
+        slopes=max(len(slopes.places) for slopes in unit.slopes),
+        token=string(token),
+    )
+
+
+def numbers(unit: Unit) -> str:
+    """The text of ``variables.c``."""
+    system = unit.source.system
+    off = switched(unit.source)
+    inputs = [variable for variable in unit.variables if variable.kind == "input"]
+    variables = (f"{{FMU_{variable.kind.upper()}, {variable.index}}}" for variable in unit.variables)
+    places = (
+        f"{{{i}, {off.get(given.name, -1)}, {int(inputs[i].fixed)}, {int(inputs[i].discrete)}}}"
+        for i, given in enumerate(system.inputs)
+    )
+    parts = [
+        comment(unit.source.heading),
+        '\n#include "variables.h"\n\n#include "hs_math.h"\n\n',
+        array("const fmu_variable", "fmu_variables", variables),
+        array("const fmu_input_place", "fmu_input", list(places) or ["{0, 0, 0, 0}"]),
+        array("const double", "fmu_input_start", (literal(variable.start or 0.0) for variable in inputs)),
+        array("const double", "fmu_input_nominal", (literal(variable.nominal or 1.0) for variable in inputs)),
+        array("const double", "fmu_nominal", map(literal, [*unit.nominals, *_ones(unit)])),
+        _slopes(unit),
+        _moves(unit),
+        _given(unit),
+        _bounds(unit),
+    ]
+    return "".join(parts)
+
+
+def _ones(unit: Unit) -> list[float]:
+    """A size for each number of a part's mode."""
+    return [1.0] * len(numbered(unit.problem.program.parts))
+
+
+def _slopes(unit: Unit) -> str:
+    program = unit.problem.program
+    nothing = [len(unit.variables) for _ in _ones(unit)]
+    derivatives, outputs = unit.references("derivative") + nothing, unit.references("output")
+    states, inputs = unit.references("state") + nothing, unit.references("input")
+    parts, rows = list[str](), list[str]()
+    for k, (mode, slopes) in enumerate(zip(program.flows, unit.slopes, strict=True)):
+        own = [program.all_states.index(name) for name in mode.states]
+        row = [*(derivatives[i] for i in own), *outputs]
+        column = [*(states[i] for i in own), *inputs]
+        parts.append(routine_functions(slopes.routines, program, f"mode_{k}_"))
+        parts.append(array("static const unsigned", f"row_{k}", (str(row[i]) for i, _ in slopes.places)))
+        parts.append(array("static const unsigned", f"column_{k}", (str(column[i]) for _, i in slopes.places)))
+        rows.append(f"{{mode_{k}_slopes, {len(slopes.places)}, row_{k}, column_{k}}}")
+    return "".join(parts) + array("const fmu_slope_table", "fmu_slopes", rows)
+
+
+def _moves(unit: Unit) -> str:
+    parts, names = list[str](), list[str]()
+    inputs, outputs = len(unit.source.system.inputs), len(unit.source.system.outputs)
+    for k, (mode, slopes) in enumerate(zip(unit.problem.program.flows, unit.slopes, strict=True)):
+        width = len(mode.states)
+        flags = (str(int(width + i in uses)) for uses in slopes.uses[width + outputs :] for i in range(inputs))
+        parts.append(array("static const char", f"moves_{k}", flags))
+        names.append(f"moves_{k}")
+    return "".join(parts) + array("const char *const", "fmu_moves", names)
+
+
+def _given(unit: Unit) -> str:
+    routines = lower_given(unit.source.system)
+    calls = (f"  if (input == {name.removeprefix('given_')}) {name}(p, t, 0, out);" for name in routines.names)
+    functions = routine_functions(routines, unit.problem.program, "")
+    return functions + _GIVEN.format(calls="\n".join(calls))
+
+
+def _bounds(unit: Unit) -> str:
+    program = unit.problem.program
+    bodies, functions, tests = constant_bodies(program), list[str](), list[str]()
+    for i, name in enumerate(program.parameters):
+        for kind, relation in (("minimum", "<"), ("maximum", ">")):
+            if (bound := f"{kind}_{i}") in bodies:
+                functions.append(function(bound, "const hs_real *p", bodies[bound]))
+                text = string(f"parameter {name} is beyond its {kind}")
+                tests.append(f"  if (!{bound}(p, &bound) && p[{i}] {relation} bound) return {text};")
+    return "".join(functions) + _BEYOND.format(tests="\n".join(tests))

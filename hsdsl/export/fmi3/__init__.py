@@ -6,6 +6,8 @@ from hsdsl.export import Modes
 from hsdsl.export.fmi.archive import compiled_names, unit_file
 from hsdsl.export.fmi.description import (
     define_experiment,
+    define_units,
+    element,
     initial_unknowns,
     named,
     numbers,
@@ -13,9 +15,9 @@ from hsdsl.export.fmi.description import (
     root_of,
     structure,
     unit_of_measure,
+    written,
 )
 from hsdsl.export.fmi.variables import Unit, unit_of
-from hsdsl.export.fmi.xml import define_units, element, written
 from hsdsl.export.source import Source
 
 _CAN = {

@@ -10,12 +10,10 @@ import sys
 from functools import cache
 from pathlib import Path
 
-from hsdsl.export.explicit import explicit
-from hsdsl.export.identifiers import identifiers
 from hsdsl.export.jax.model import model_text
 from hsdsl.export.jax.refusals import check
 from hsdsl.export.jax.template import PARTS
-from hsdsl.export.source import Source
+from hsdsl.export.source import Source, explicit, identifiers
 
 
 @cache

@@ -6,8 +6,7 @@ import ast
 from bisect import bisect_right
 
 from hsdsl.export.jax.language import function, literal
-from hsdsl.export.routines import definitions, parameters_in
-from hsdsl.export.source import Source
+from hsdsl.export.source import Source, definitions, parameters_in
 from hsdsl.mathematics.program import Program
 
 SWITCHES = "it decides when a function of time switches"

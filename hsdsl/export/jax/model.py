@@ -10,9 +10,7 @@ from hsdsl.engine.integrators.numbers import table_numbers
 from hsdsl.engine.simulate import Problem
 from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
 from hsdsl.export.jax.language import function, literal
-from hsdsl.export.parameters import derived, followed
-from hsdsl.export.routines import data_names, definitions, mode_definitions, parameters_in
-from hsdsl.export.source import Source
+from hsdsl.export.source import Source, data_names, definitions, derived, followed, mode_definitions, parameters_in
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 
 

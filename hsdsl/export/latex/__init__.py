@@ -9,9 +9,7 @@ from hsdsl.base.graphs import closure
 from hsdsl.base.names import without_memory
 from hsdsl.export.automata import Pairs, document_of, pairs, texts
 from hsdsl.export.latex.automata import of_parts
-from hsdsl.export.latex.escaping import escaped
-from hsdsl.export.latex.layout import equations, stacked
-from hsdsl.export.latex.mathematics import Mathematics
+from hsdsl.export.latex.mathematics import Mathematics, equations, escaped, stacked
 from hsdsl.export.source import Source
 from hsdsl.language.elaborate.functions import named_functions
 from hsdsl.language.expression.plain import names_in

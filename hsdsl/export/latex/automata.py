@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hsdsl.export.automata import Automata, Automaton, Pairs, automata_of, pairs
-from hsdsl.export.latex.escaping import escaped
-from hsdsl.export.latex.layout import equations, stacked
-from hsdsl.export.latex.mathematics import Mathematics
+from hsdsl.export.latex.mathematics import Mathematics, equations, escaped, stacked
 from hsdsl.export.source import Source
 
 

@@ -1,17 +1,21 @@
 # pyright: basic, reportIncompatibleMethodOverride=false
-"""Expressions of a model as LaTeX mathematics, by SymPy's printer with names and numbers as people write them."""
+"""Expressions and texts of a model as LaTeX: SymPy's printer, with names and numbers as people write them.
+
+Every sign of a text that has a meaning in LaTeX is escaped, and what fonts may lack is spelled out.
+"""
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from sympy.printing.latex import LatexPrinter
 
 from hsdsl.base.functions import below
+from hsdsl.base.names import visible
 from hsdsl.base.numbers import decimals
-from hsdsl.export.latex.escaping import GREEK, escaped, greek_name
 from hsdsl.language.expression import plain
 from hsdsl.language.expression.scope import Function, symbol
 from hsdsl.language.expression.selection import cases
@@ -145,3 +149,84 @@ def _decimal(p: int, q: int) -> str | None:
         return None
     mantissa, exponent = found
     return rf"{mantissa} \cdot 10^{{{exponent}}}" if exponent else mantissa
+
+
+_ESCAPES = {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\(<\)",
+    ">": r"\(>\)",
+    "|": r"\(|\)",
+    '"': "''",
+    "°": r"\(^\circ\)",
+    "·": r"\(\cdot\)",
+    "×": r"\(\times\)",
+    "²": r"\(^2\)",
+    "³": r"\(^3\)",
+    "–": "--",
+    "—": "---",
+    "ß": r"\ss{}",
+    "ø": r"\o{}",
+    "Ø": r"\O{}",
+    "æ": r"\ae{}",
+    "Æ": r"\AE{}",
+    "ł": r"\l{}",
+    "Ł": r"\L{}",
+    "’": "'",
+    "‘": "`",
+    "“": "``",
+    "”": "''",
+    **{sign: f"\\{sign}" for sign in "#$%&_{}"},
+}
+_ACCENTS = {"\u0300": "`", "\u0301": "'", "\u0302": "^", "\u0303": "~", "\u0308": '"', "\u030a": "r", "\u030c": "v"}
+_ACCENTS["\u0327"] = "c"
+_LETTERS = "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi"
+_CAPITALS = "Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega"
+GREEK = frozenset(f"{_LETTERS} psi omega {_CAPITALS}".split())  # that LaTeX has commands for
+
+
+def escaped(text: str) -> str:
+    """A text in one line that LaTeX prints as it is."""
+    return "".join(map(_sign, unicodedata.normalize("NFC", visible(text))))
+
+
+def _sign(sign: str) -> str:
+    if sign in _ESCAPES:
+        return _ESCAPES[sign]
+    if sign.isascii():
+        return sign
+    greek = greek_name(sign)
+    if greek in GREEK:
+        return rf"\(\{greek}\)"
+    base, *marks = unicodedata.normalize("NFD", sign)
+    if base.isascii() and base.isalpha() and len(marks) == 1 and marks[0] in _ACCENTS:
+        letter = {"i": r"\i", "j": r"\j"}.get(base, base)
+        return rf"\{_ACCENTS[marks[0]]}{{{letter}}}"
+    return f"[U+{ord(sign):04X}]"
+
+
+def greek_name(sign: str) -> str:
+    """The name of a Greek letter, capital ones with a capital; empty for another sign."""
+    name = unicodedata.name(sign, "")
+    kind, _, letter = name.partition(" LETTER ")
+    known = {"LAMDA": "lambda"}.get(letter, letter.lower())
+    return {"GREEK SMALL": known, "GREEK CAPITAL": known.capitalize()}.get(kind, "")
+
+
+WIDEST = 90  # signs of a formula that fit into a line, roughly: a longer one is a paragraph that breaks by itself
+_COMMAND = re.compile(r"\\[A-Za-z]+|[{}^_ ]")
+
+
+def equations(pairs: list[tuple[str, str]]) -> list[str]:
+    """Equations below each other, aligned; where one is too long for that, each is a paragraph."""
+    if not pairs:
+        return []
+    if any(len(_COMMAND.sub("", left + right)) > WIDEST for left, right in pairs):
+        return [r"\begin{flushleft}", *(rf"\({left} = {right}\)\par" for left, right in pairs), r"\end{flushleft}"]
+    rows = [rf"{left} &= {right}" for left, right in pairs]
+    return [r"\begin{align*}", " \\\\\n".join(rows), r"\end{align*}"]
+
+
+def stacked(formulas: list[str]) -> list[str]:
+    return [r"\begin{gather*}", " \\\\\n".join(formulas), r"\end{gather*}"]

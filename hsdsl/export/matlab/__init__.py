@@ -10,12 +10,8 @@ from textwrap import wrap
 
 from hsdsl.base.names import visible
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
-from hsdsl.export.matlab.language import body, helpers, literal
-from hsdsl.export.matlab.model import ModelText, parameter_fields
-from hsdsl.export.matlab.text import comment, string
-from hsdsl.export.parameters import derived, followed, structural
-from hsdsl.export.routines import definitions
-from hsdsl.export.source import Source
+from hsdsl.export.matlab.model import ModelText, body, comment, helpers, literal, parameter_fields, string
+from hsdsl.export.source import Source, definitions, derived, followed, structural
 
 PARTS = Path(__file__).parent / "parts"
 

@@ -1,22 +1,22 @@
-"""The function that gives a model as a structure: routines of each mode, names, inputs over time, method, settings."""
+"""The function that gives a model as a structure: routines of each mode, names, inputs over time, method, settings.
+
+Routines are functions of time, the states and the parameters, each a column of values.
+"""
 
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hsdsl.base.names import visible
 from hsdsl.base.parts import layout_of
 from hsdsl.engine.backends.c import width
+from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text
+from hsdsl.engine.simulate import Problem
 from hsdsl.engine.simulate.control import LARGEST_SHARE
-from hsdsl.export import routines
-from hsdsl.export.identifiers import identifiers
-from hsdsl.export.matlab.language import KEYWORDS, body, helpers, reserved
-from hsdsl.export.matlab.settings import run_fields
-from hsdsl.export.matlab.text import cell, comment, string, strings, vector
-from hsdsl.export.routines import mode_definitions
-from hsdsl.export.source import Source
+from hsdsl.export.source import Source, data_names, identifiers, mode_definitions
 from hsdsl.mathematics.program import ModeProgram, Program
 
 _LAST = """
@@ -64,9 +64,9 @@ def parameter_fields(program: Program) -> dict[str, str]:
     return identifiers(program.parameters, KEYWORDS)
 
 
-def data_names(program: Program) -> dict[str, str]:
+def row_entries(program: Program) -> dict[str, str]:
     """The inputs, switches and contacts of a routine, as entries of a row."""
-    names = routines.data_names(program)[len(program.parameters) :]
+    names = data_names(program)[len(program.parameters) :]
     return {name: f"d({at})" for at, name in enumerate(names, start=1)}
 
 
@@ -156,7 +156,7 @@ class ModelText:
         own = identifiers(mode.states, taken | set(parameter_fields(program).values()))
         names = {f"x{i}": own[state] for i, state in enumerate(mode.states)}
         names |= {f"p{i}": f"p.{f}" for i, f in enumerate(parameter_fields(program).values())}
-        names |= data_names(program) | {"t": "t"}
+        names |= row_entries(program) | {"t": "t"}
         text = body(definition, names)
         used = {node.id for node in ast.walk(definition) if isinstance(node, ast.Name)}
         unpack = [f"  {own[s]} = x({i + 1});\n" for i, s in enumerate(mode.states) if f"x{i}" in used]
@@ -179,3 +179,140 @@ def _about(name: str, mode: ModeProgram) -> str:
     if kind in ("reset", "condition") and len(numbers) > 1:
         return visible(f"mode {mode.name}, {kind} of {mode.edges[int(numbers[1]) - 1].name}")
     return visible(f"mode {mode.name}: {kind}")
+
+
+_WIDTH = 100
+
+
+def comment(lines: Iterable[str]) -> str:
+    """Comments; none of them is a brace alone, which would begin a block."""
+    return "".join(f"% {line}\n" for line in lines)
+
+
+def string(text: str) -> str:
+    """A text between single quotes, in which only the quote itself means something."""
+    return "'" + visible(text).replace("'", "''") + "'"
+
+
+def strings(texts: Iterable[str]) -> str:
+    """A row of texts."""
+    return cell(map(string, texts))
+
+
+def cell(items: Iterable[str]) -> str:
+    """A row of anything."""
+    return "{" + ", ".join(items) + "}"
+
+
+def vector(values: Iterable[float], sign: str = ", ") -> str:
+    """A row of numbers, or with ``"; "`` a column; broken into lines."""
+    lines, line = list[str](), ""
+    for text in map(literal, values):
+        if line and len(line) + len(text) > _WIDTH:
+            lines.append(line + sign.rstrip())
+            line = ""
+        line += (sign if line else "") + text
+    return "[" + " ...\n    ".join([*lines, line]) + "]"
+
+
+def matrix(rows: Sequence[Sequence[float]]) -> str:
+    """Rows of numbers, a line each."""
+    inner = "; ...\n    ".join(", ".join(map(literal, row)) for row in rows)
+    return f"[{inner}]" if rows else "zeros(0, 0)"
+
+
+def run_fields(problem: Problem) -> Iterable[tuple[str, str]]:
+    """Names of fields with their values.
+
+    ``data`` has a row of numbers for each stretch of inputs. ``typical`` has a size of each state, by which the sets of
+    a toolbox know round-off.
+    """
+    settings, segments = problem.settings, problem.timeline.segments
+    yield "starts", _column(s.start for s in segments)
+    rows = [s.data[len(problem.program.parameters) :] for s in segments]
+    yield "data", matrix(rows) if rows[0] else f"zeros({len(rows)}, 0)"
+    scale = {name: float(settings.scale.get(name, 0.0)) for name in problem.program.all_states}
+    first = {name: abs(float(number)) for name, number in zip(problem.states, problem.x, strict=True)}
+    yield "typical", _column(max(size, first.get(name, 0.0)) for name, size in scale.items())
+    yield "settings.scheme", string(settings.scheme)
+    numbers = {"step": settings.step or 0.0, "tolerance": settings.tolerance or 0.0, "relaxation": settings.relaxation}
+    numbers |= {"until": settings.until, "max_transitions": settings.max_transitions}
+    yield from ((f"settings.{key}", vector([number])) for key, number in numbers.items())
+
+
+def _column(values: Iterable[float]) -> str:
+    numbers = list(values)
+    return vector(numbers, "; ") if numbers else "zeros(0, 1)"
+
+
+_WORDS = """
+break case catch classdef continue do else elseif end end_try_catch end_unwind_protect endfor endfunction endif
+endswitch endwhile enumeration events for function global if methods otherwise parfor persistent properties return spmd
+switch try until unwind_protect while arguments import
+"""
+KEYWORDS = frozenset(_WORDS.split())
+BUILT_IN = ("sin", "cos", "tan", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "exp", "abs", "sign", "floor")
+_FUNCTIONS = frozenset((*BUILT_IN, "min", "max", "zeros", "pi", "eps", "Inf", "NaN", "i", "j", "e"))
+_PLAIN = re.compile(rf"\bhs_({'|'.join(BUILT_IN)})\(")
+_HELPER = re.compile(r"\bhs_(\w+)\(")
+_TEMPORARY = re.compile(r"\b[vw]\d+\b")
+
+# what MATLAB answers with a complex number has no value here
+HELPERS = {
+    "sqrt": ("x", "x >= 0", "sqrt(x)"),
+    "log": ("x", "x > 0", "log(x)"),
+    "asin": ("x", "abs(x) <= 1", "asin(x)"),
+    "acos": ("x", "abs(x) <= 1", "acos(x)"),
+    "acosh": ("x", "x >= 1", "acosh(x)"),
+    "atanh": ("x", "abs(x) < 1", "atanh(x)"),
+    "pow": ("x, y", "x >= 0 || y == floor(y)", "x ^ y"),
+    "heaviside": ("x", "x == x", "(1 + sign(x)) / 2"),
+    "choose": ("test, x, other", "test", "x"),
+}
+
+
+def literal(value: float) -> str:
+    """Write a number without loss."""
+    return number_text(value, "NaN", "Inf", lambda number: repr(number).removesuffix(".0"))
+
+
+def _results(values: Sequence[str]) -> list[str]:
+    return [f"out = zeros({len(values)}, 1);", *(f"out({i}) = {value};" for i, value in enumerate(values, start=1))]
+
+
+MATLAB = Language(
+    literal=literal,
+    assign="{name} = {value};",
+    results=_results,
+    divide="({left} / {right})",
+    choose="hs_choose({test}, {body}, {other})",
+    call="hs_{name}({arguments})",
+    fold="{name}({left}, {right})",
+    truths=("false", "true"),
+    operators={**C_OPERATORS, ast.NotEq: "~=", ast.Not: "~"},
+)
+
+
+def body(definition: ast.FunctionDef, names: Mapping[str, str]) -> str:
+    """The statements of a routine, indented; ``out`` has its values."""
+    return "\n".join(f"  {_PLAIN.sub(_without_prefix, line)}" for line in MATLAB.body(definition, names))
+
+
+def _without_prefix(match: re.Match[str]) -> str:
+    return f"{match[1]}("
+
+
+def reserved(source: str) -> frozenset[str]:
+    """What no variable of a function made from a text may be called."""
+    own = ("t", "x", "p", "d", "s", "m", "out")
+    return KEYWORDS | _FUNCTIONS | frozenset(own) | frozenset(_TEMPORARY.findall(source))
+
+
+def helpers(text: str) -> str:
+    """The functions that a text calls and MATLAB lacks."""
+    lines: list[str] = []
+    for name in sorted(set(_HELPER.findall(text)) & HELPERS.keys()):
+        arguments, where, value = HELPERS[name]
+        lines.append(f"function value = hs_{name}({arguments})\n  if {where}\n    value = {value};\n")
+        lines[-1] += f"  else\n    value = {'other' if name == 'choose' else 'NaN'};\n  end\nend\n"
+    return "\n".join(lines)

@@ -15,10 +15,8 @@ from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel, runtime
 from hsdsl.engine.simulate import prepare
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
-from hsdsl.export.identifiers import identifiers
-from hsdsl.export.parameters import structural
 from hsdsl.export.rust.model import literal, model_text, string
-from hsdsl.export.source import Source
+from hsdsl.export.source import Source, identifiers, structural
 
 MOST = 100  # transitions; of longer runs these are enough
 

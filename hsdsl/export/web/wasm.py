@@ -14,7 +14,7 @@ from hsdsl.engine.runtime.compiler import Compiler, NoCompiler, zig_compiler
 from hsdsl.engine.runtime.process import workshop
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.source import Source
-from hsdsl.export.web.numbers import page_numbers
+from hsdsl.export.web.model import page_numbers
 
 PARTS = Path(__file__).parent / "parts"
 FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-Wl,--strip-all", *EXACT_FLAGS)
