@@ -33,8 +33,8 @@ class LoopHook(BuildHookInterface[Any]):
         if sys.platform == "win32" and SETTING == "1":
             os.environ["CC"] = f'"{sys.executable}" -m ziglang cc'
         sys.path.insert(0, self.root)
-        from hsdsl.runtime.compiler import NoCompiler
-        from hsdsl.runtime.library import loop, ship
+        from hsdsl.engine.runtime.compiler import NoCompiler
+        from hsdsl.engine.runtime.library import loop, ship
 
         try:
             if version == "editable":
@@ -49,4 +49,4 @@ class LoopHook(BuildHookInterface[Any]):
         platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
         build_data["pure_python"] = False
         build_data["tag"] = f"py3-none-{platform}"
-        build_data["force_include"][str(library)] = f"hsdsl/runtime/shipped/{library.name}"
+        build_data["force_include"][str(library)] = f"hsdsl/engine/runtime/shipped/{library.name}"

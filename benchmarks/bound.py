@@ -25,10 +25,10 @@ import numpy as np
 from engines import compiled
 
 import hsdsl
-from hsdsl.chart import Scene
-from hsdsl.chart.judge import Judgement, judge
-from hsdsl.chart.result import Attempt, Result, Tool
-from hsdsl.chart.stopwatch import Timed, race
+from hsdsl.interface.chart import Scene
+from hsdsl.interface.chart.judge import Judgement, judge
+from hsdsl.interface.chart.result import Attempt, Result, Tool
+from hsdsl.interface.chart.stopwatch import Timed, race
 
 HERE = Path(__file__).parent
 RESTS = 1e-9, 1e-6, 2e-5, 1e-3, 1e-2

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 import hsdsl
-from hsdsl.metrics.points import distances
-from hsdsl.metrics.space import make_space
-from hsdsl.model.distances import distance_of_runs as distance
+from hsdsl.analysis.metrics.points import distances
+from hsdsl.analysis.metrics.space import make_space
+from hsdsl.interface.model.distances import distance_of_runs as distance
 
 MODELS = Path(__file__).parents[1] / "models"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"

@@ -21,7 +21,7 @@ from time import thread_time
 from typing import Any
 
 import hsdsl
-from hsdsl.runtime.compiler import find_compiler
+from hsdsl.engine.runtime.compiler import find_compiler
 
 HERE = Path(__file__).parent
 MODELS = HERE.parent / "models"

@@ -13,8 +13,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from lint.grid import grid
 
-from hsdsl.elaborate import elaborate
-from hsdsl.lint import lint
+from hsdsl.analysis.lint import lint
+from hsdsl.language.elaborate import elaborate
 
 
 def seconds(work, *arguments, **named) -> float:

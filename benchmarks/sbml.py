@@ -1,7 +1,7 @@
 # pyright: basic
 """The semantic test suite of SBML: how many of its cases the language expresses, and how many runs are right.
 
-Each case is converted (`hsdsl.sbml`), run as its settings say, and compared with its results. Every number must be
+Each case is converted (`hsdsl.interface.imports.sbml`), run as its settings say, and compared with its results. Every number must be
 within the case's absolute plus relative tolerance.
 
     python benchmarks/sbml.py SUITE [--cases 1-200] [--processes 2] [--verbose]
@@ -28,7 +28,7 @@ import numpy as np
 import yaml
 
 import hsdsl
-from hsdsl.sbml import FEATURE, converted
+from hsdsl.interface.imports.sbml import FEATURE, converted
 
 TOLERANCE = 1e-10
 BEYOND = 1e-6  # runs are longer by this share: the suite counts what happens at the last instant, as floor(t) does

@@ -36,7 +36,7 @@ STIFFNESS, GAP, BOUNCE = 4.0, 0.25, 0.5  # as in tests/chains.py
 START = """
 import resource, sys, time
 import hsdsl
-from hsdsl.runtime.kernel import CompiledModel, runtime
+from hsdsl.engine.runtime.kernel import CompiledModel, runtime
 def spent():
     return time.process_time() + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
 runtime()

@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 
 import hsdsl
-from hsdsl.chart import PEERS, Row, Scene, work_precision
-from hsdsl.chart.rows import as_csv
+from hsdsl.interface.chart import PEERS, Row, Scene, work_precision
+from hsdsl.interface.chart.rows import as_csv
 
 MODELS = Path(__file__).parent.parent / "models"
 sys.path.insert(0, str(MODELS))

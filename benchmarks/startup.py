@@ -20,7 +20,7 @@ from tempfile import TemporaryDirectory
 MODELS = Path(__file__).parent.parent / "models"
 ROUNDS, FIRST = 15, 5
 ENVIRONMENT = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-LOOP = "from hsdsl.runtime.kernel import runtime; runtime()"
+LOOP = "from hsdsl.engine.runtime.kernel import runtime; runtime()"
 
 
 def seconds(*words: str, cache: str | None = None) -> float:

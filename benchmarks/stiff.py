@@ -19,9 +19,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.backends.python import PythonKernel
-from hsdsl.integrators import radau
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.engine.backends.python import PythonKernel
+from hsdsl.engine.integrators import radau
 
 PROBLEMS = sorted((Path(__file__).parents[1] / "tests" / "convergence" / "stiff").glob("*.yaml"))
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-11)

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 import hsdsl
-from hsdsl.processes import processor_seconds
-from hsdsl.sweep import load
-from hsdsl.sweep.variation import read
+from hsdsl.analysis.sweep import load
+from hsdsl.analysis.sweep.variation import read
+from hsdsl.base.processes import processor_seconds
 
 MODEL = Path(__file__).parent.parent / "models" / "oscillator-with-stop-1.yaml"
 VARY = ["c~uniform(0.5, 0.95)", "initial.v~uniform(10, 40)"]

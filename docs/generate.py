@@ -13,7 +13,7 @@ from pathlib import Path
 
 from writing import codes, command_line, language, methods, mistakes, models, python_api
 
-from hsdsl.lint.rules import FAMILIES, RULES, family
+from hsdsl.analysis.lint.rules import FAMILIES, RULES, family
 
 REFERENCE = Path(__file__).parent / "reference"
 

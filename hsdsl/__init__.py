@@ -6,7 +6,7 @@ One pipeline, each stage a module that imports only from below::
          --lower--> Program --backends--> Kernel                                numbers, free of SymPy
          --simulate--> Execution --report, plot, store--> what people see
 
-`hsdsl.model` runs it from end to end; `hsdsl.simulate.relaxed` is the algorithm of Burden, Gonzalez, Vasudevan,
+`hsdsl.interface.model` runs it from end to end; `hsdsl.engine.simulate.relaxed` is the algorithm of Burden, Gonzalez, Vasudevan,
 Bajcsy, Sastry, *Metrization and Simulation of Controlled Hybrid Systems* (2013).
 """
 
@@ -20,21 +20,21 @@ __all__ = ["Execution", "Limits", "Model", "ModelError", "UsageError", "__versio
 if TYPE_CHECKING:
     from typing import Any
 
-    from hsdsl.errors import ModelError, UsageError
-    from hsdsl.execution import Execution
-    from hsdsl.limits import Limits
-    from hsdsl.model import Model, load, loads
-    from hsdsl.model.distances import distance
+    from hsdsl.base.errors import ModelError, UsageError
+    from hsdsl.base.limits import Limits
+    from hsdsl.engine.execution import Execution
+    from hsdsl.interface.model import Model, load, loads
+    from hsdsl.interface.model.distances import distance
 
 _HOMES = {
-    "Execution": "hsdsl.execution",
-    "Limits": "hsdsl.limits",
-    "Model": "hsdsl.model",
-    "ModelError": "hsdsl.errors",
-    "UsageError": "hsdsl.errors",
-    "distance": "hsdsl.model.distances",
-    "load": "hsdsl.model",
-    "loads": "hsdsl.model",
+    "Execution": "hsdsl.engine.execution",
+    "Limits": "hsdsl.base.limits",
+    "Model": "hsdsl.interface.model",
+    "ModelError": "hsdsl.base.errors",
+    "UsageError": "hsdsl.base.errors",
+    "distance": "hsdsl.interface.model.distances",
+    "load": "hsdsl.interface.model",
+    "loads": "hsdsl.interface.model",
 }
 _MODULES = ("exact", "store", "sweep")  # those with functions for users
 

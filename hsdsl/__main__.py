@@ -1,5 +1,5 @@
 """``python -m hsdsl``."""
 
-from hsdsl.cli import main
+from hsdsl.interface.cli import main
 
 main()

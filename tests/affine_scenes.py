@@ -1,6 +1,6 @@
 """Random affine models in exact numbers, ways to write each in other units, and distances on them by brute force.
 
-Nothing is shared with `hsdsl.metrics`: guards are clipped in rationals, paths are searched for on a graph of sampled
+Nothing is shared with `hsdsl.analysis.metrics`: guards are clipped in rationals, paths are searched for on a graph of sampled
 guard points and then drawn tight, window by window.
 """
 

@@ -10,12 +10,12 @@ import ctypes
 from collections.abc import Sequence
 from typing import Any
 
-from hsdsl.arithmetic import FLOAT64, Number
-from hsdsl.backends.python import PythonKernel, changed, conjunction, spread_out
-from hsdsl.kernel import ModeKernel, Routine, Series, Taylor, Vector
-from hsdsl.program import Program, Tape
-from hsdsl.runtime import structures
-from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.base.numbers.arithmetic import FLOAT64, Number
+from hsdsl.engine.backends.python import PythonKernel, changed, conjunction, spread_out
+from hsdsl.engine.kernel import ModeKernel, Routine, Series, Taylor, Vector
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.runtime.kernel import CompiledModel
+from hsdsl.mathematics.program import Program, Tape
 
 Address = int | None
 Double = ctypes.c_double

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, settings
 
-from hsdsl import cache
+from hsdsl.base import cache
 
 ROOM = 4 << 30  # bytes of addresses that a test may take, and each process that it starts; memory in use is far less
 
@@ -55,9 +55,9 @@ def control_c() -> Iterator[None]:
 @pytest.fixture(scope="session")
 def compiled_loop() -> Path | None:
     """The hand-written loop as the user's cache keeps it: seconds of compiling for tests with a cache of their own."""
-    from hsdsl.cache import find
-    from hsdsl.runtime import library
-    from hsdsl.runtime.compiler import NoCompiler, find_compiler
+    from hsdsl.base.cache import find
+    from hsdsl.engine.runtime import library
+    from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
 
     text, symbol = library.LOOP
     with suppress(NoCompiler):
@@ -71,7 +71,7 @@ def with_loop(compiled_loop: Path | None) -> Callable[[], None]:
     """Put the compiled loop into the cache that the test has, as if the compiler of the test had made it."""
 
     def put() -> None:
-        from hsdsl.runtime import library
+        from hsdsl.engine.runtime import library
 
         if compiled_loop is not None:
             library._keep(library._key(library.LOOP[0], library.find_compiler()), compiled_loop)

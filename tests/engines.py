@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from compiled_kernel import CompiledKernel
 
-from hsdsl.arithmetic import DOMAIN_ERRORS
-from hsdsl.execution import Execution
-from hsdsl.execution.records import same
-from hsdsl.model import Model
-from hsdsl.runtime.compiler import NoCompiler, find_compiler
-from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.execution.records import same
+from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
+from hsdsl.engine.runtime.kernel import CompiledModel
+from hsdsl.interface.model import Model
 
 try:
     find_compiler()

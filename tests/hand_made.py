@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.execution import Arc, Execution, Point, Stop, Transition, Verdict
+from hsdsl.engine.execution import Arc, Execution, Point, Stop, Transition, Verdict
 
 NAN = float("nan")
 

@@ -18,12 +18,12 @@ from conformance.test_conformance import CASES, model
 from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smooth_model
 
 import hsdsl
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.integrators import AUTO
-from hsdsl.model import Model
-from hsdsl.runtime.structures import SCHEMES
-from hsdsl.simulate import output_buffers
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.engine.integrators import AUTO
+from hsdsl.engine.runtime.structures import SCHEMES
+from hsdsl.engine.simulate import output_buffers
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 ALL = sys.argv[1:] == ["all"]
 SOME = list(CASES) if ALL else list(CASES)[::3]

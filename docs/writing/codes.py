@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 from writing.markdown import lowered, table
 
-from hsdsl import errors
-from hsdsl.lint.pages import error_pages, rule_pages, titles, warning_pages
-from hsdsl.lint.rules import FAMILIES, RULES, family
+from hsdsl.analysis.lint.pages import error_pages, rule_pages, titles, warning_pages
+from hsdsl.analysis.lint.rules import FAMILIES, RULES, family
+from hsdsl.base import errors
 
 ERROR_CODES = """# Error codes
 

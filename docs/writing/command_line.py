@@ -7,7 +7,7 @@ from typing import Any
 from typer import Context
 from writing.markdown import table
 
-from hsdsl.cli.verbs import VERBS, command
+from hsdsl.interface.cli.verbs import VERBS, command
 
 COMMAND_LINE = """# Command line
 

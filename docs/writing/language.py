@@ -7,9 +7,9 @@ from typing import Any
 
 from writing.markdown import table
 
-from hsdsl import schema
-from hsdsl.defaults import DEFAULT_TOLERANCE, DEFAULTS
-from hsdsl.functions import CONSTANTS, FUNCTIONS
+from hsdsl.base.defaults import DEFAULT_TOLERANCE, DEFAULTS
+from hsdsl.base.functions import CONSTANTS, FUNCTIONS
+from hsdsl.language import schema
 
 LANGUAGE = """# Language
 

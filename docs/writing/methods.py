@@ -9,8 +9,8 @@ from typing import Any
 
 from writing.markdown import table
 
-from hsdsl import integrators
-from hsdsl.integrators import ButcherTableau
+from hsdsl.engine import integrators
+from hsdsl.engine.integrators import ButcherTableau
 
 INTEGRATORS = """# Integrators
 

@@ -8,8 +8,8 @@ from textwrap import fill
 from typing import NamedTuple
 
 import hsdsl
-from hsdsl.execution import Execution
-from hsdsl.report.words import number
+from hsdsl.analysis.report.words import number
+from hsdsl.engine.execution import Execution
 
 ROOT = Path(__file__).parents[2]
 PICTURES = ROOT / "docs" / "images" / "models"

@@ -23,7 +23,7 @@ of the model's parameters as well, such as `"40*pi"`. Errors are [`ModelError`](
 [`UsageError`](#hsdslusageerror), of a request; their sentences are those of the command line.
 
 """
-RUN = "hsdsl.execution.parts."
+RUN = "hsdsl.engine.execution.parts."
 # heading: names, each with its members where it is a class
 SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
     "Load a model": (("hsdsl.load", ""), ("hsdsl.loads", ""), ("hsdsl.Limits", "")),
@@ -41,48 +41,51 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
             " sample_times",
         ),
         *((RUN + name, "") for name in ("Transition", "Stop", "Verdict", "Point", "Arc")),
-        ("hsdsl.execution.samples.Samples", "only columns to_pandas names labels"),
-        ("hsdsl.model.estimate.Estimate", "*"),
-        ("hsdsl.model.stream.Streamed", ""),
+        ("hsdsl.engine.execution.samples.Samples", "only columns to_pandas names labels"),
+        ("hsdsl.interface.model.estimate.Estimate", "*"),
+        ("hsdsl.interface.model.stream.Streamed", ""),
         ("hsdsl.store.load", ""),
         ("hsdsl.store.read_sidecar", ""),
     ),
     "Ensemble": (
-        ("hsdsl.execution.ensemble.Ensemble", "reasons failed failures run to_pandas"),
-        ("hsdsl.execution.ensemble.TransitionTable", ""),
-        ("hsdsl.execution.ensemble.Failure", ""),
+        ("hsdsl.engine.execution.ensemble.Ensemble", "reasons failed failures run to_pandas"),
+        ("hsdsl.engine.execution.ensemble.TransitionTable", ""),
+        ("hsdsl.engine.execution.ensemble.Failure", ""),
     ),
     "Sweep": (
         ("hsdsl.sweep.load", ""),
         ("hsdsl.sweep.Sweep", "rows done complete columns reasons batches table to_pandas plot summary"),
     ),
     "Derivatives, orbits, fits": (
-        ("hsdsl.sensitivity.result.Sensitivity", "*"),
-        *((f"hsdsl.sensitivity.result.{name}", "") for name in ("TransitionSlopes", "EndSlopes", "SampleSlopes")),
-        ("hsdsl.sensitivity.ties.Tie", ""),
-        ("hsdsl.fitting.fit.Fit", "*"),
-        ("hsdsl.orbits.orbit.Orbit", "*"),
-        ("hsdsl.orbits.branch.Branch", "*"),
-        ("hsdsl.orbits.continuation.Bifurcation", ""),
-        ("hsdsl.orbits.sampling.OrbitalStability", "*"),
+        ("hsdsl.analysis.sensitivity.result.Sensitivity", "*"),
+        *(
+            (f"hsdsl.analysis.sensitivity.result.{name}", "")
+            for name in ("TransitionSlopes", "EndSlopes", "SampleSlopes")
+        ),
+        ("hsdsl.analysis.sensitivity.ties.Tie", ""),
+        ("hsdsl.analysis.fitting.fit.Fit", "*"),
+        ("hsdsl.analysis.orbits.orbit.Orbit", "*"),
+        ("hsdsl.analysis.orbits.branch.Branch", "*"),
+        ("hsdsl.analysis.orbits.continuation.Bifurcation", ""),
+        ("hsdsl.analysis.orbits.sampling.OrbitalStability", "*"),
     ),
     "Distances": (
         ("hsdsl.distance", ""),
-        ("hsdsl.model.distances.distance_of_runs", ""),
-        ("hsdsl.metrics.interval.Interval", "width middle"),
-        ("hsdsl.metrics.paths.PointDistance", "status sentence"),
-        ("hsdsl.metrics.paths.PathPiece", ""),
-        ("hsdsl.metrics.paths.SpacePoint", ""),
+        ("hsdsl.interface.model.distances.distance_of_runs", ""),
+        ("hsdsl.analysis.metrics.interval.Interval", "width middle"),
+        ("hsdsl.analysis.metrics.paths.PointDistance", "status sentence"),
+        ("hsdsl.analysis.metrics.paths.PathPiece", ""),
+        ("hsdsl.analysis.metrics.paths.SpacePoint", ""),
         ("hsdsl.exact.reference", ""),
     ),
     "Errors": (
         ("hsdsl.ModelError", ""),
-        ("hsdsl.errors.Diagnostic", ""),
-        ("hsdsl.errors.Span", ""),
+        ("hsdsl.base.errors.Diagnostic", ""),
+        ("hsdsl.base.errors.Span", ""),
         ("hsdsl.UsageError", ""),
     ),
 }
-MADE = ("hsdsl.Limits", "hsdsl.metrics.paths.SpacePoint")  # classes that readers make themselves
+MADE = ("hsdsl.Limits", "hsdsl.analysis.metrics.paths.SpacePoint")  # classes that readers make themselves
 _ROLE = re.compile(r":(?:attr|class|data|func|meth|mod):`~?\.?([^`]+)`")
 _ERROR = re.compile(r"^Raises (\w+): ", re.MULTILINE)
 _ERRORS = re.compile(r"^Raises \w+: .+?(?=\n\n|\Z)", re.MULTILINE | re.DOTALL)

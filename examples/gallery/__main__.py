@@ -16,7 +16,7 @@ from gallery.pictures import DRAWN_AT, draw  # noqa: E402
 from gallery.records import Record, Records, joined, read, save, versions  # noqa: E402
 from gallery.scenes import Entry, entries  # noqa: E402
 from gallery.settings import Setting, own_settings, peer_settings  # noqa: E402
-from hsdsl.chart import PEERS  # noqa: E402
+from hsdsl.interface.chart import PEERS  # noqa: E402
 
 DOCS = EXAMPLES.parent / "docs"
 

@@ -8,8 +8,8 @@ from functools import partial
 
 from gallery.scenes import Entry
 from gallery.settings import Setting, run
-from hsdsl.chart.outcome import Outcome
-from hsdsl.processes import HANGS, Lost, in_processes
+from hsdsl.base.processes import HANGS, Lost, in_processes
+from hsdsl.interface.chart.outcome import Outcome
 
 LIMIT = 30.0  # processor seconds of a run
 SHORTER = {"stiff-switch": 8.0}  # most explicit runs would take all of it

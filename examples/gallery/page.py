@@ -11,8 +11,8 @@ from textwrap import fill
 from gallery.records import Record, Records
 from gallery.scenes import Entry
 from gallery.settings import MOST, WITHIN
-from hsdsl.chart import PEERS
-from hsdsl.simulate import SCHEMES
+from hsdsl.engine.simulate import SCHEMES
+from hsdsl.interface.chart import PEERS
 
 OURS = ("hsdsl c", "hsdsl python")
 OUTCOMES = ("right", "warns", "stops", "refuses", "wrong", "crashes", "hangs")  # from best to worst
@@ -52,7 +52,7 @@ Each cell counts outcomes: of ours over all methods and sizes and both engines, 
 
 {versions}
 
-Tools other than ours run as their documentation shows (`hsdsl/chart/peers`), with events restarted after each
+Tools other than ours run as their documentation shows (`hsdsl/interface/chart/peers`), with events restarted after each
 transition; some have options that help in some scenes. `casadi` and `diffrax` do not take every model. Our runs have
 methods of every order, explicit ones on stiff scenes too, tolerances of 1e-6 and 1e-9, steps of a thousandth and a
 ten-thousandth of the run, and at most {most:,} transitions; fixed steps are estimated (`--estimate`). The Python

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gallery.scenes import Entry
-from hsdsl.chart.peers import prepare
-from hsdsl.chart.scene import sampled
-from hsdsl.plot.style import ALARM, FAINT, INK, save
+from hsdsl.analysis.plot.style import ALARM, FAINT, INK, save
+from hsdsl.interface.chart.peers import prepare
+from hsdsl.interface.chart.scene import sampled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

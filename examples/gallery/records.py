@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from gallery.settings import Setting
-from hsdsl.chart import PEERS
-from hsdsl.chart.outcome import Outcome
+from hsdsl.interface.chart import PEERS
+from hsdsl.interface.chart.outcome import Outcome
 
 PACKAGES = {"sksundae": "scikit-sundae"}
 COLUMNS = ("scene", "tool", "scheme", "method", "tolerance", "step", "word", "verdict", "error", "transitions", "why")

@@ -7,11 +7,11 @@ from functools import cached_property
 from pathlib import Path
 
 from hsdsl import load
-from hsdsl.chart import Scene
-from hsdsl.exact import reference
-from hsdsl.execution import Execution
-from hsdsl.model import Model
-from hsdsl.store import load as load_execution
+from hsdsl.analysis.exact import reference
+from hsdsl.analysis.store import load as load_execution
+from hsdsl.engine.execution import Execution
+from hsdsl.interface.chart import Scene
+from hsdsl.interface.model import Model
 
 MODELS = Path(__file__).parents[2] / "models"
 GALLERY = MODELS / "gallery"

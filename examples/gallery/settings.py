@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from gallery.scenes import UNDECIDED, Entry
-from hsdsl.chart import PEERS, Refused
-from hsdsl.chart.outcome import WITHIN, Outcome, outcome
-from hsdsl.chart.peers import prepare
-from hsdsl.chart.plan import relaxation
-from hsdsl.chart.result import Tool
-from hsdsl.errors import UsageError
-from hsdsl.integrators import METHODS
-from hsdsl.model.options import OWN_FORMULA
-from hsdsl.simulate import SCHEMES
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.integrators import METHODS
+from hsdsl.engine.preparation.options import OWN_FORMULA
+from hsdsl.engine.simulate import SCHEMES
+from hsdsl.interface.chart import PEERS, Refused
+from hsdsl.interface.chart.outcome import WITHIN, Outcome, outcome
+from hsdsl.interface.chart.peers import prepare
+from hsdsl.interface.chart.plan import relaxation
+from hsdsl.interface.chart.result import Tool
 
 TOLERANCES = (1e-6, 1e-9)
 STEPS = (1e-3, 1e-4)  # of the run

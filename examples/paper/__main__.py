@@ -12,8 +12,8 @@ EXAMPLES = Path(__file__).parents[1]
 MODELS = EXAMPLES.parent / "models"
 sys.path[:0] = [str(EXAMPLES), str(MODELS)]
 
-from hsdsl.diagnose import render  # noqa: E402
-from hsdsl.errors import ModelError, UsageError  # noqa: E402
+from hsdsl.base.errors import ModelError, UsageError  # noqa: E402
+from hsdsl.language.diagnose import render  # noqa: E402
 from paper.parts import PARTS  # noqa: E402
 from paper.results import Desk, Finding, say  # noqa: E402
 

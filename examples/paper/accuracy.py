@@ -8,9 +8,9 @@ from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 
-from hsdsl.execution import Execution
-from hsdsl.model import Model
-from hsdsl.model.distances import distance_of_runs as distance
+from hsdsl.engine.execution import Execution
+from hsdsl.interface.model import Model
+from hsdsl.interface.model.distances import distance_of_runs as distance
 from paper.results import Desk, Finding, say
 
 RATIOS = (2e-2, 2e-3, 2e-4, 2e-5)  # relaxation over step

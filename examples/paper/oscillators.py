@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hsdsl.execution import Execution
-from hsdsl.model import Model
+from hsdsl.engine.execution import Execution
+from hsdsl.interface.model import Model
 from paper.results import Desk, Finding
 
 TABLE = {  # as printed; u at t = 0 and t = 1

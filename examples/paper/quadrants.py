@@ -9,12 +9,12 @@ from typing import Any
 
 import references.digital_control as exact
 
-from hsdsl.execution import Execution
-from hsdsl.metrics.curves import rho
-from hsdsl.metrics.points import SpaceMetric, SpacePoint
-from hsdsl.metrics.space import make_space
-from hsdsl.model import Model
-from hsdsl.model.distances import distance_of_runs as distance
+from hsdsl.analysis.metrics.curves import rho
+from hsdsl.analysis.metrics.points import SpaceMetric, SpacePoint
+from hsdsl.analysis.metrics.space import make_space
+from hsdsl.engine.execution import Execution
+from hsdsl.interface.model import Model
+from hsdsl.interface.model.distances import distance_of_runs as distance
 from paper.results import Desk, Finding, say
 
 DELTAS = tuple(Fraction(1, 10**k) for k in range(1, 7))

@@ -11,11 +11,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from hsdsl.errors import UsageError
-from hsdsl.exact import reference
-from hsdsl.execution import Execution
-from hsdsl.model import Model, load
-from hsdsl.store.atomic import replacing
+from hsdsl.analysis.exact import reference
+from hsdsl.base.atomic import replacing
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution
+from hsdsl.interface.model import Model, load
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Desk:
 
     def picture(self, name: str, draw: Callable[[], Any]) -> None:
         """Write the figure that ``draw`` makes as ``NAME.png`` and ``NAME.svg``."""
-        from hsdsl.plot import save
+        from hsdsl.analysis.plot import save
 
         save(draw, self.out / f"{name}.png", self.out / f"{name}.svg")
         say(f"  wrote {self.out / name}.png and .svg")

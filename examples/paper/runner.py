@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hsdsl.execution import Execution
+from hsdsl.engine.execution import Execution
 from paper.results import Desk, Finding
 
 Array = npt.NDArray[Any]

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import astuple, dataclass, fields
 from typing import Any
 
-from hsdsl.errors import UsageError
-from hsdsl.execution import Execution
-from hsdsl.model import Model
-from hsdsl.model.engines import ENGINES
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.preparation.engines import ENGINES
+from hsdsl.interface.model import Model
 from paper.accuracy import rho_hat
 from paper.results import Desk, Finding, say
 

@@ -15,13 +15,13 @@ from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
-from hsdsl.errors import UsageError
-from hsdsl.names import did_you_mean
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import did_you_mean
 
 if TYPE_CHECKING:
+    from hsdsl.base.atomic import New
     from hsdsl.export.source import Source
-    from hsdsl.model import Model
-    from hsdsl.store.atomic import New
+    from hsdsl.interface.model import Model
 
 __all__ = ["TARGETS", "Modes", "check_folder", "check_scheme", "check_target", "files_of", "source_of", "write"]
 
@@ -98,7 +98,7 @@ def write(files: Mapping[str, bytes], folder: Path, force: bool = False) -> list
 
     Raises UsageError: the folder has entries and ``force`` is not given, or it cannot be written.
     """
-    from hsdsl.store.atomic import unplaced
+    from hsdsl.base.atomic import unplaced
 
     check_folder(folder, force)
     paths, folders = [folder / PurePosixPath(name) for name in files], list[Path]()

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from hsdsl.elaborate import elaborate_files
 from hsdsl.export.source import Source
-from hsdsl.expression.plain import names_in
-from hsdsl.expression.syntax import ExpressionError
-from hsdsl.schema import ModelDocument, SystemDocument
+from hsdsl.language.elaborate import elaborate_files
+from hsdsl.language.expression.plain import names_in
+from hsdsl.language.expression.syntax import ExpressionError
+from hsdsl.language.schema import ModelDocument, SystemDocument
 
 Pairs = list[tuple[str, str]]  # names and texts of expressions
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hsdsl.errors import UsageError
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.integrators import AUTO, INTEGRATORS, ButcherTableau
 from hsdsl.export.source import Source
-from hsdsl.integrators import AUTO, INTEGRATORS, ButcherTableau
 
 
 def explicit(source: Source, target: str) -> tuple[Source, ButcherTableau]:

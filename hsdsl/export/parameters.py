@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from hsdsl.base.parts import numbered
+from hsdsl.engine.simulate import Problem
 from hsdsl.export.routines import definitions, parameters_in
-from hsdsl.parts import numbered
-from hsdsl.program import Program
-from hsdsl.simulate import Problem
+from hsdsl.mathematics.program import Program
 
 
 def derived(problem: Problem) -> set[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 
-from hsdsl.program import ModeProgram, Program, Routines
+from hsdsl.mathematics.program import ModeProgram, Program, Routines
 
 
 def definitions(routines: Routines) -> dict[str, ast.FunctionDef]:

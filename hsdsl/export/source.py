@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from hsdsl import __version__
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.backends.python import PythonKernel
-from hsdsl.errors import UsageError
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import visible
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.engine.backends.python import PythonKernel
+from hsdsl.engine.preparation.pipeline import Pipeline
+from hsdsl.engine.simulate import Problem
 from hsdsl.export.identifiers import ascii_name
-from hsdsl.lower import lower_constants
-from hsdsl.model import Model
-from hsdsl.model.pipeline import Pipeline
-from hsdsl.names import visible
-from hsdsl.simulate import Problem
-from hsdsl.system import HybridSystem, started
+from hsdsl.interface.model import Model
+from hsdsl.language.system import HybridSystem, started
+from hsdsl.mathematics.lower import lower_constants
 
 LONGEST = 40  # letters of a name: some languages read 63 of an identifier, and something is put behind it
 
@@ -101,6 +101,6 @@ def _with_given_start(source: Source) -> Source:
 
 
 def drivable(source: Source) -> Source:
-    """The same source with inputs of time that can be driven from outside; see `hsdsl.elaborate.drivable`."""
+    """The same source with inputs of time that can be driven from outside; see `hsdsl.language.elaborate.drivable`."""
     system, problem = _prepared(source.model.pipeline.drivable(), source.arguments)
     return replace(source, system=system, problem=problem)

@@ -1,4 +1,4 @@
-"""Generators of the exact executions in ``hsdsl/exact/stored``: equations by hand, solved without the simulator.
+"""Generators of the exact executions in ``hsdsl/analysis/exact/stored``: equations by hand, solved without the simulator.
 
 ======================  =======================================================================================
 `build`                 the executions of each model; solves them and writes them

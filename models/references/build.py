@@ -20,9 +20,9 @@ if __name__ == "__main__":
     sys.path.insert(0, str(MODELS))
 
 import hsdsl  # noqa: E402
-from hsdsl.exact.references import STORED, references_of  # noqa: E402
-from hsdsl.exact.refined import difference  # noqa: E402
-from hsdsl.execution import Execution  # noqa: E402
+from hsdsl.analysis.exact.references import STORED, references_of  # noqa: E402
+from hsdsl.analysis.exact.refined import difference  # noqa: E402
+from hsdsl.engine.execution import Execution  # noqa: E402
 from references.bouncing_ball import bouncing_ball  # noqa: E402
 from references.constrained_pendulum import constrained_pendulum  # noqa: E402
 from references.digital_control import digital_control  # noqa: E402

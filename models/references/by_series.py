@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hsdsl.errors import UsageError
-from hsdsl.exact.interpolation import mp
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import mp
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 from references.taylor import ORDER, Mode, Solved, digits, solve
 

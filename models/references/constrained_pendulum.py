@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hsdsl.exact.interpolation import Number, mp
-from hsdsl.execution import Execution
+from hsdsl.analysis.exact.interpolation import Number, mp
+from hsdsl.engine.execution import Execution
 from references.by_series import by_series
 from references.series import Flow, Series, States, sin_cos
 from references.taylor import Edge, Mode

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from hsdsl.errors import UsageError
-from hsdsl.exact.interpolation import Number, Stretch, Vector, mp, number
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp, number
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 
 SOURCE = "closed form: straight lines from axis to axis (Burden et al. 2013, Fig. 1)"

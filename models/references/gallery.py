@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
-from hsdsl.exact.interpolation import Number, Stretch, mp
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, mp
+from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 from references.gallery_balls import BALLS
 from references.gallery_series import lorenz_section, stick_slip

@@ -7,8 +7,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from hsdsl.exact.interpolation import Number, Stretch, Vector, mp
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
+from hsdsl.engine.execution import Execution, Verdict
 from references.bouncing_ball import bounces, bouncing_ball
 from references.closed_form import ClosedForm, as_execution
 from references.rests import UNRESOLVED, tail

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from hsdsl.exact.interpolation import mp
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import mp
+from hsdsl.engine.execution import Execution, Verdict
 from references.by_series import by_series
 from references.series import Series, States
 from references.taylor import Edge, Mode

@@ -7,8 +7,8 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.exact.interpolation import Number, Stretch, mp
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, mp
+from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 from references.terms import Terms, polynomial, stretch, wave
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.exact.interpolation import Number, Vector, mp
-from hsdsl.execution import Array
+from hsdsl.analysis.exact.interpolation import Number, Vector, mp
+from hsdsl.engine.execution import Array
 
 REST = mp.mpf(10) ** -25  # impacts slower than this are summed; flights down to it cancel half of the digits
 

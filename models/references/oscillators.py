@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from hsdsl.errors import UsageError
-from hsdsl.exact.interpolation import Number, Stretch, Vector, mp
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 from references.impact_oscillator import Flight, Motion, exact_example_1, exact_example_2
 from references.rests import UNRESOLVED, rest, tail

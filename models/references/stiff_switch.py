@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.errors import UsageError
-from hsdsl.exact.interpolation import Number, Stretch, Vector, mp, number
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp, number
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 
 SOURCE = "closed form: two exponentials a mode; its switches by Newton's method in eighty digits"

@@ -15,8 +15,8 @@ from itertools import pairwise
 from math import floor
 from typing import Any
 
-from hsdsl.errors import UsageError
-from hsdsl.exact.interpolation import Number, Stretch, Vector, mp
+from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
+from hsdsl.base.errors import UsageError
 from references.series import Flow, Series, States, solution, value, values
 
 ORDER = 40

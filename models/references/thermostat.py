@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.errors import UsageError
-from hsdsl.exact.interpolation import Number, Stretch, Vector, mp, number
-from hsdsl.execution import Execution, Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp, number
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 
 SOURCE = "closed form: exponentials, and logarithms for the times between switches"

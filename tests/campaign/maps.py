@@ -11,7 +11,7 @@ from math import cos
 from random import Random
 from typing import Any, NamedTuple
 
-from hsdsl.arithmetic import multiprecision
+from hsdsl.base.numbers.arithmetic import multiprecision
 
 DIGITS = 60
 NUMERAL = re.compile(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?(?![\w.])")

@@ -12,7 +12,7 @@ import pytest
 import hsdsl
 from campaign.families import FAMILIES, Family
 from campaign.reference import Outcome
-from hsdsl.model.estimate import corrected_times
+from hsdsl.interface.model.estimate import corrected_times
 
 METHODS = ("auto", "taylor", "dopri5", "dop853", "radau")
 MANY, FEW = 450, 6

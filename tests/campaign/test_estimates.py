@@ -11,7 +11,7 @@ import pytest
 from campaign.families import FAMILIES
 from campaign.test_campaign import NOT_FOR_RELAXED
 from hsdsl import Execution, loads
-from hsdsl.model.estimate import Estimate
+from hsdsl.interface.model.estimate import Estimate
 
 FIXED = ("euler", "midpoint", "heun", "ralston", "rk4", "dopri5", "dop853")
 MANY = 40  # runs of each family

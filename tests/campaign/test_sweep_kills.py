@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.sweep import load
+from hsdsl.analysis.sweep import load
 
 pytestmark = pytest.mark.campaign
 MODEL = Path(__file__).parents[2] / "models" / "oscillator-with-stop-1.yaml"

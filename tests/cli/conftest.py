@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from hsdsl.cli import main
+from hsdsl.interface.cli import main
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from typing import get_args
 
 import pytest
 
-from hsdsl.cli import options
-from hsdsl.model.engines import ENGINES
-from hsdsl.simulate import SCHEMES
+from hsdsl.engine.preparation.engines import ENGINES
+from hsdsl.engine.simulate import SCHEMES
+from hsdsl.interface.cli import options
 
 ROOT = Path(__file__).parents[2]
 SHELLS = ("bash", "zsh")

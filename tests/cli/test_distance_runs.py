@@ -8,7 +8,7 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.store import load
+from hsdsl.analysis.store import load
 
 THERMOSTAT, QUADRANTS = MODELS / "thermostat.yaml", MODELS / "digital-control.yaml"
 

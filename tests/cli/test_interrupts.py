@@ -18,10 +18,10 @@ from signals import interruptible
 BALL = str(MODELS / "bouncing-ball.yaml")
 START = """
 import os
-from hsdsl import interrupts
+from hsdsl.base import interrupts
 interrupts.expect()
 os.write(1, b".")
-from hsdsl.cli import main
+from hsdsl.interface.cli import main
 main()
 """
 COMMANDS = {
@@ -67,9 +67,13 @@ def test_control_c_at_any_moment(verb, times, tmp_path):
 
 
 def test_next_to_nothing_is_imported_before_control_c_is_expected():
-    code = "import sys; before = {*sys.modules}; import hsdsl.cli; print(*sys.modules.keys() - before)"
+    code = "import sys; before = {*sys.modules}; import hsdsl.interface.cli; print(*sys.modules.keys() - before)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert {name for name in loaded if name.startswith("hsdsl")} == {"hsdsl", "hsdsl.cli", "hsdsl.interrupts"}
+    assert {name for name in loaded if name.startswith("hsdsl")} == {
+        "hsdsl",
+        "hsdsl.interface.cli",
+        "hsdsl.base.interrupts",
+    }
     assert not {"dataclasses", "re", "typing"} & {*loaded}  # the first of what takes long
 
 

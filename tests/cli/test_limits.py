@@ -10,13 +10,13 @@ import pytest
 import sympy as sp
 
 import hsdsl
-from hsdsl import limits
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.expression import symbolic
-from hsdsl.expression.timebox import OutOfTime, timebox
-from hsdsl.limits import Limits, applied
-from hsdsl.lower import lower
+from hsdsl.base import limits
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.base.limits import Limits, applied
+from hsdsl.language.elaborate import elaborate
+from hsdsl.language.expression import symbolic
+from hsdsl.language.expression.timebox import OutOfTime, timebox
+from hsdsl.mathematics.lower import lower
 
 MODEL = b"""hsdsl: 1
 modes: {A: {flow: {x: 1, v: sin(x)}}}
@@ -95,7 +95,7 @@ def test_a_profiler_does_not_hang_after_a_box_that_ran_out():
     """CPython 3.11 looks for ever for an exception that was taken back."""
     program = (
         "import sys\n"
-        "from hsdsl.expression.timebox import OutOfTime, timebox\n"
+        "from hsdsl.language.expression.timebox import OutOfTime, timebox\n"
         "try:\n"
         "    with timebox(0.02):\n"
         "        while True: pass\n"
@@ -120,7 +120,7 @@ def test_an_expression_that_takes_too_long_is_an_error_at_its_place(monkeypatch)
 
 def test_lowering_that_takes_too_long_is_an_error(monkeypatch):
     system = elaborate("m.yaml", text=MODEL)
-    monkeypatch.setattr("hsdsl.lower.print_routines", busy)
+    monkeypatch.setattr("hsdsl.mathematics.lower.print_routines", busy)
     with pytest.raises(ModelError) as raised, applied(Limits(seconds=0.1)):
         lower(system)
     assert [d.code for d in raised.value.diagnostics] == ["HS122"]

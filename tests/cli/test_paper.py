@@ -16,7 +16,7 @@ from paper.parts import PARTS
 from paper.runner import CAPTION, KNOWN, guard_curves, snapshots
 
 from hsdsl import load
-from hsdsl.exact import reference
+from hsdsl.analysis.exact import reference
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "paper.md"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hsdsl.cli.sweep import Pace, duration
+from hsdsl.interface.cli.sweep import Pace, duration
 
 DECAY = """hsdsl: 1
 title: Decay
@@ -94,7 +94,7 @@ def test_ctrl_c_says_how_far_it_is_and_how_to_go_on(command, model, tmp_path, mo
 
 def test_progress_shows_rate_and_time_left(monkeypatch):
     clock = [100.0]
-    monkeypatch.setattr("hsdsl.cli.sweep.time.monotonic", lambda: clock[0])
+    monkeypatch.setattr("hsdsl.interface.cli.sweep.time.monotonic", lambda: clock[0])
     pace = Pace()
     pace.note(100, 1100)  # a sweep that goes on
     assert pace.text(10) == "[=         ] 100 of 1,100 rows"

@@ -13,7 +13,7 @@ from engines import COMPILER
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.cli.verbs import VERBS
+from hsdsl.interface.cli.verbs import VERBS
 
 SLIDING = """hsdsl: 1
 modes:
@@ -82,7 +82,7 @@ def test_doctor(command):
 def test_help_imports_no_library():
     helps = [["--help"], *([verb, "--help"] for verb in VERBS)]
     program = (
-        "import sys\nfrom hsdsl.cli.verbs import obey\n"
+        "import sys\nfrom hsdsl.interface.cli.verbs import obey\n"
         f"codes = [obey(words) for words in {helps}]\n"
         "print(*codes, *({'numpy', 'sympy', 'pydantic', 'yaml', 'matplotlib', 'rich'} & set(sys.modules)), sep='+')"
     )

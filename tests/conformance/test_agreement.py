@@ -15,8 +15,8 @@ from conformance.test_conformance import CASES, SETTINGS, Run, given, model, rea
 from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
-from hsdsl.integrators import METHODS
-from hsdsl.runtime.structures import SCHEMES
+from hsdsl.engine.integrators import METHODS
+from hsdsl.engine.runtime.structures import SCHEMES
 
 pytestmark = needs_compiler
 COMPILED = list(product(SCHEMES, METHODS))

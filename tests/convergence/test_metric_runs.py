@@ -9,7 +9,7 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.model.distances import distance_of_runs as distance
+from hsdsl.interface.model.distances import distance_of_runs as distance
 
 EPS = 1e-9
 SIZES = [1e-1, 1e-3, 1e-6]

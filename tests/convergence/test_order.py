@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from convergence.scene import SCENES, Scene, slope
 
-from hsdsl.integrators import INTEGRATORS, METHODS
+from hsdsl.engine.integrators import INTEGRATORS, METHODS
 
 FIXED = [name for name, table in INTEGRATORS.items() if table.embedded is None]
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]

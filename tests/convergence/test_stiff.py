@@ -15,8 +15,8 @@ from engines import assert_engines_agree, needs_compiler
 from scipy.integrate import solve_ivp
 
 import hsdsl
-from hsdsl.elaborate import elaborate
-from hsdsl.model import Model
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 PROBLEMS = {path.stem: path for path in sorted((Path(__file__).parent / "stiff").glob("*.yaml"))}
 TOLERANCES = (1e-4, 1e-6, 1e-8)

@@ -9,8 +9,8 @@ import pytest
 from convergence.scene import slope
 from convergence.theorem_scenes import BEFORE_ZENO, LONG, OTHER, SCENES, known
 
-from hsdsl.integrators import INTEGRATORS
-from hsdsl.model.distances import distance_of_runs as distance
+from hsdsl.engine.integrators import INTEGRATORS
+from hsdsl.interface.model.distances import distance_of_runs as distance
 
 FIXED = [name for name, table in INTEGRATORS.items() if table.embedded is None]
 ALL = {**SCENES, **LONG, **BEFORE_ZENO}

@@ -16,8 +16,8 @@ from exact.relaxed import delayed, relaxed_oscillator
 from references.impact_oscillator import exact_example_1, exact_example_2
 
 import hsdsl
-from hsdsl.exact.references import reference
-from hsdsl.model.distances import distance_of_runs as distance
+from hsdsl.analysis.exact.references import reference
+from hsdsl.interface.model.distances import distance_of_runs as distance
 
 ROOT = Path(__file__).parents[2]
 HERE = Path(__file__).parent / "scenes"

@@ -36,8 +36,8 @@ import pytest
 from typer import Context
 
 import hsdsl
-from hsdsl.cli import main
-from hsdsl.cli.verbs import VERBS, command
+from hsdsl.interface.cli import main
+from hsdsl.interface.cli.verbs import VERBS, command
 
 ROOT = Path(__file__).parent.parent.parent
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from docs.test_documents import run_hsdsl
 
-from hsdsl.cli.verbs import VERBS, command
+from hsdsl.interface.cli.verbs import VERBS, command
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "reference" / "files.md").read_text(encoding="utf-8")

@@ -9,8 +9,8 @@ from typing import Any
 
 from references.closed_form import ClosedForm, as_execution
 
-from hsdsl.exact.interpolation import Number, Stretch, Vector, mp
-from hsdsl.execution import Verdict
+from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
+from hsdsl.engine.execution import Verdict
 
 STATES = {"line": ("x",), "plane": ("x", "y"), "space": ("x", "y", "z"), "last": ("x",)}
 

@@ -10,8 +10,8 @@ from references.closed_form import ClosedForm, as_execution
 from references.impact_oscillator import Flight, Motion
 from references.rests import rest
 
-from hsdsl.exact.interpolation import Stretch, mp
-from hsdsl.execution import Arc, Verdict
+from hsdsl.analysis.exact.interpolation import Stretch, mp
+from hsdsl.engine.execution import Arc, Verdict
 
 
 def delayed(run: Any, eps: float) -> Any:

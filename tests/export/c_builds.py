@@ -12,10 +12,10 @@ from pathlib import Path
 from shutil import which
 from typing import Any
 
+from hsdsl.engine.runtime.library import RUNTIME
 from hsdsl.export import files_of, source_of, write
 from hsdsl.export.c.sources import COMPILED, EXACT_FLAGS
-from hsdsl.model import Model
-from hsdsl.runtime.library import RUNTIME
+from hsdsl.interface.model import Model
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
 COMPILERS: dict[str, list[str]] = {name: [path] for name in ("gcc", "clang") if (path := which(name))}

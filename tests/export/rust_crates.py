@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 from export.c_builds import cached_compiler, exported
 
-from hsdsl.model import Model
-from hsdsl.report import as_json
+from hsdsl.analysis.report import as_json
+from hsdsl.interface.model import Model
 
 CARGO = which("cargo")
 needs_cargo = [pytest.mark.tools, pytest.mark.skipif(CARGO is None, reason="there is no cargo")]

@@ -15,12 +15,12 @@ from export.c_builds import COMPILERS, OF_PACKAGES, USING, built, exported, obje
 from shipped import MODELS, assert_golden
 
 import hsdsl
-from hsdsl.cli.verbs import obey
+from hsdsl.analysis.report import as_json
+from hsdsl.engine.runtime.library import RUNTIME
 from hsdsl.export import files_of, source_of
 from hsdsl.export.c.readme import MEASURED, SMALL, SMALL_MEASURED
 from hsdsl.export.c.sources import COMPILED, c_sources
-from hsdsl.report import as_json
-from hsdsl.runtime.library import RUNTIME
+from hsdsl.interface.cli.verbs import obey
 
 EVENTS = Path(__file__).parents[1] / "conformance" / "events"
 FAST = {"bouncing-ball", "thermostat", "digital-control"}

@@ -13,11 +13,11 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.cli.export import only_text
-from hsdsl.cli.verbs import obey
-from hsdsl.errors import UsageError
+from hsdsl.base.errors import UsageError
 from hsdsl.export import TARGETS, files_of, source_of, write
 from hsdsl.export.identifiers import identifiers
+from hsdsl.interface.cli.export import only_text
+from hsdsl.interface.cli.verbs import obey
 
 BALL = str(MODELS / "bouncing-ball.yaml")
 

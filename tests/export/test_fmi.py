@@ -17,11 +17,11 @@ from export.c_builds import COMPILERS, USING, WARNINGS
 from shipped import MODELS, assert_golden
 
 import hsdsl
-from hsdsl.execution.run import Execution
+from hsdsl.engine.execution.run import Execution
 from hsdsl.export import files_of, source_of
 from hsdsl.export.fmi import archive
 from hsdsl.export.fmi.variables import nominals, unit_of
-from hsdsl.model import Model
+from hsdsl.interface.model import Model
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
 from fmpy.fmi1 import FMICallException  # noqa: E402

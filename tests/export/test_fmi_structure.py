@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.cli.verbs import obey
 from hsdsl.export import Modes, files_of, source_of
 from hsdsl.export.fmi import archive
 from hsdsl.export.fmi.variables import unit_of
+from hsdsl.interface.cli.verbs import obey
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed: pip install 'hsdsl[export]'")
 from fmpy.validation import validate_fmu  # noqa: E402

@@ -17,8 +17,8 @@ import pytest
 from shipped import assert_golden
 
 import hsdsl
-from hsdsl.cli.verbs import obey
 from hsdsl.export import files_of, source_of
+from hsdsl.interface.cli.verbs import obey
 
 # a product and a sum in one instruction round once: how deep a relaxed step ends in a strip may turn on that
 os.environ.setdefault("XLA_FLAGS", "--xla_cpu_max_isa=AVX")

@@ -14,7 +14,7 @@ from export.octave import OCTAVE, assert_runs, evaluated, exported
 from shipped import assert_golden
 
 import hsdsl
-from hsdsl.errors import UsageError
+from hsdsl.base.errors import UsageError
 from hsdsl.export import files_of, source_of
 from hsdsl.export.c.sources import EXACT_FLAGS
 

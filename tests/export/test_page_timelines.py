@@ -10,12 +10,12 @@ import pytest
 from export.c_builds import COMPILERS
 
 import hsdsl
+from hsdsl.engine.runtime.library import RUNTIME
+from hsdsl.engine.simulate import Problem
 from hsdsl.export import source_of
 from hsdsl.export.c.sources import c_sources
 from hsdsl.export.web.numbers import page_numbers
 from hsdsl.export.web.wasm import PARTS
-from hsdsl.runtime.library import RUNTIME
-from hsdsl.simulate import Problem
 
 MAIN = r"""
 #include <stdio.h>

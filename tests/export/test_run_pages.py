@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from export.web_pages import browser, complaints, in_browser
 
-from hsdsl.plot import plot
+from hsdsl.analysis.plot import plot
 
 BALL = hand_made.bouncing_ball(bounces=4)
 OTHER = hand_made.bouncing_ball(bounces=3, restitution="0.25")

@@ -24,15 +24,15 @@ from export.web_pages import (
 from shipped import MODELS, assert_golden
 
 import hsdsl
-from hsdsl.cli.verbs import obey
-from hsdsl.errors import UsageError
+from hsdsl.analysis.report import as_json
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import without_memory
 from hsdsl.export import files_of, source_of
 from hsdsl.export.web import numbers as page_numbers
 from hsdsl.export.web import wasm
 from hsdsl.export.web.model import model_of
-from hsdsl.model import Model
-from hsdsl.names import without_memory
-from hsdsl.report import as_json
+from hsdsl.interface.cli.verbs import obey
+from hsdsl.interface.model import Model
 
 CONFORMANCE = Path(__file__).parents[1] / "conformance" / "cases"
 # inputs of each kind, linear switches of time, derived parameters, and settings that follow parameters

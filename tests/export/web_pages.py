@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from hsdsl.export import files_of, source_of, write
-from hsdsl.model import Model
+from hsdsl.interface.model import Model
 
 CHROMIUM = next(filter(None, map(which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = which("chromedriver")

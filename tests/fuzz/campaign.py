@@ -35,7 +35,7 @@ sys.path[:0] = [str(Path(__file__).resolve().parents[1]), str(Path(__file__).res
 sys.path = [entry for entry in sys.path if Path(entry or ".").resolve() != Path(__file__).resolve().parent]
 
 from fuzz import generators, targets  # noqa: E402
-from hsdsl.processes import Lost, in_processes  # noqa: E402
+from hsdsl.base.processes import Lost, in_processes  # noqa: E402
 
 Block = tuple["Counter[str]", list[dict[str, Any]], "Times", int]  # how far inputs got, faults, times, peak of memory
 KINDS = {"bytes": generators.raw, "expressions": generators.expression, "documents": generators.document}

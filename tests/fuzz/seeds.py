@@ -66,8 +66,8 @@ def documents(legal: bool = False) -> tuple[bytes, ...]:
 @cache
 def expressions() -> tuple[str, ...]:
     """The expressions of the models and the conformance cases."""
-    from hsdsl.errors import Findings
-    from hsdsl.source import Mapping, Node, Scalar, Sequence, compose, decode
+    from hsdsl.base.errors import Findings
+    from hsdsl.language.source import Mapping, Node, Scalar, Sequence, compose, decode
 
     found: dict[str, None] = {}
 

@@ -15,22 +15,22 @@ from typing import Any
 import yaml
 
 from fuzz import late, seeds
-from hsdsl import limits
-from hsdsl.backends.c import model_source
-from hsdsl.backends.c.source import _HEAD
-from hsdsl.diagnose import as_json, render
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.expression import ExpressionError, parse, symbolic
-from hsdsl.expression.inequality import inequality
-from hsdsl.expression.scope import Scope, Value, state, symbol
-from hsdsl.expression.stack import deep_stack
-from hsdsl.expression.timebox import PARTS, OutOfTime, timebox
-from hsdsl.functions import replaced
-from hsdsl.lower.routines import Definition, print_routines
-from hsdsl.lower.straight import Gradient
-from hsdsl.model import Model
-from hsdsl.system import TIME
+from hsdsl.base import limits
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.base.functions import replaced
+from hsdsl.engine.backends.c import model_source
+from hsdsl.engine.backends.c.source import _HEAD
+from hsdsl.interface.model import Model
+from hsdsl.language.diagnose import as_json, render
+from hsdsl.language.elaborate import elaborate
+from hsdsl.language.expression import ExpressionError, parse, symbolic
+from hsdsl.language.expression.inequality import inequality
+from hsdsl.language.expression.scope import Scope, Value, state, symbol
+from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.language.system import TIME
+from hsdsl.mathematics.lower.routines import Definition, print_routines
+from hsdsl.mathematics.lower.straight import Gradient
 
 assert late.LATE  # before anything is watched
 SCOPE = Scope(

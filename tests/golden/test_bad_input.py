@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from shipped import assert_golden, bad_models
 
-from hsdsl.diagnose import as_json, render
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import CODES, TOO_LONG, ModelError
+from hsdsl.base.errors import CODES, TOO_LONG, ModelError
+from hsdsl.language.diagnose import as_json, render
+from hsdsl.language.elaborate import elaborate
 
 FOLDER = Path(__file__).parent / "bad"
 CASES = bad_models()

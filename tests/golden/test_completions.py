@@ -10,7 +10,7 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.lint import Selection, lint
+from hsdsl.analysis.lint import Selection, lint
 
 METHODS = ["taylor", "dopri5", "radau"]
 ENGINES = ["python", "c"]
@@ -459,7 +459,7 @@ def test_long_transitions_are_written_a_line_for_each_key() -> None:
 
 
 def test_nothing_to_complete_is_said(tmp_path: Any, capsys: Any) -> None:
-    from hsdsl.cli.verbs import obey
+    from hsdsl.interface.cli.verbs import obey
 
     path = tmp_path / "m.yaml"
     path.write_text("hsdsl: 1\nmodes: {a: {flow: {x: 1}}}\ninitial: {mode: a, x: 0}\nexperiment: {until: 1}\n")

@@ -13,8 +13,8 @@ import pytest
 from engines import assert_engines_agree
 
 import hsdsl
-from hsdsl.completion.nearby import size
-from hsdsl.completion.overlay import overlay
+from hsdsl.mathematics.completion.nearby import size
+from hsdsl.mathematics.completion.overlay import overlay
 
 ENGINES = ["python", "c"]
 TOWER = """

@@ -22,9 +22,9 @@ from scipy.integrate import solve_ivp
 from shipped import shipped
 
 import hsdsl
-from hsdsl import exact
-from hsdsl.exact.residual import residual
-from hsdsl.store import load
+from hsdsl.analysis import exact
+from hsdsl.analysis.exact.residual import residual
+from hsdsl.analysis.store import load
 
 ZENO = 12.850588106343579
 

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl import store
-from hsdsl.store import npz, sidecar
-from hsdsl.sweep import load, manifest
+from hsdsl.analysis import store
+from hsdsl.analysis.store import npz, sidecar
+from hsdsl.analysis.sweep import load, manifest
 
 FORMATS = Path(__file__).parent / "formats"
 MODEL = FORMATS / "model.yaml"

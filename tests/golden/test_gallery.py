@@ -15,9 +15,9 @@ from references.gallery import GALLERY as SOLVED
 from references.gallery import two_ways
 
 import hsdsl
-from hsdsl.chart.outcome import WITHIN, Tolerance, outcome
-from hsdsl.chart.result import Result
-from hsdsl.execution import Verdict
+from hsdsl.engine.execution import Verdict
+from hsdsl.interface.chart.outcome import WITHIN, Tolerance, outcome
+from hsdsl.interface.chart.result import Result
 
 SCENES = entries()
 BY_SERIES = {"lorenz-section", "stick-slip"}

@@ -8,7 +8,7 @@ from gallery.page import page
 from gallery.records import read, save
 from gallery.scenes import entries
 
-from hsdsl.chart import PEERS
+from hsdsl.interface.chart import PEERS
 
 SCENES = entries()
 DOCS = Path(__file__).parents[2] / "docs"

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from hsdsl.cli import main
-from hsdsl.names import counted
+from hsdsl.base.names import counted
+from hsdsl.interface.cli import main
 
 FOLDER = Path(__file__).parent
 DATA = yaml.safe_load((FOLDER / "mistakes.yaml").read_text(encoding="utf-8"))

@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 from shipped import MODELS, shipped
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.backends.python import PythonKernel
-from hsdsl.exact import reference
-from hsdsl.exact.references import STORED
-from hsdsl.exact.residual import residual
+from hsdsl.analysis.exact import reference
+from hsdsl.analysis.exact.references import STORED
+from hsdsl.analysis.exact.residual import residual
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.engine.backends.python import PythonKernel
 
 KEPT = [(name, block) for name, solutions in REFERENCES.items() for block in range(len(solutions))]
 KEPT_IDS = [f"{name}-{block}" for name, block in KEPT]

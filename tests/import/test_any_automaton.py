@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsdsl
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.limits import Limits, applied
-from hsdsl.spaceex import imported
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.base.limits import Limits, applied
+from hsdsl.interface.imports.spaceex import imported
 
 FOLDER = Path(__file__).parent
 RATES = st.sampled_from(["1", "-1", "0.5", "v", "-v", "x - v", "-2*x + 0.3", "0"])

@@ -8,9 +8,9 @@ import pytest
 from automata import component, location, model, param, transition
 
 import hsdsl
-from hsdsl.cli.verbs import obey
-from hsdsl.errors import ModelError
-from hsdsl.spaceex import imported
+from hsdsl.base.errors import ModelError
+from hsdsl.interface.cli.verbs import obey
+from hsdsl.interface.imports.spaceex import imported
 
 X, V = param("x"), param("v")
 

@@ -10,10 +10,10 @@ import pytest
 import yaml
 
 import hsdsl
-from hsdsl import limits
-from hsdsl.cli.verbs import obey
-from hsdsl.sbml import converted, imported
-from hsdsl.source.xml import read_xml
+from hsdsl.base import limits
+from hsdsl.interface.cli.verbs import obey
+from hsdsl.interface.imports.sbml import converted, imported
+from hsdsl.language.source.xml import read_xml
 
 MATH = '<math xmlns="http://www.w3.org/1998/Math/MathML">{}</math>'
 SPECIES = (

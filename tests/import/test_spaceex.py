@@ -11,8 +11,8 @@ from shipped import assert_golden
 from switch_times import BY_NAME
 
 import hsdsl
-from hsdsl.cli.verbs import obey
-from hsdsl.spaceex import imported
+from hsdsl.interface.cli.verbs import obey
+from hsdsl.interface.imports.spaceex import imported
 
 FOLDER = Path(__file__).parent
 

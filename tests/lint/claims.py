@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import hsdsl
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.lint import Selection, lint
+from hsdsl.analysis.lint import Selection, lint
+from hsdsl.base.errors import ModelError, UsageError
 
 LEVELS = ("0", "1", "-1", "1/2")
 NAMES = ("x", "y", "z")

@@ -9,11 +9,11 @@ import sympy as sp
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from hsdsl.functions import FUNCTIONS
-from hsdsl.lint.analysis.decide import Decider
-from hsdsl.lint.analysis.normal_form import NormalForms, expression
-from hsdsl.lint.analysis.question import SearchRange, at_most_zero, negative, positive, zero
-from hsdsl.lint.analysis.straight_line_program import StraightLine
+from hsdsl.base.functions import FUNCTIONS
+from hsdsl.mathematics.decisions.decide import Decider
+from hsdsl.mathematics.decisions.normal_form import NormalForms, expression
+from hsdsl.mathematics.decisions.question import SearchRange, at_most_zero, negative, positive, zero
+from hsdsl.mathematics.decisions.straight_line_program import StraightLine
 
 x, y, v, t = sp.symbols("x y v t", real=True)
 pi = sp.pi

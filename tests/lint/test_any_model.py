@@ -8,9 +8,9 @@ import pytest
 from fuzz import generators
 from lint.grid import grid
 
-from hsdsl.errors import ModelError
-from hsdsl.lint import UNDECIDED, Selection, lint
-from hsdsl.lint.fix import fix
+from hsdsl.analysis.lint import UNDECIDED, Selection, lint
+from hsdsl.analysis.lint.fix import fix
+from hsdsl.base.errors import ModelError
 
 ROOT = Path(__file__).parents[2]
 MODELS = [p for p in sorted(ROOT.glob("tests/conformance/cases/*.yaml")) if not p.name.endswith(".expect.yaml")]

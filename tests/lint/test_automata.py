@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hsdsl.lint import lint
+from hsdsl.analysis.lint import lint
 
 MODEL = """
 hsdsl: 1

@@ -6,10 +6,10 @@ import mpmath
 import pytest
 import sympy as sp
 
-from hsdsl.expression import parse, symbolic
-from hsdsl.expression.scope import Scope, Value, symbol
-from hsdsl.lint.numbers import BEYOND, INSIDE, ON, evaluate, holds, leaves, rational, sample_at, side
-from hsdsl.system import TIME, Mode, SampledInput, Surface
+from hsdsl.analysis.lint.numbers import BEYOND, INSIDE, ON, evaluate, holds, leaves, rational, sample_at, side
+from hsdsl.language.expression import parse, symbolic
+from hsdsl.language.expression.scope import Scope, Value, symbol
+from hsdsl.language.system import TIME, Mode, SampledInput, Surface
 
 X, Y = symbol("x"), symbol("y")
 SCOPE = Scope({"x": Value(X), "y": Value(Y), "t": Value(TIME)})

@@ -3,10 +3,10 @@
 import pytest
 from lint.fragments import blocks, completed
 
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import CODES, WARNINGS, ModelError
-from hsdsl.lint import RULES
-from hsdsl.lint.pages import error_pages, pages, rule_pages, titles, warning_pages
+from hsdsl.analysis.lint import RULES
+from hsdsl.analysis.lint.pages import error_pages, pages, rule_pages, titles, warning_pages
+from hsdsl.base.errors import CODES, WARNINGS, ModelError
+from hsdsl.language.elaborate import elaborate
 
 # not UTF-8; large files, mappings, expressions and nests; a minute of work
 WITHOUT_EXAMPLE = {"HS001", "HS003", "HS015", "HS016", "HS110", "HS122", "HS123"}

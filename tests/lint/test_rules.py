@@ -18,11 +18,11 @@ import pytest
 import yaml
 from lint.fragments import completed, examples
 
-from hsdsl.expression.timebox import OutOfTime
-from hsdsl.lint import RULES, Selection, lint
-from hsdsl.lint.fix import fix
-from hsdsl.lint.pages import rule_pages
-from hsdsl.lint.rules import FAMILIES, family
+from hsdsl.analysis.lint import RULES, Selection, lint
+from hsdsl.analysis.lint.fix import fix
+from hsdsl.analysis.lint.pages import rule_pages
+from hsdsl.analysis.lint.rules import FAMILIES, family
+from hsdsl.language.expression.timebox import OutOfTime
 
 FOLDER = Path(__file__).parent
 SECTIONS = ("What it does", "Why it is bad", "Example", "Use instead", "How it is decided", "How to fix it")

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
-from hsdsl import schema
-from hsdsl.errors import Findings
-from hsdsl.lint.source_expressions import Role, written
-from hsdsl.lint.units.model import Units
-from hsdsl.schema import fields
-from hsdsl.schema.fields import Document
-from hsdsl.source import ABSENT, Scalar, compose, decode
+from hsdsl.analysis.lint.source_expressions import Role, written
+from hsdsl.analysis.lint.units.model import Units
+from hsdsl.base.errors import Findings
+from hsdsl.language import schema
+from hsdsl.language.schema import fields
+from hsdsl.language.schema.fields import Document
+from hsdsl.language.source import ABSENT, Scalar, compose, decode
 
 OF_EXPRESSIONS = (
     *(fields.Expression, fields.OptionalExpression, fields.OptionalCondition),

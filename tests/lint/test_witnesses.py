@@ -6,7 +6,7 @@ from functools import cache
 import pytest
 
 import hsdsl
-from hsdsl.lint import Selection, lint
+from hsdsl.analysis.lint import Selection, lint
 
 BEYOND = """hsdsl: 1
 modes:

@@ -12,14 +12,14 @@ from engines import needs_compiler, outcome
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.backends.c.printer import function_body
-from hsdsl.backends.python import PythonKernel
-from hsdsl.elaborate import elaborate
-from hsdsl.functions import FUNCTIONS
-from hsdsl.kernel import ModeKernel
-from hsdsl.model import Model
-from hsdsl.runtime.kernel import CompiledModel
+from hsdsl.base.functions import FUNCTIONS
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.engine.backends.c.printer import function_body
+from hsdsl.engine.backends.python import PythonKernel
+from hsdsl.engine.kernel import ModeKernel
+from hsdsl.engine.runtime.kernel import CompiledModel
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 pytestmark = needs_compiler
 SPECIAL = [0.0, -0.0, 0.5, -0.5, 1.0, -1.0, 2.0, 3.0, 710.0, -746.0, 1e-310, 1e200, -1e308, float("inf"), float("nan")]

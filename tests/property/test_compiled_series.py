@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from property.test_compiled_kernel import EXPRESSIONS, NUMBERS, ONE, SPECIAL, TWO, both_kernels
 
-from hsdsl.arithmetic import DOMAIN_ERRORS
-from hsdsl.kernel import Taylor
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS
+from hsdsl.engine.kernel import Taylor
 
 pytestmark = needs_compiler
 STATES = 1, 2  # lines

@@ -9,11 +9,11 @@ import pytest
 from engines import assert_engines_agree, needs_compiler
 from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smooth_model
 
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.execution import Execution
-from hsdsl.model import Model
-from hsdsl.runtime.structures import SCHEMES
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.runtime.structures import SCHEMES
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 pytestmark = needs_compiler
 STOPPING = (1, 4, 5, 6, 8, 11, 14, 17, 19)  # in every way, and none refused

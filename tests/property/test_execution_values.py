@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hsdsl import decimals
+from hsdsl.base.numbers import decimals
 
 BALLS = st.fixed_dictionaries(
     {

@@ -6,10 +6,10 @@ from fractions import Fraction
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import ModelError
-from hsdsl.expression import ExpressionError, parse, symbolic
-from hsdsl.expression.scope import Scope, state, symbol
+from hsdsl.base.errors import ModelError
+from hsdsl.language.elaborate import elaborate
+from hsdsl.language.expression import ExpressionError, parse, symbolic
+from hsdsl.language.expression.scope import Scope, state, symbol
 
 VALUES = {"x": Fraction(3, 7), "beta": Fraction(-2), "E": Fraction(5, 2)}
 SCOPE = Scope({name: state(name) for name in VALUES})

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64, multiprecision
-from hsdsl.backends.python import PythonKernel
-from hsdsl.elaborate import elaborate
-from hsdsl.model import Model
+from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
+from hsdsl.engine.backends.python import PythonKernel
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 MANY = multiprecision(40)
 # every expression stays within [-50, 50] on [-2, 2]^2, and so do its first two derivatives' parts: errors are absolute

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsdsl
-from hsdsl.metrics.points import SpacePoint, distance
-from hsdsl.metrics.space import make_space
+from hsdsl.analysis.metrics.points import SpacePoint, distance
+from hsdsl.analysis.metrics.space import make_space
 
 
 @functools.cache

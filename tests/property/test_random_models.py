@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from hsdsl.elaborate import elaborate
-from hsdsl.model import Model
-from hsdsl.model.estimate import corrected_times
+from hsdsl.interface.model import Model
+from hsdsl.interface.model.estimate import corrected_times
+from hsdsl.language.elaborate import elaborate
 
 UNTIL, MOST = 12, 12  # after many transitions round-off decides what lands on a guard by coincidence
 METHODS = [{"method": "euler", "step": "1/7"}, {"method": "midpoint", "step": "0.9"}, {"tolerance": "1e-6"}]

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from hsdsl.elaborate import elaborate
-from hsdsl.model import Model
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 HIT = "{name: hit, when: x <= 0, to: a, reset: {v: -v/2}}"
 METHODS: list[dict[str, Any]] = [

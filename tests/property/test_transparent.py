@@ -19,8 +19,8 @@ import pytest
 from engines import ENGINES
 from numpy.polynomial.polynomial import polyadd, polyder, polymul, polyval
 
-from hsdsl.elaborate import elaborate
-from hsdsl.model import Model
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 Poly = Sequence[Fraction]  # the coefficient of 1 first
 APART = 0.06  # roots of one surface, crossings of different ones

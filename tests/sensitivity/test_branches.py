@@ -12,7 +12,7 @@ from scipy.linalg import expm
 
 import hsdsl
 from hsdsl import UsageError
-from hsdsl.cli.verbs import obey
+from hsdsl.interface.cli.verbs import obey
 
 OSCILLATOR = """
 hsdsl: 1
@@ -209,7 +209,7 @@ def test_a_picture_shows_no_state_that_is_round_off_at_the_section(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn: list[Any] = []
-    monkeypatch.setattr("hsdsl.plot.analyses.plot_branch", lambda *given: drawn.extend(given))
+    monkeypatch.setattr("hsdsl.analysis.plot.analyses.plot_branch", lambda *given: drawn.extend(given))
     model = hsdsl.loads(hsdsl.loads(STUCK).completed())
     model.continuation("sliding_on_back->on", "drive", 1.98, 2.02).plot(tmp_path / "branch.png")
     assert drawn[1:3] == ["drive [N*m]", "u [rad/s] after the section"]  # v is zero there

@@ -15,11 +15,11 @@ from engines import needs_compiler
 
 import hsdsl
 from hsdsl import UsageError
-from hsdsl.arithmetic import multiprecision
-from hsdsl.cli.verbs import obey
-from hsdsl.integrators.radau import Steps
-from hsdsl.model.values import with_parameters
-from hsdsl.store.npz import load
+from hsdsl.analysis.store.npz import load
+from hsdsl.base.numbers.arithmetic import multiprecision
+from hsdsl.engine.integrators.radau import Steps
+from hsdsl.engine.preparation.values import with_parameters
+from hsdsl.interface.cli.verbs import obey
 
 MODELS = yaml.safe_load((Path(__file__).parent / "models.yaml").read_text())
 DIGITS, STEP = 50, Fraction(1, 10**14)

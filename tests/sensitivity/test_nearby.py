@@ -11,8 +11,8 @@ import pytest
 
 import hsdsl
 from hsdsl import UsageError
-from hsdsl.cli.verbs import obey
-from hsdsl.orbits.sampling import sampled
+from hsdsl.analysis.orbits.sampling import sampled
+from hsdsl.interface.cli.verbs import obey
 
 CORNER = """
 hsdsl: 1

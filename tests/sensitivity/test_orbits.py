@@ -12,10 +12,10 @@ from scipy.linalg import expm
 
 import hsdsl
 from hsdsl import UsageError
-from hsdsl.cli.verbs import obey
-from hsdsl.orbits.section import Section
-from hsdsl.plot import style
-from hsdsl.plot.panel import label
+from hsdsl.analysis.orbits.section import Section
+from hsdsl.analysis.plot import style
+from hsdsl.analysis.plot.panel import label
+from hsdsl.interface.cli.verbs import obey
 
 BELT = "models/gallery/stick-slip.yaml"
 OSCILLATOR = "models/oscillator-with-stop-1.yaml"

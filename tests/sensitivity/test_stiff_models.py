@@ -13,7 +13,7 @@ import pytest
 from engines import needs_compiler
 
 import hsdsl
-from hsdsl.execution.records import same
+from hsdsl.engine.execution.records import same
 
 STEP = mpmath.mpf(10) ** -25
 SWITCH = hsdsl.load("models/stiff-switch.yaml")

@@ -12,8 +12,8 @@ from engines import ENGINES, alike, needs_compiler
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.model.call_cache import CallCache, call_key
+from hsdsl.base.errors import UsageError
+from hsdsl.interface.model.call_cache import CallCache, call_key
 
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 FAST = {"scheme": "relaxed", "method": "dopri5", "tolerance": 1e-6, "until": 10}

@@ -12,15 +12,15 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl import ahead
-from hsdsl.cache import making
-from hsdsl.elaborate import elaborate_files
-from hsdsl.errors import ModelError
-from hsdsl.files import ModelFiles
-from hsdsl.lower import lower
-from hsdsl.model.pipeline import pipeline_of
-from hsdsl.runtime import kernel, library, programs
-from hsdsl.runtime.compiler import NoCompiler, find_compiler
+from hsdsl.base.cache import making
+from hsdsl.base.errors import ModelError
+from hsdsl.engine import ahead
+from hsdsl.engine.preparation.pipeline import pipeline_of
+from hsdsl.engine.runtime import kernel, library, programs
+from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
+from hsdsl.language.elaborate import elaborate_files
+from hsdsl.language.files import ModelFiles
+from hsdsl.mathematics.lower import lower
 
 ROBERTSON = """\
 hsdsl: 1

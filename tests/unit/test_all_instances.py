@@ -7,8 +7,8 @@ import pytest
 
 import hsdsl
 from hsdsl import UsageError
+from hsdsl.analysis.report.summary import summary
 from hsdsl.export import source_of
-from hsdsl.report.summary import summary
 
 TEXT = """
 hsdsl: 1

@@ -15,10 +15,10 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.names import INVISIBLE
-from hsdsl.plot import plot
-from hsdsl.store import save
+from hsdsl.analysis.plot import plot
+from hsdsl.analysis.store import save
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import INVISIBLE
 
 BALL = MODELS / "bouncing-ball.yaml"
 NUMBERS = [float("nan"), float("inf"), 1.5, "2", True, 0, -1, None, [1]]
@@ -118,7 +118,7 @@ HANDED_ON = {  # functions with `**arguments`; of orbits, fits and sweeps see th
     "Model.sensitivity": lambda **unknown: hsdsl.load(BALL).sensitivity("c", **unknown),
     "Model.orbit": lambda **unknown: hsdsl.load(BALL).orbit("h = 0", **unknown),
     "Execution.plot": RUN.plot,
-    "hsdsl.plot.plot": lambda **unknown: plot(RUN, "picture.png", **unknown),
+    "hsdsl.analysis.plot.plot": lambda **unknown: plot(RUN, "picture.png", **unknown),
     "hsdsl.exact.precise": lambda **unknown: hsdsl.exact.precise(hsdsl.load(BALL), **unknown),
 }
 

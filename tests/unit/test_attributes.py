@@ -47,4 +47,4 @@ def test_of_a_model(name: str, place: str) -> None:
 def test_a_picture_at_a_path() -> None:
     with pytest.raises(UsageError, match="figure of Matplotlib, got the path 'level") as caught:
         RUN.plot("level.png")
-    assert "hsdsl.plot.plot(run, 'level.png')" in str(caught.value.hint)
+    assert "hsdsl.analysis.plot.plot(run, 'level.png')" in str(caught.value.hint)

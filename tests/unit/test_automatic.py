@@ -10,9 +10,9 @@ import yaml
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.model import automatic
-from hsdsl.report.summary import summary
-from hsdsl.store import load
+from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.store import load
+from hsdsl.engine.preparation import automatic
 
 ROOT = """
 hsdsl: 1

@@ -22,13 +22,14 @@ from compiled_kernel import CompiledKernel
 from engines import alike, needs_compiler
 
 import hsdsl
-from hsdsl import cache, program_cache
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.errors import ModelError
-from hsdsl.files import ModelFiles
-from hsdsl.runtime import kernel, library
-from hsdsl.runtime.kernel import CompiledModel
-from hsdsl.unfinished import is_locked
+from hsdsl.base import cache
+from hsdsl.base.errors import ModelError
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.base.unfinished import is_locked
+from hsdsl.engine.runtime import kernel, library
+from hsdsl.engine.runtime.kernel import CompiledModel
+from hsdsl.language.files import ModelFiles
+from hsdsl.mathematics import program_cache
 
 try:
     import fcntl
@@ -52,7 +53,7 @@ print([name for name in sys.argv[2:] if name in sys.modules])
 """
 LIGHT_COMMAND = """
 import sys
-from hsdsl.cli.verbs import obey
+from hsdsl.interface.cli.verbs import obey
 obey(["run", sys.argv[1], "--json", "--engine", "c"])  # which waits for the compiler
 print([name for name in sys.argv[2:] if name in sys.modules])
 """
@@ -200,7 +201,7 @@ def test_a_full_cache_on_a_read_only_file_system_serves(folder: Path, tmp_path: 
     with_loop()
     subprocess.run(RUN, check=True, capture_output=True)
     before = sorted(folder.rglob("*"))
-    code = "import hsdsl.runtime.library as l; l._compile = None; from hsdsl.cli import main; main()"
+    code = "import hsdsl.engine.runtime.library as l; l._compile = None; from hsdsl.interface.cli import main; main()"
     served = ["unshare", "-rm", "sh", "-c", READ_ONLY.format(tmp_path / "caches") + 'exec "$@"', "-"]
     done = subprocess.run([*served, sys.executable, "-c", code, *RUN[3:]], capture_output=True, text=True)
     assert done.returncode == 0 and not done.stderr, done.stderr
@@ -343,13 +344,20 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str, with_loop) ->
     with_loop()
     command = [sys.executable, "-c", program, str(ROOT / "models" / "oscillator-with-stop-2.yaml"), *HEAVY]
     lines = [subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines() for _ in range(2)]
-    by_another_process = program == LIGHT_COMMAND  # see `hsdsl.ahead`
+    by_another_process = program == LIGHT_COMMAND  # see `hsdsl.engine.ahead`
     assert ("sympy" in lines[0][-1] or by_another_process) and lines[1][-1] == "[]"
 
 
-PYTHON_LOOP = tuple(f"hsdsl.simulate.{name}" for name in ("relaxed", "located", "entry", "zeno", "contact", "touching"))
-LOOKS = tuple(f"hsdsl.simulate.verdict.{name}" for name in ("looks", "flows", "misses", "landings", "steps"))
-OTHERS = ("hsdsl.report.summary", "hsdsl.elaborate", "hsdsl.lower", "hsdsl.backends.c")
+PYTHON_LOOP = tuple(
+    f"hsdsl.engine.simulate.{name}" for name in ("relaxed", "located", "entry", "zeno", "contact", "touching")
+)
+LOOKS = tuple(f"hsdsl.engine.simulate.verdict.{name}" for name in ("looks", "flows", "misses", "landings", "steps"))
+OTHERS = (
+    "hsdsl.analysis.report.summary",
+    "hsdsl.language.elaborate",
+    "hsdsl.mathematics.lower",
+    "hsdsl.engine.backends.c",
+)
 
 
 @needs_compiler

@@ -16,15 +16,15 @@ import pytest
 from sympy import Symbol
 
 import hsdsl
-from hsdsl.chart import PEERS, Refused, Scene, work_precision
-from hsdsl.chart.judge import judge
-from hsdsl.chart.peers import prepare
-from hsdsl.chart.result import Attempt, Result, Tool
-from hsdsl.chart.rows import COLUMNS, as_csv
-from hsdsl.chart.stopwatch import Deadline, race
-from hsdsl.chart.translation import as_function, in_floats, translate
-from hsdsl.errors import UsageError
-from hsdsl.functions import FUNCTIONS
+from hsdsl.base.errors import UsageError
+from hsdsl.base.functions import FUNCTIONS
+from hsdsl.interface.chart import PEERS, Refused, Scene, work_precision
+from hsdsl.interface.chart.judge import judge
+from hsdsl.interface.chart.peers import prepare
+from hsdsl.interface.chart.result import Attempt, Result, Tool
+from hsdsl.interface.chart.rows import COLUMNS, as_csv
+from hsdsl.interface.chart.stopwatch import Deadline, race
+from hsdsl.interface.chart.translation import as_function, in_floats, translate
 
 MODELS = Path(hsdsl.__file__).parent.parent / "models"
 PACKAGES = {"sksundae": "sksundae", "casadi": "casadi", "heyoka": "heyoka", "diffrax": "diffrax", "scipy": "scipy"}
@@ -186,7 +186,7 @@ def test_turns_alternate_and_the_slow_are_ended():
 
 
 def test_a_search_for_rho_is_ended(ball, monkeypatch):
-    monkeypatch.setattr("hsdsl.chart.rho", lambda *_: time.sleep(60))
+    monkeypatch.setattr("hsdsl.interface.chart.rho", lambda *_: time.sleep(60))
     (row,), _ = work_precision(
         ball, schemes=["located"], methods=["taylor"], engines=["python"], tolerances=[1e-6], patience=0.5, rounds=1
     )
@@ -311,7 +311,7 @@ def enumerated(operations):
 def by_casadi(mode, value, points):
     import casadi as ca
 
-    from hsdsl.chart.peers.casadi_rosenbrock import FUNCTIONS
+    from hsdsl.interface.chart.peers.casadi_rosenbrock import FUNCTIONS
 
     t, x = ca.SX.sym("t"), ca.SX.sym("x")
     function = ca.Function("f", [t, x], [as_function(mode, (value,), FUNCTIONS)(t, x, x)[0]])
@@ -321,7 +321,7 @@ def by_casadi(mode, value, points):
 def by_diffrax(mode, value, points):
     import jax.numpy as jnp
 
-    from hsdsl.chart.peers.diffrax_event import FUNCTIONS, jax
+    from hsdsl.interface.chart.peers.diffrax_event import FUNCTIONS, jax
 
     jax.config.update("jax_enable_x64", True)
     function = as_function(mode, (value,), FUNCTIONS)
@@ -331,7 +331,7 @@ def by_diffrax(mode, value, points):
 def by_heyoka(mode, value, points):
     import heyoka as hy
 
-    from hsdsl.chart.peers.heyoka_taylor import FUNCTIONS
+    from hsdsl.interface.chart.peers.heyoka_taylor import FUNCTIONS
 
     x = hy.expression("x")
     function = hy.cfunc([hy.expression(as_function(mode, (value,), FUNCTIONS)(hy.time, x, x)[0])], [x])
@@ -406,12 +406,12 @@ def test_installed_peers_get_a_ball_right(ball, name):
 
 
 def test_what_a_tool_raises_is_a_failed_result(ball, monkeypatch):
-    from hsdsl.chart import peers
+    from hsdsl.interface.chart import peers
 
     def broken(_):
         raise RuntimeError("no convergence\nat step 3")
 
-    monkeypatch.setattr("hsdsl.chart.peers.scipy_ivp.prepare", lambda _: broken)
+    monkeypatch.setattr("hsdsl.interface.chart.peers.scipy_ivp.prepare", lambda _: broken)
     judgement = judge(ball, peers.prepare("scipy", ball)(1e-6))
     assert (judgement.verdict, judgement.why) == ("failed", "at step 3")
     assert isnan(judgement.error)

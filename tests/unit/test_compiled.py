@@ -15,12 +15,12 @@ from engines import assert_engines_agree, needs_compiler
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import UsageError
-from hsdsl.model import Model
-from hsdsl.runtime import structures
-from hsdsl.runtime.compiler import FLAGS, find_compiler
-from hsdsl.simulate import output_buffers
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.runtime.compiler import FLAGS, find_compiler
+from hsdsl.engine.simulate import output_buffers
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 

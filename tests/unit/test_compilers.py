@@ -14,11 +14,11 @@ import pytest
 from engines import needs_compiler
 
 import hsdsl
-from hsdsl.cli.verbs import obey
-from hsdsl.errors import UsageError
-from hsdsl.limits import Limits
-from hsdsl.model import engines
-from hsdsl.runtime import compiler, kernel, library, process
+from hsdsl.base.errors import UsageError
+from hsdsl.base.limits import Limits
+from hsdsl.engine.preparation import engines
+from hsdsl.engine.runtime import compiler, kernel, library, process
+from hsdsl.interface.cli.verbs import obey
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the compilers here are shell scripts")
 MODEL = Path(__file__).parents[2] / "models" / "thermostat.yaml"

@@ -17,7 +17,7 @@ DEFINED = re.compile(r"#define (\w+) (.+)")
 LISTED = re.compile(r"\b([A-Z][A-Z_]+) = (\d+)\b")  # of `enum { NODES = 4, POWERS = 6 }`
 NUMBER = re.compile(r"\(?[-+*/. \deE]*\)?|0x1p[-+]?\d+")
 FOLDERS = ("simulate", "simulate/verdict", "integrators")
-PROGRAM = ("hsdsl.arithmetic", "hsdsl.enclosures", "hsdsl.program")
+PROGRAM = ("hsdsl.base.numbers.arithmetic", "hsdsl.base.numbers.enclosures", "hsdsl.mathematics.program")
 IN_C_ALONE = {
     "BITS", "UNIT", "TIME_UNIT", "INTEGER_POWERS",  # of the number type
     "PAUSED", "LANDED", "AT_BOUNDARY", "WITHOUT_VALUE", "NO_VALUE", "NO_CONVERGENCE", "TESTS",  # answers of functions

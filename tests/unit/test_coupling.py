@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hsdsl.metrics.polyline import Polyline
-from hsdsl.metrics.skorokhod import coupling
+from hsdsl.analysis.metrics.polyline import Polyline
+from hsdsl.analysis.metrics.skorokhod import coupling
 
 
 def walk(rng, size, modes, step):

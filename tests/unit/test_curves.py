@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hsdsl.elaborate import elaborate
-from hsdsl.model import Model
-from hsdsl.simulate.root_isolation import value
-from hsdsl.simulate.surface_polynomials import affine_curve
-from hsdsl.simulate.surfaces import at
+from hsdsl.engine.simulate.root_isolation import value
+from hsdsl.engine.simulate.surface_polynomials import affine_curve
+from hsdsl.engine.simulate.surfaces import at
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 TEXT = """
 hsdsl: 1

@@ -7,8 +7,8 @@ import math
 import pytest
 
 import hsdsl
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import ModelError, UsageError
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.language.elaborate import elaborate
 
 HILL = """hsdsl: 1
 functions:

@@ -6,8 +6,8 @@ import mpmath as mp
 import pytest
 
 import hsdsl
-from hsdsl.report import as_json
-from hsdsl.report.summary import summary
+from hsdsl.analysis.report import as_json
+from hsdsl.analysis.report.summary import summary
 
 SPIN = """hsdsl: 1
 modes:

@@ -4,9 +4,9 @@ import json
 import re
 from pathlib import Path
 
-from hsdsl.diagnose import render
-from hsdsl.errors import Diagnostic, Span
-from hsdsl.schema import json_schema
+from hsdsl.base.errors import Diagnostic, Span
+from hsdsl.language.diagnose import render
+from hsdsl.language.schema import json_schema
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "editors.md").read_text(encoding="utf-8")

@@ -7,10 +7,10 @@ from fractions import Fraction
 import pytest
 import sympy as sp
 
-from hsdsl.elaborate import elaborate, parameter_expression
-from hsdsl.elaborate.slicing import only
-from hsdsl.errors import STEP_AND_TOLERANCE, ModelError, UsageError
-from hsdsl.system import TIME, HybridSystem, KnownState, KnownTransition, Reference
+from hsdsl.base.errors import STEP_AND_TOLERANCE, ModelError, UsageError
+from hsdsl.language.elaborate import elaborate, parameter_expression
+from hsdsl.language.elaborate.slicing import only
+from hsdsl.language.system import TIME, HybridSystem, KnownState, KnownTransition, Reference
 
 X, V, A = (sp.Symbol(n, real=True) for n in "xva")
 HEAD = "hsdsl: 1\n"

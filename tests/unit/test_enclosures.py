@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hsdsl.expression import parse, symbolic
-from hsdsl.expression.scope import Scope, state, symbol
-from hsdsl.metrics.space.expressions import formula
+from hsdsl.analysis.metrics.space.expressions import formula
+from hsdsl.language.expression import parse, symbolic
+from hsdsl.language.expression.scope import Scope, state, symbol
 
 SCOPE = Scope({"x": state("x"), "y": state("y")})
 

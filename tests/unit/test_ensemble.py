@@ -12,11 +12,11 @@ from engines import ENGINES, needs_compiler
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import UsageError
-from hsdsl.execution.records import same
-from hsdsl.model import Model
-from hsdsl.simulate import output_buffers
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution.records import same
+from hsdsl.engine.simulate import output_buffers
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
 
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 FAST = {"method": "dopri5", "tolerance": 1e-6, "until": 12}
@@ -173,7 +173,7 @@ def test_instances_of_short_runs_have_their_own_default_relaxation():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_transition_is_kept_with_the_states_around_it(engine, monkeypatch):
-    monkeypatch.setattr("hsdsl.simulate.ensemble.LOG_ROOM", 2)
+    monkeypatch.setattr("hsdsl.engine.simulate.ensemble.LOG_ROOM", 2)
     several = model(MODES)
     ensemble = several.ensemble(
         parameters={"a": [0.5, 0, 2, 4]}, every_transition=True, engine=engine, tolerance=1e-6, scheme="relaxed"

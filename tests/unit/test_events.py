@@ -9,17 +9,17 @@ import pytest
 from engines import COMPILER, ENGINES
 
 import hsdsl
-import hsdsl.store
+import hsdsl.analysis.store
 from hsdsl import UsageError
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.cli.verbs import obey
+from hsdsl.analysis.plot.view import View
+from hsdsl.analysis.report import as_json, dumps, mode_graph
+from hsdsl.analysis.report.model import model_html
+from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.sensitivity import summary as derivative_summary
+from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.export import files_of, source_of
-from hsdsl.model.guards import guard_lines
-from hsdsl.plot.view import View
-from hsdsl.report import as_json, dumps, mode_graph
-from hsdsl.report.model import model_html
-from hsdsl.report.summary import summary
-from hsdsl.sensitivity import summary as derivative_summary
+from hsdsl.interface.cli.verbs import obey
+from hsdsl.interface.model.guards import guard_lines
 
 HEAD = "hsdsl: 1\nmodes:\n  m:\n"
 

@@ -14,9 +14,9 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl import decimals
-from hsdsl.errors import UsageError
-from hsdsl.execution import Stop
+from hsdsl.base.errors import UsageError
+from hsdsl.base.numbers import decimals
+from hsdsl.engine.execution import Stop
 
 FIFTY = decimals.context_of(50)
 

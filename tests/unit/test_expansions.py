@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from engines import needs_compiler
 
-from hsdsl.bernstein import around_middle, from_powers
-from hsdsl.runtime import structures
-from hsdsl.runtime.compiler import FLAGS, find_compiler
-from hsdsl.simulate.verdict import expansions
-from hsdsl.simulate.verdict.expanded import EXPANDED
+from hsdsl.base.numbers.bernstein import around_middle, from_powers
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.runtime.compiler import FLAGS, find_compiler
+from hsdsl.engine.simulate.verdict import expansions
+from hsdsl.engine.simulate.verdict.expanded import EXPANDED
 
 pytestmark = needs_compiler
 ONE = """#include "screen_parts.h"

@@ -12,12 +12,14 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl import limits, program_cache, store
-from hsdsl.cache import key_of
-from hsdsl.errors import ModelError, UsageError
-from hsdsl.files import data, read_bytes
-from hsdsl.limits import Limits, applied
-from hsdsl.lint.fix import fix
+from hsdsl.analysis import store
+from hsdsl.analysis.lint.fix import fix
+from hsdsl.base import limits
+from hsdsl.base.cache import key_of
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.base.limits import Limits, applied
+from hsdsl.language.files import data, read_bytes
+from hsdsl.mathematics import program_cache
 
 posix = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX files")
 MODEL = """hsdsl: 1
@@ -46,9 +48,9 @@ def replaced(path: Path, text: str) -> None:
 
 
 # The name of a step of loading, and where it is looked up.
-STEPS = ["hsdsl.program_cache.find", "hsdsl.elaborate.decode", "hsdsl.elaborate.compose",
-         "hsdsl.program_cache.keep",
-         "hsdsl.elaborate.define_inputs", "hsdsl.lower.lower", "hsdsl.cache.keep", "hsdsl.cache.find"]  # fmt: skip
+STEPS = ["hsdsl.mathematics.program_cache.find", "hsdsl.language.elaborate.decode", "hsdsl.language.elaborate.compose",
+         "hsdsl.mathematics.program_cache.keep",
+         "hsdsl.language.elaborate.define_inputs", "hsdsl.mathematics.lower.lower", "hsdsl.base.cache.keep", "hsdsl.base.cache.find"]  # fmt: skip
 
 
 @pytest.mark.parametrize("saved", ["model", "data"])
@@ -109,13 +111,13 @@ def test_a_fix_is_not_written_over_what_was_saved_meanwhile(tmp_path, monkeypatc
     path = tmp_path / "m.yaml"
     edge = "x: 1, y: 1}, transitions: [{when: x >= 5, to: m, reset: {x: 0, y: y}}]"
     path.write_text(LOCATED.replace("x: 1}", edge).replace("x: 0}", "x: 0, y: 0}"))
-    look = sys.modules["hsdsl.lint.fix"].lint
+    look = sys.modules["hsdsl.analysis.lint.fix"].lint
 
     def looked_after_a_save(*arguments, **named):
         path.write_text("# mine\n")
         return look(*arguments, **named)
 
-    monkeypatch.setattr("hsdsl.lint.fix.lint", looked_after_a_save)
+    monkeypatch.setattr("hsdsl.analysis.lint.fix.lint", looked_after_a_save)
     with pytest.raises(UsageError, match="changed meanwhile"):
         fix(path)
     assert path.read_text() == "# mine\n"
@@ -211,7 +213,7 @@ def test_what_has_no_end_or_no_content_is_refused(command, sentence, tmp_path):
 
 @posix
 def test_a_pipe_to_which_nobody_writes_is_left_after_a_while(tmp_path, monkeypatch):
-    monkeypatch.setattr("hsdsl.files.model._SILENCE", 0.05)
+    monkeypatch.setattr("hsdsl.language.files.model._SILENCE", 0.05)
     os.mkfifo(tmp_path / "m.yaml")
     with pytest.raises(UsageError, match="nobody writes to this pipe"):
         hsdsl.load(tmp_path / "m.yaml")

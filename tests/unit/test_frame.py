@@ -17,8 +17,8 @@ import generate
 import pytest
 
 import hsdsl
-from hsdsl import integrators
-from hsdsl.errors import CODES
+from hsdsl.base.errors import CODES
+from hsdsl.engine import integrators
 
 ROOT = Path(__file__).parent.parent.parent
 SOURCES = sorted((ROOT / "hsdsl").rglob("*.py"))
@@ -33,7 +33,7 @@ def modules_after(statement: str) -> set[str]:
 
 
 def test_simulation_needs_no_heavy_library():
-    assert modules_after("import hsdsl.simulate").isdisjoint(HEAVY)
+    assert modules_after("import hsdsl.engine.simulate").isdisjoint(HEAVY)
 
 
 def test_importing_the_package_alone_is_light():
@@ -41,7 +41,7 @@ def test_importing_the_package_alone_is_light():
 
 
 def test_the_probe_for_heavy_libraries_sees_them():
-    assert "sympy" in modules_after("import hsdsl.system")
+    assert "sympy" in modules_after("import hsdsl.language.system")
 
 
 WITHOUT_RUNS = [name for name in generate.PAGES if name != "../models.md"]  # `.ci/run` checks that one
@@ -55,7 +55,7 @@ def test_reference_page_says_what_the_code_says(name):
 def test_every_integrator_is_registered():
     tables = set()
     for info in pkgutil.iter_modules(integrators.__path__):
-        module = importlib.import_module(f"hsdsl.integrators.{info.name}")
+        module = importlib.import_module(f"hsdsl.engine.integrators.{info.name}")
         tables |= {value for value in vars(module).values() if isinstance(value, integrators.ButcherTableau)}
     assert tables == set(integrators.INTEGRATORS.values())
 

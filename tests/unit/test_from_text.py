@@ -7,7 +7,7 @@ import sys
 import pytest
 
 import hsdsl
-from hsdsl.errors import ModelError, UsageError
+from hsdsl.base.errors import ModelError, UsageError
 
 TEXT = """hsdsl: 1
 inputs: {u: {file: u.csv, hold: zero}}
@@ -53,7 +53,7 @@ def test_dir_lists_what_is_public():
 
 
 def test_a_missing_library_is_said_before_the_run(tmp_path, monkeypatch, capsys):
-    from hsdsl.cli import main
+    from hsdsl.interface.cli import main
 
     (tmp_path / "model.yaml").write_text(TEXT.replace("{file: u.csv, hold: zero}", "1/0"))  # not even read
     monkeypatch.setitem(sys.modules, "pyarrow", None)

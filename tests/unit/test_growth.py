@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from hsdsl.backends.c import model_source
-from hsdsl.elaborate import elaborate
-from hsdsl.lower import lower
+from hsdsl.engine.backends.c import model_source
+from hsdsl.language.elaborate import elaborate
+from hsdsl.mathematics.lower import lower
 
 
 def ring(n: int) -> str:

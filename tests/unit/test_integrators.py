@@ -7,10 +7,10 @@ from fractions import Fraction
 
 import pytest
 
-from hsdsl.arithmetic import FLOAT64, multiprecision
-from hsdsl.integrators import INTEGRATORS
-from hsdsl.integrators.stepper import hermite, stepper
-from hsdsl.integrators.tableau import density, nodes, trees
+from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
+from hsdsl.engine.integrators import INTEGRATORS
+from hsdsl.engine.integrators.stepper import hermite, stepper
+from hsdsl.engine.integrators.tableau import density, nodes, trees
 
 ARITHMETICS = [FLOAT64, multiprecision(40)]
 

@@ -9,8 +9,17 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from hsdsl.arithmetic import FLOAT64, multiprecision
-from hsdsl.simulate.root_isolation import ROUNDING, bernstein, changes, last_root, rises, split, value, value_and_slope
+from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
+from hsdsl.engine.simulate.root_isolation import (
+    ROUNDING,
+    bernstein,
+    changes,
+    last_root,
+    rises,
+    split,
+    value,
+    value_and_slope,
+)
 
 TINY = 2.0**-50
 

@@ -11,8 +11,8 @@ from engines import ENGINES
 
 import hsdsl
 from hsdsl import UsageError
-from hsdsl.metrics.points import SpacePoint, distance
-from hsdsl.metrics.space import make_space
+from hsdsl.analysis.metrics.points import SpacePoint, distance
+from hsdsl.analysis.metrics.space import make_space
 
 HEAD = "hsdsl: 1\n"
 TIMES, VALUES = [0, 1, 1, 2, 3, 3], [0, 1, 3, 1, 2, -1]

@@ -14,13 +14,13 @@ from engines import needs_compiler
 from scipy.special import jv
 
 import hsdsl
-from hsdsl.backends.c import model_parts, model_source
-from hsdsl.backends.c.pieces import LONGEST
-from hsdsl.integrators.sparse import sparse_factored, sparse_factored_complex
-from hsdsl.lower.ordering import ordering
-from hsdsl.program_cache import _rows
-from hsdsl.runtime.kernel import SYMBOL
-from hsdsl.sparsity import elimination
+from hsdsl.base.sparsity import elimination
+from hsdsl.engine.backends.c import model_parts, model_source
+from hsdsl.engine.backends.c.pieces import LONGEST
+from hsdsl.engine.integrators.sparse import sparse_factored, sparse_factored_complex
+from hsdsl.engine.runtime.kernel import SYMBOL
+from hsdsl.mathematics.lower.ordering import ordering
+from hsdsl.mathematics.program_cache import _rows
 
 SIZES = 40, 80
 RUNNER = Path(__file__).parents[2] / "models" / "pronking-runner.yaml"

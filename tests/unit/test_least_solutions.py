@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hsdsl.completion.nearby import NUMBERS, _least
+from hsdsl.mathematics.completion.nearby import NUMBERS, _least
 
 SHAPES = [(1, 1), (1, 4), (3, 3), (3, 7), (7, 3), (6, 6)]
 

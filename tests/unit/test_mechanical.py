@@ -109,6 +109,6 @@ def test_what_it_cannot_know_it_says(tmp_path: Path) -> None:
     assert any("difference quotients" in reason for reason in run.verdict.reasons)
     assert set(run.settings) == {"until", "step", "max_transitions"}
     run.save(tmp_path / "run.npz")
-    from hsdsl.store import load
+    from hsdsl.analysis.store import load
 
     assert load(tmp_path / "run.npz") == run

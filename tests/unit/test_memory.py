@@ -8,9 +8,9 @@ from engines import ENGINES, needs_compiler
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.limits import Limits
-from hsdsl.simulate import output_buffers
+from hsdsl.base.errors import UsageError
+from hsdsl.base.limits import Limits
+from hsdsl.engine.simulate import output_buffers
 
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
 LONG = {

@@ -7,12 +7,12 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.metrics.gate_sequence import ConeShape
-from hsdsl.metrics.interval import INFINITE, ZERO
-from hsdsl.metrics.points import SpacePoint, distance, distances
-from hsdsl.metrics.socp import solve
-from hsdsl.metrics.space import make_space
+from hsdsl.analysis.metrics.gate_sequence import ConeShape
+from hsdsl.analysis.metrics.interval import INFINITE, ZERO
+from hsdsl.analysis.metrics.points import SpacePoint, distance, distances
+from hsdsl.analysis.metrics.socp import solve
+from hsdsl.analysis.metrics.space import make_space
+from hsdsl.base.errors import UsageError
 
 QUADRANTS = {"D0": (-1, -1), "D1": (-1, 1), "D2": (1, -1), "D3": (1, 1)}
 OSCILLATOR = "oscillator-with-stop-1"

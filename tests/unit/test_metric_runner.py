@@ -10,11 +10,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 import hsdsl
-from hsdsl.metrics import guard_clearance
-from hsdsl.metrics.guard_clearance import CERTAIN, OUTSIDE, UNDECIDED, segments_inside, to_passages
-from hsdsl.metrics.points import SpacePoint, distance
-from hsdsl.metrics.space import make_space
-from hsdsl.model.distances import distance_of_runs as between_runs
+from hsdsl.analysis.metrics import guard_clearance
+from hsdsl.analysis.metrics.guard_clearance import CERTAIN, OUTSIDE, UNDECIDED, segments_inside, to_passages
+from hsdsl.analysis.metrics.points import SpacePoint, distance
+from hsdsl.analysis.metrics.space import make_space
+from hsdsl.interface.model.distances import distance_of_runs as between_runs
 
 MODEL = Path(__file__).parents[2] / "models" / "pronking-runner.yaml"
 PSI = np.pi / 5

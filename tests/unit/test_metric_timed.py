@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.metrics.points import SpacePoint, distance
-from hsdsl.metrics.space import make_space
-from hsdsl.model.distances import distance_of_runs as between_runs
+from hsdsl.analysis.metrics.points import SpacePoint, distance
+from hsdsl.analysis.metrics.space import make_space
+from hsdsl.interface.model.distances import distance_of_runs as between_runs
 
 HEAD = "hsdsl: 1\n"
 TAIL = "initial: {mode: a, x: 0}\nexperiment: {until: 3}\n"

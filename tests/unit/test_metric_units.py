@@ -7,14 +7,14 @@ import pytest
 from affine_scenes import UNITS, BruteForce, path_fault, random_point, random_scene, text_of
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.metrics import passage_bounds
-from hsdsl.metrics.budget import Budget
-from hsdsl.metrics.dominance import followers, hops_of
-from hsdsl.metrics.interval import EndsCross, Interval, weakest
-from hsdsl.metrics.points import SpacePoint, distance, distances
-from hsdsl.metrics.socp import solve
-from hsdsl.metrics.space import make_space
+from hsdsl.analysis.metrics import passage_bounds
+from hsdsl.analysis.metrics.budget import Budget
+from hsdsl.analysis.metrics.dominance import followers, hops_of
+from hsdsl.analysis.metrics.interval import EndsCross, Interval, weakest
+from hsdsl.analysis.metrics.points import SpacePoint, distance, distances
+from hsdsl.analysis.metrics.socp import solve
+from hsdsl.analysis.metrics.space import make_space
+from hsdsl.base.errors import UsageError
 
 HEAD = "hsdsl: 1\ninputs: {u: sin(t)}\nmodes:\n"
 TAIL = "initial: {mode: a, x: 0, y: 0}\nexperiment: {until: 1}\n"

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.execution import Execution
-from hsdsl.expression import plain
-from hsdsl.progress import FIRST_SIGN, INTERVAL, counted, in_notebook, ticking
-from hsdsl.report.mathml import Mathematics
+from hsdsl.analysis.report.mathml import Mathematics
+from hsdsl.base.errors import UsageError
+from hsdsl.base.progress import FIRST_SIGN, INTERVAL, counted, in_notebook, ticking
+from hsdsl.engine.execution import Execution
+from hsdsl.language.expression import plain
 
 BALL = """
 hsdsl: 1
@@ -149,7 +149,7 @@ def test_a_run_plots_into_a_given_figure(ball, tmp_path):
     from matplotlib.figure import Figure
 
     ball.simulate(engine="python").save(tmp_path / "run.npz")
-    from hsdsl.store import load
+    from hsdsl.analysis.store import load
 
     left, _ = Figure(figsize=(9, 4)).subfigures(1, 2)
     axes = load(tmp_path / "run.npz").plot(left)

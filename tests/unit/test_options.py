@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64, multiprecision
-from hsdsl.errors import UsageError
-from hsdsl.integrators import INTEGRATORS
-from hsdsl.model import split_overrides
-from hsdsl.model.options import FILE, resolve
-from hsdsl.model.settings import check_method
+from hsdsl.base.errors import UsageError
+from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
+from hsdsl.engine.integrators import INTEGRATORS
+from hsdsl.engine.preparation.options import FILE, resolve
+from hsdsl.engine.preparation.settings import check_method
+from hsdsl.interface.model import split_overrides
 
 # (file, --set, call) -> (method, size, its value)
 ACCEPTED = {

@@ -11,8 +11,8 @@ import pytest
 from engines import ENGINES, assert_engines_agree, needs_compiler
 
 import hsdsl
-from hsdsl.report import as_json, dumps
-from hsdsl.store import load
+from hsdsl.analysis.report import as_json, dumps
+from hsdsl.analysis.store import load
 
 CASE = Path(__file__).parent.parent / "conformance" / "cases" / "outputs-of-modes.yaml"
 OF_A, OF_B = ("stretch", "pull"), ("swing",)

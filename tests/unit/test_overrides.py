@@ -11,11 +11,11 @@ import pytest
 from engines import COMPILER, ENGINES
 
 import hsdsl
-from hsdsl.cli import main
-from hsdsl.model.distances import distance_of_runs as distance
-from hsdsl.report import as_json, dumps
-from hsdsl.report.summary import summary
-from hsdsl.store import load
+from hsdsl.analysis.report import as_json, dumps
+from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.store import load
+from hsdsl.interface.cli import main
+from hsdsl.interface.model.distances import distance_of_runs as distance
 
 MODEL = """hsdsl: 1
 parameters: {c: 1/2, wall: 1, far: {value: 2*wall, min: 0}}

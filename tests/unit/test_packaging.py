@@ -16,7 +16,7 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 BESIDES = ("README.md", "LICENSE", "CHANGELOG.md", "pyproject.toml", "schemas/model.schema.json", "tests/conftest.py")
 # the package ziglang has a compiler, which a bare environment lacks
-BARE = "import sys; sys.modules['ziglang'] = None; from hsdsl.cli import main; main()"
+BARE = "import sys; sys.modules['ziglang'] = None; from hsdsl.interface.cli import main; main()"
 
 
 def build(folder: Path, *options: str, **more: str) -> Path:
@@ -60,7 +60,9 @@ def test_wheel_and_sdist_hold_the_package(built):
     assert wheel.name.endswith("-py3-none-any.whl")  # one for every platform: the loop is compiled where it runs
     with zipfile.ZipFile(wheel) as archive:
         names = {name for name in archive.namelist() if name.startswith("hsdsl/")}
-    assert names == tracked() and {"hsdsl/py.typed", "hsdsl/runtime/c/hs.c", "hsdsl/runtime/c/hs.h"} <= names
+    assert (
+        names == tracked() and {"hsdsl/py.typed", "hsdsl/engine/runtime/c/hs.c", "hsdsl/engine/runtime/c/hs.h"} <= names
+    )
     with tarfile.open(sdist) as archive:
         inside = {name.partition("/")[2] for name in archive.getnames()}
     assert tracked() | {*BESIDES} <= inside
@@ -106,6 +108,6 @@ def test_the_wheel_of_a_platform_has_the_loop_compiled(built, tmp_path):
     for each in (pure, wheel):
         folder = tmp_path / each.name
         folder.mkdir()
-        assert not run_there(each, folder, "from hsdsl.cli import main; main()", engine="c").stderr
+        assert not run_there(each, folder, "from hsdsl.interface.cli import main; main()", engine="c").stderr
         compiled.append(len(list((folder / "cache" / "hsdsl" / "compiled").iterdir())))
     assert compiled == [2, 1]  # the loop and the model, the model alone

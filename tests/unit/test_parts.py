@@ -11,8 +11,8 @@ import pytest
 from engines import ENGINES, needs_compiler
 
 import hsdsl
-from hsdsl.elaborate.product import flat_part
-from hsdsl.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.language.elaborate.product import flat_part
 
 MODELS = Path(__file__).parents[2] / "models" / "parts"
 WAYS = [

@@ -13,10 +13,10 @@ import pytest
 from engines import ENGINES, alike
 
 import hsdsl
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import Diagnostic, ModelError, Span, UsageError
-from hsdsl.files import DataRefused
-from hsdsl.limits import Limits
+from hsdsl.base.errors import Diagnostic, ModelError, Span, UsageError
+from hsdsl.base.limits import Limits
+from hsdsl.language.elaborate import elaborate
+from hsdsl.language.files import DataRefused
 
 MODELS = sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))
 OSCILLATOR = next(path for path in MODELS if path.stem == "oscillator-with-stop-1")

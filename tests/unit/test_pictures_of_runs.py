@@ -16,16 +16,16 @@ from matplotlib import colors
 from matplotlib.figure import Figure
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.execution import Stop
-from hsdsl.plot import View, orbit, plot
-from hsdsl.plot.animation import FPS, MOST, frame_times
-from hsdsl.plot.curves import curves
-from hsdsl.plot.figure import picture
-from hsdsl.plot.page import page, thinned
-from hsdsl.plot.shapes import Drawn, shapes_at
-from hsdsl.plot.style import fills, looks
-from hsdsl.system import Shape
+from hsdsl.analysis.plot import View, orbit, plot
+from hsdsl.analysis.plot.animation import FPS, MOST, frame_times
+from hsdsl.analysis.plot.curves import curves
+from hsdsl.analysis.plot.figure import picture
+from hsdsl.analysis.plot.page import page, thinned
+from hsdsl.analysis.plot.shapes import Drawn, shapes_at
+from hsdsl.analysis.plot.style import fills, looks
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Stop
+from hsdsl.language.system import Shape
 
 BALL = hand_made.bouncing_ball()
 LONG = "a_mode_with_a_very_long_name_"
@@ -146,7 +146,7 @@ def test_names_of_modes_keep_off_the_power_of_ten_of_an_axis():
 
 
 def test_long_labels_of_guards_leave_the_panel_its_width():
-    from hsdsl.plot import GuardLine
+    from hsdsl.analysis.plot import GuardLine
 
     guards = [GuardLine(f"mode{k}", "x", 4.0, "a transition with a long name " * 3 + str(k)) for k in range(8)]
     figure = picture([modes(8)], View(guards=guards))
@@ -268,7 +268,7 @@ def test_a_film_has_its_frames(tmp_path):
 
 
 def test_what_cannot_be_a_film_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("hsdsl.plot.animation.which", lambda name: None)
+    monkeypatch.setattr("hsdsl.analysis.plot.animation.which", lambda name: None)
     with pytest.raises(UsageError, match="needs the program ffmpeg") as refusal:
         hsdsl.loads(SCENE).animate(tmp_path / "film.mp4")
     assert "write a .gif" in (refusal.value.hint or "")
@@ -291,7 +291,7 @@ def test_a_failed_run_says_so_in_every_picture():
 
 
 def test_the_legend_of_many_sequences_is_short():
-    from hsdsl.plot import analyses
+    from hsdsl.analysis.plot import analyses
 
     points = [(10.0**-k, 10.0**-k, (f"a_transition_with_a_name_{j}",) * 9) for k in (2, 3) for j in range(40)]
     figure = analyses.plot_nearby.__wrapped__(points, "title")
@@ -304,7 +304,7 @@ def test_the_legend_of_many_sequences_is_short():
 
 
 def test_a_branch_says_which_lines_are_stable():
-    from hsdsl.plot import analyses
+    from hsdsl.analysis.plot import analyses
 
     points = [(0.1 * k, float(k), k not in (4, 5, 6)) for k in range(12)]
     figure = analyses.plot_branch.__wrapped__("c", "x", points, [("fold", 0.3, 3.0)], "title")
@@ -312,7 +312,7 @@ def test_a_branch_says_which_lines_are_stable():
 
 
 def test_a_stable_piece_of_a_branch_ends_at_its_marks():
-    from hsdsl.plot import analyses
+    from hsdsl.analysis.plot import analyses
 
     points = [(1.0, 4.0, False), (0.5, 3.5, None), (0.6, 3.0, True), (0.9, 2.0, None), (1.2, 1.0, False)]
     figure = analyses.plot_branch.__wrapped__("c", "x", points, [("fold", 0.5, 3.5), ("flip", 0.9, 2.0)], "title")

@@ -14,14 +14,14 @@ import pytest
 from matplotlib.colors import to_rgb
 
 import hsdsl
-from hsdsl import decimals
-from hsdsl.errors import UsageError
-from hsdsl.execution import Stop
-from hsdsl.plot import GuardLine, View, plot
-from hsdsl.plot.curves import CELLS, SEVERAL, curves, limits, line
-from hsdsl.plot.figure import picture
-from hsdsl.plot.style import RUNS as RUN_COLOURS
-from hsdsl.plot.style import colours
+from hsdsl.analysis.plot import GuardLine, View, plot
+from hsdsl.analysis.plot.curves import CELLS, SEVERAL, curves, limits, line
+from hsdsl.analysis.plot.figure import picture
+from hsdsl.analysis.plot.style import RUNS as RUN_COLOURS
+from hsdsl.analysis.plot.style import colours
+from hsdsl.base.errors import UsageError
+from hsdsl.base.numbers import decimals
+from hsdsl.engine.execution import Stop
 
 FIFTY = decimals.context_of(50)
 FLOOR = GuardLine("fly", "h", 0.0, "h <= 0")
@@ -278,7 +278,7 @@ def test_nobody_s_matplotlib_is_disturbed(tmp_path):
     code = (
         "import sys, matplotlib, hand_made\n"
         "before = matplotlib.rcParams.copy()\n"
-        "from hsdsl.plot import plot\n"
+        "from hsdsl.analysis.plot import plot\n"
         f"plot(hand_made.jumping_input(), {str(tmp_path / 'run.png')!r})\n"
         "assert matplotlib.rcParams.copy() == before\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
@@ -287,7 +287,7 @@ def test_nobody_s_matplotlib_is_disturbed(tmp_path):
 
 
 def test_importing_the_plot_costs_no_matplotlib():
-    code = "import sys, hsdsl.plot, hsdsl.report, hsdsl.store\nassert 'matplotlib' not in sys.modules\n"
+    code = "import sys, hsdsl.analysis.plot, hsdsl.analysis.report, hsdsl.analysis.store\nassert 'matplotlib' not in sys.modules\n"
     subprocess.run([sys.executable, "-c", code], check=True, env={"PYTHONPATH": ":".join(sys.path)})
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.report.remedies import REMEDIES, remedies_of, table
-from hsdsl.report.summary import summary
+from hsdsl.analysis.report.remedies import REMEDIES, remedies_of, table
+from hsdsl.analysis.report.summary import summary
 
 ROOT = Path(hsdsl.__file__).parent
 CLOSE = """\

@@ -13,12 +13,14 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl import decimals, parts, report
-from hsdsl.execution import Verdict
-from hsdsl.report.alike import condensed
-from hsdsl.report.html import html
-from hsdsl.report.summary import summary
-from hsdsl.report.words import times
+from hsdsl.analysis import report
+from hsdsl.analysis.report.alike import condensed
+from hsdsl.analysis.report.html import html
+from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.report.words import times
+from hsdsl.base import parts
+from hsdsl.base.numbers import decimals
+from hsdsl.engine.execution import Verdict
 
 FIFTY = decimals.context_of(50)
 

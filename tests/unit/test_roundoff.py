@@ -10,8 +10,8 @@ import pytest
 from engines import needs_compiler
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64, Arithmetic, multiprecision
-from hsdsl.roundoff import Rounded, following, moved
+from hsdsl.base.numbers.arithmetic import FLOAT64, Arithmetic, multiprecision
+from hsdsl.base.numbers.roundoff import Rounded, following, moved
 
 NUMBERS = {"a": "0.1", "b": "2.7", "c": "1e9", "d": "-3"}
 FORMULAS = (

@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.backends.c import model_source
-from hsdsl.runtime.compiler import FLAGS
-from hsdsl.runtime.library import RUNTIME
+from hsdsl.engine.backends.c import model_source
+from hsdsl.engine.runtime.compiler import FLAGS
+from hsdsl.engine.runtime.library import RUNTIME
 
 TESTS = Path(__file__).parents[1]
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]

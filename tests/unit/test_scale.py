@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.model import split_overrides
-from hsdsl.report import as_json
+from hsdsl.analysis.report import as_json
+from hsdsl.base.errors import UsageError
+from hsdsl.interface.model import split_overrides
 
 MODEL = """hsdsl: 1
 parameters: {k: 2}

@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 import hsdsl
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import ModelError
-from hsdsl.schema import json_schema
+from hsdsl.base.errors import ModelError
+from hsdsl.language.elaborate import elaborate
+from hsdsl.language.schema import json_schema
 
 ROOT = Path(__file__).parent.parent.parent
 MODELS = [*ROOT.glob("models/*.yaml")]

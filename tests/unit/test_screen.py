@@ -14,10 +14,10 @@ import pytest
 from engines import needs_compiler
 
 import hsdsl
-from hsdsl.simulate import verdict
-from hsdsl.simulate.diagnostics import Diagnostics
-from hsdsl.simulate.verdict import RunView, assess, compiled_verdict, run_view
-from hsdsl.simulate.verdict.screen import Screen, screened
+from hsdsl.engine.simulate import verdict
+from hsdsl.engine.simulate.diagnostics import Diagnostics
+from hsdsl.engine.simulate.verdict import RunView, assess, compiled_verdict, run_view
+from hsdsl.engine.simulate.verdict.screen import Screen, screened
 
 ROOT = Path(__file__).parents[2]
 MODELS = (

@@ -8,8 +8,8 @@ from collections import Counter
 import pytest
 import sympy as sp
 
-from hsdsl.functions import below, maximum
-from hsdsl.lower.sharing import shared
+from hsdsl.base.functions import below, maximum
+from hsdsl.mathematics.lower.sharing import shared
 
 A, B, C, D, X, Y = sp.symbols("a b c d x y", real=True)
 

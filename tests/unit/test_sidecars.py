@@ -13,9 +13,9 @@ import pytest
 from engines import needs_compiler
 
 import hsdsl
-from hsdsl import store
-from hsdsl.errors import UsageError
-from hsdsl.store import read_sidecar
+from hsdsl.analysis import store
+from hsdsl.analysis.store import read_sidecar
+from hsdsl.base.errors import UsageError
 
 BALL = Path(__file__).parents[2] / "models" / "bouncing-ball.yaml"
 RUNS = [hand_made.jumping_input(), hand_made.modes_of_different_size(), hand_made.ends_in_strip()]
@@ -174,11 +174,11 @@ def test_a_table_that_was_moved_with_its_sidecar_still_belongs_to_it(tmp_path):
 
 
 def test_a_chart_removes_the_sidecar_of_what_it_writes_over(tmp_path, monkeypatch):
-    from hsdsl.cli import chart
-    from hsdsl.cli.options import Answer
+    from hsdsl.interface.cli import chart
+    from hsdsl.interface.cli.options import Answer
 
     RUNS[0].save(tmp_path / "run.csv")
-    monkeypatch.setattr("hsdsl.chart.rows.as_csv", lambda rows: "name\n")
+    monkeypatch.setattr("hsdsl.interface.chart.rows.as_csv", lambda rows: "name\n")
     chart._report([], tmp_path / "run.csv", None, Answer(quiet=True))
     assert [p.name for p in tmp_path.iterdir()] == ["run.csv"]
     with pytest.raises(UsageError, match="No such file"):

@@ -10,8 +10,8 @@ from engines import ENGINES, needs_compiler
 
 import hsdsl
 from hsdsl import UsageError
-from hsdsl.functions import solution
-from hsdsl.lower.elimination import solved
+from hsdsl.base.functions import solution
+from hsdsl.mathematics.lower.elimination import solved
 
 CART = """hsdsl: 1
 parameters: {M: 2, m: 1, l: 1/2, g: 9.81}

@@ -4,10 +4,10 @@ import time
 
 import pytest
 
-from hsdsl.errors import Findings, ModelError, UsageError
-from hsdsl.files import read_bytes
-from hsdsl.limits import DEFAULT
-from hsdsl.source import Mapping, Scalar, Sequence, compose, decode
+from hsdsl.base.errors import Findings, ModelError, UsageError
+from hsdsl.base.limits import DEFAULT
+from hsdsl.language.files import read_bytes
+from hsdsl.language.source import Mapping, Scalar, Sequence, compose, decode
 
 
 def root(text):

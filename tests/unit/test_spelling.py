@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hsdsl
-from hsdsl.errors import ModelError
+from hsdsl.base.errors import ModelError
 
 TAIL = "initial: {mode: m, x: 0, vel: 1}\nexperiment: {until: 1}\n"
 MODEL = """hsdsl: 1

@@ -12,16 +12,16 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.chart.result import Tool
-from hsdsl.chart.stability import stability_map
-from hsdsl.chart.stability.axes import read_axes
-from hsdsl.chart.stability.cells import Bench
-from hsdsl.chart.stability.limits import eigenvalues, grows_on_the_axis, largest_step, stability_polynomial
-from hsdsl.chart.stability.picture import plot_stability
-from hsdsl.chart.stability.table import as_csv, as_plain, as_text
-from hsdsl.errors import UsageError
-from hsdsl.integrators import INTEGRATORS
-from hsdsl.processes import CRASHES, HANGS, Lost, in_processes
+from hsdsl.base.errors import UsageError
+from hsdsl.base.processes import CRASHES, HANGS, Lost, in_processes
+from hsdsl.engine.integrators import INTEGRATORS
+from hsdsl.interface.chart.result import Tool
+from hsdsl.interface.chart.stability import stability_map
+from hsdsl.interface.chart.stability.axes import read_axes
+from hsdsl.interface.chart.stability.cells import Bench
+from hsdsl.interface.chart.stability.limits import eigenvalues, grows_on_the_axis, largest_step, stability_polynomial
+from hsdsl.interface.chart.stability.picture import plot_stability
+from hsdsl.interface.chart.stability.table import as_csv, as_plain, as_text
 
 GALLERY = Path(__file__).parents[2] / "models" / "gallery"
 DECAY = """hsdsl: 1

@@ -19,10 +19,11 @@ import hand_made
 import numpy as np
 import pytest
 
-import hsdsl.store.table
-from hsdsl import decimals, store
-from hsdsl.errors import UsageError
-from hsdsl.store.atomic import replacing
+import hsdsl.analysis.store.table
+from hsdsl.analysis import store
+from hsdsl.base.atomic import replacing
+from hsdsl.base.errors import UsageError
+from hsdsl.base.numbers import decimals
 
 FIFTY = decimals.context_of(50)
 
@@ -411,7 +412,7 @@ def test_what_a_killed_process_left_is_removed_and_what_another_writes_is_not(tm
 
 WRITER = """
 import sys
-from hsdsl.store.atomic import replacing
+from hsdsl.base.atomic import replacing
 for _ in range(25):
     with replacing(sys.argv[1]) as file:
         file.write(sys.argv[2].encode() * 1000)
@@ -471,7 +472,7 @@ def test_a_new_file_has_the_usual_permissions(tmp_path):
 
 def test_csv_leaves_the_file_open_for_its_owner():
     file = io.BytesIO()
-    hsdsl.store.table.write_csv(hand_made.jumping_input().rows(), file)
+    hsdsl.analysis.store.table.write_csv(hand_made.jumping_input().rows(), file)
     assert file.getvalue().startswith(b"time,mode,j,x,u\n")
     assert not file.closed
 

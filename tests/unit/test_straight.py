@@ -7,14 +7,14 @@ import mpmath
 import pytest
 import sympy as sp
 
-from hsdsl.arithmetic import FLOAT64, multiprecision
-from hsdsl.backends.python import PythonKernel
-from hsdsl.elaborate import elaborate
-from hsdsl.expression.derivatives import derivative
-from hsdsl.functions import absolute, atan2, below, cosh, floor, maximum, minimum, sign, sinh, tanh
-from hsdsl.lower.routines import written_out
-from hsdsl.lower.straight import LARGEST, WIDEST, Cut, Gradient
-from hsdsl.model import Model
+from hsdsl.base.functions import absolute, atan2, below, cosh, floor, maximum, minimum, sign, sinh, tanh
+from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
+from hsdsl.engine.backends.python import PythonKernel
+from hsdsl.interface.model import Model
+from hsdsl.language.elaborate import elaborate
+from hsdsl.language.expression.derivatives import derivative
+from hsdsl.mathematics.lower.routines import written_out
+from hsdsl.mathematics.lower.straight import LARGEST, WIDEST, Cut, Gradient
 
 MANY = multiprecision(60)
 X, Y = sp.symbols("x y", real=True)

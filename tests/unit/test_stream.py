@@ -16,8 +16,8 @@ from engines import needs_compiler
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.simulate import output_buffers
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.simulate import output_buffers
 
 CASES = Path(__file__).parents[1] / "conformance" / "cases"
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
@@ -119,7 +119,7 @@ def test_without_a_compiler_it_is_refused(tmp_path, monkeypatch):
 
 @needs_compiler
 def test_the_command_line_streams(tmp_path, capsys, monkeypatch):
-    from hsdsl.cli import main
+    from hsdsl.interface.cli import main
 
     out = tmp_path / "run.csv"
     arguments = ["hsdsl", "run", str(OSCILLATOR), "--until", "3", "--out", str(out), "--every", "50", "--json"]

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.errors import UsageError
-from hsdsl.sweep import load, picture, recording, variation
-from hsdsl.sweep.dataset import damaged
+from hsdsl.analysis.sweep import load, picture, recording, variation
+from hsdsl.analysis.sweep.dataset import damaged
+from hsdsl.base.errors import UsageError
 
 pytest.importorskip("pyarrow")
 
@@ -267,7 +267,7 @@ def test_what_cannot_be_run_is_refused_before_a_folder_is_made(model, tmp_path, 
 
 
 def test_a_process_that_dies_loses_nothing(model, tmp_path, monkeypatch):
-    from hsdsl.model.chunk_work import ChunkWork
+    from hsdsl.interface.model.chunk_work import ChunkWork
 
     made, fuse = ChunkWork.__call__, tmp_path / "fuse"
     fuse.touch()
@@ -284,7 +284,7 @@ def test_a_process_that_dies_loses_nothing(model, tmp_path, monkeypatch):
 
 
 def test_a_chunk_that_ends_every_process_ends_the_sweep(model, tmp_path, monkeypatch):
-    from hsdsl.model.chunk_work import ChunkWork
+    from hsdsl.interface.model.chunk_work import ChunkWork
 
     made = ChunkWork.__call__
     monkeypatch.setattr(ChunkWork, "__call__", lambda self, k: os._exit(1) if k == 3 else made(self, k))
@@ -366,7 +366,7 @@ def test_a_cluster_gives_the_same(model, tmp_path):
 
 def test_a_cluster_that_does_not_answer_is_refused(model, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("hsdsl.sweep.cluster.PATIENCE", 0.2)
+    monkeypatch.setattr("hsdsl.analysis.sweep.cluster.PATIENCE", 0.2)
     with pytest.raises(UsageError, match="no scheduler answers there"):
         model.sweep(VARY, tmp_path / "s", cluster="tcp://127.0.0.1:9")
     assert not (tmp_path / "s").exists()
@@ -375,7 +375,7 @@ def test_a_cluster_that_does_not_answer_is_refused(model, tmp_path, monkeypatch)
 @pytest.mark.slow
 def test_a_cluster_that_is_lost_loses_nothing(model, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr("hsdsl.sweep.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("hsdsl.analysis.sweep.cluster.PATIENCE", 0.5)
     arguments = {"vary": {"c": "0.7:0.9:200"}, "out": tmp_path / "s", "chunk": 5}
     options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
     cluster = distributed.LocalCluster(**options)

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64, Arithmetic, multiprecision
-from hsdsl.backends.python import PythonKernel
-from hsdsl.elaborate import elaborate
-from hsdsl.errors import UsageError
-from hsdsl.limits import Limits, applied
-from hsdsl.lower import lower
-from hsdsl.simulate.input_segments import Timeline, make_timeline
+from hsdsl.base.errors import UsageError
+from hsdsl.base.limits import Limits, applied
+from hsdsl.base.numbers.arithmetic import FLOAT64, Arithmetic, multiprecision
+from hsdsl.engine.backends.python import PythonKernel
+from hsdsl.engine.simulate.input_segments import Timeline, make_timeline
+from hsdsl.language.elaborate import elaborate
+from hsdsl.mathematics.lower import lower
 
 MODEL = """hsdsl: 1
 parameters: {{p: 0.3}}

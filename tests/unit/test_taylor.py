@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64, multiprecision
-from hsdsl.backends.python import PythonKernel
-from hsdsl.functions import FUNCTIONS
+from hsdsl.base.functions import FUNCTIONS
+from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
+from hsdsl.engine.backends.python import PythonKernel
 
 MANY = multiprecision(60)
 DIGITS = mp.mpf(10) ** -50

@@ -8,8 +8,8 @@ import pytest
 from engines import COMPILER, assert_engines_agree
 
 import hsdsl
-from hsdsl.arithmetic import FLOAT64, multiprecision
-from hsdsl.backends.python import PythonKernel
+from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
+from hsdsl.engine.backends.python import PythonKernel
 
 JUMP = "floor(y/100)"  # 0
 EXPRESSIONS = [

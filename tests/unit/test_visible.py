@@ -15,14 +15,14 @@ import hand_made
 import numpy as np
 import pytest
 
-from hsdsl import plot, store
-from hsdsl.cli import main
-from hsdsl.diagnose import as_annotation, render
-from hsdsl.errors import Diagnostic, Span
-from hsdsl.execution import Stop, Transition, Verdict
-from hsdsl.names import shown, visible, visible_lines
-from hsdsl.report.html import html
-from hsdsl.report.summary import summary
+from hsdsl.analysis import plot, store
+from hsdsl.analysis.report.html import html
+from hsdsl.analysis.report.summary import summary
+from hsdsl.base.errors import Diagnostic, Span
+from hsdsl.base.names import shown, visible, visible_lines
+from hsdsl.engine.execution import Stop, Transition, Verdict
+from hsdsl.interface.cli import main
+from hsdsl.language.diagnose import as_annotation, render
 
 HIDDEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]")
 HOSTILE = [

@@ -11,13 +11,13 @@ from engines import ENGINES
 from lint.fragments import blocks
 
 import hsdsl
-from hsdsl.errors import WARNINGS
-from hsdsl.lint.pages import warning_pages
-from hsdsl.report import as_json, dumps
-from hsdsl.report.html import html
-from hsdsl.report.summary import summary
-from hsdsl.report.words import MOST_WORDS, conclusion
-from hsdsl.store import load
+from hsdsl.analysis.lint.pages import warning_pages
+from hsdsl.analysis.report import as_json, dumps
+from hsdsl.analysis.report.html import html
+from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.report.words import MOST_WORDS, conclusion
+from hsdsl.analysis.store import load
+from hsdsl.base.errors import WARNINGS
 
 # A foot over ground that swings through it while x < 2 a second in: z = 1 - 4 t**2, and at t = 1 it lands where it may.
 FOOT = """

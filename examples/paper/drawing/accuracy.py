@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from hsdsl.plot.style import ALARM
+from hsdsl.analysis.plot.style import ALARM
 from paper.accuracy import RATIOS, Point, Rival
 from paper.drawing.axes import MARKERS, letter, loglog, order, power, shades
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from hsdsl.plot.style import FAINT, colours, curve
+from hsdsl.analysis.plot.style import FAINT, colours, curve
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hsdsl.plot.style import INK, colours, curve
+from hsdsl.analysis.plot.style import INK, colours, curve
 from paper.runner import Leg, Pose
 
 if TYPE_CHECKING:

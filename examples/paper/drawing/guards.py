@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from hsdsl.execution import Execution
-from hsdsl.plot.style import INK
+from hsdsl.analysis.plot.style import INK
+from hsdsl.engine.execution import Execution
 from paper.drawing.axes import shades
 
 NAMES = {

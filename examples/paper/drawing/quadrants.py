@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from hsdsl.execution import Execution
-from hsdsl.plot.style import INK, band, colours
+from hsdsl.analysis.plot.style import INK, band, colours
+from hsdsl.engine.execution import Execution
 from paper.drawing.axes import MARKERS, letter, loglog, order, shades
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
-from hsdsl.plot.style import INK
+from hsdsl.analysis.plot.style import INK
 from paper.drawing.body import draw_ground, draw_runner
 from paper.runner import PSI, Pose, pose
 

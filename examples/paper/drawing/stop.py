@@ -7,7 +7,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from hsdsl.plot.style import ALARM, INK, band, colours
+from hsdsl.analysis.plot.style import ALARM, INK, band, colours
 from paper.drawing.body import spring
 
 

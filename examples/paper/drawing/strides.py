@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from hsdsl.plot.style import INK
+from hsdsl.analysis.plot.style import INK
 from paper.drawing.axes import letter
 from paper.drawing.body import draw_ground, draw_runner, phase_colours
 from paper.runner import Pose

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from hsdsl.execution import Execution
-from hsdsl.plot.style import ALARM, FAINT, INK
+from hsdsl.analysis.plot.style import ALARM, FAINT, INK
+from hsdsl.engine.execution import Execution
 from paper.drawing.axes import letter
 
 ZOOM = (4.6, 5.1, -0.8125, -0.7985)  # the first impacts and the Zeno point of example 2

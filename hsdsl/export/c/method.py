@@ -6,11 +6,11 @@ import ctypes
 from collections.abc import Sequence
 from typing import Any
 
-from hsdsl.arithmetic import Number
-from hsdsl.backends.c.printer import constant
-from hsdsl.runtime import structures
-from hsdsl.runtime.structures import Row, array_at
-from hsdsl.simulate.interpolation import Interpolation
+from hsdsl.base.numbers.arithmetic import Number
+from hsdsl.engine.backends.c.printer import constant
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.runtime.structures import Row, array_at
+from hsdsl.engine.simulate.interpolation import Interpolation
 
 
 def method_text(table: Any) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from hsdsl.base.parts import layout_of
+from hsdsl.engine.simulate import Problem
 from hsdsl.export.c.text import array, string
-from hsdsl.parts import layout_of
-from hsdsl.program import ModeProgram, Program
-from hsdsl.simulate import Problem
+from hsdsl.mathematics.program import ModeProgram, Program
 
 STRINGS = "const char *const"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hsdsl.arithmetic import FLOAT64, Arithmetic
-from hsdsl.simulate import Settings
-from hsdsl.simulate.refinement import LEAST_UNITS
+from hsdsl.base.numbers.arithmetic import FLOAT64, Arithmetic
+from hsdsl.engine.simulate import Settings
+from hsdsl.engine.simulate.refinement import LEAST_UNITS
 
 FLOAT32 = replace(FLOAT64, name="float32", bits=24, unit=2.0**-24)  # its numbers are rounded where they are compiled
 

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from hsdsl.arithmetic import Arithmetic
-from hsdsl.backends.c import derivatives, factors, lines, width
-from hsdsl.backends.c.printer import constant, literal
+from hsdsl.base.numbers.arithmetic import Arithmetic
+from hsdsl.engine.backends.c import derivatives, factors, lines, width
+from hsdsl.engine.backends.c.printer import constant, literal
+from hsdsl.engine.runtime.methods import method_table
+from hsdsl.engine.runtime.structures import METHOD_KINDS, SCHEMES
+from hsdsl.engine.simulate import Problem, Settings
+from hsdsl.engine.simulate.control import make_control
+from hsdsl.engine.simulate.interpolation import along_steps, interpolation
 from hsdsl.export.c.method import interpolation_text, method_text
 from hsdsl.export.c.names import names_text
 from hsdsl.export.c.precision import PRECISIONS, in_both, in_single
 from hsdsl.export.c.starts import derivations
 from hsdsl.export.c.text import array, comment
 from hsdsl.export.source import Source
-from hsdsl.program import Program
-from hsdsl.runtime.methods import method_table
-from hsdsl.runtime.structures import METHOD_KINDS, SCHEMES
-from hsdsl.simulate import Problem, Settings
-from hsdsl.simulate.control import make_control
-from hsdsl.simulate.interpolation import along_steps, interpolation
+from hsdsl.mathematics.program import Program
 
 _HEADER = """
 #ifndef PROBLEM_H

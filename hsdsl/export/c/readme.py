@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hsdsl.base.names import visible
 from hsdsl.export.source import Source
-from hsdsl.names import visible
 
 
 @dataclass(frozen=True)

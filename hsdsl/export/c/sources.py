@@ -6,13 +6,13 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from hsdsl.backends.c import model_source
-from hsdsl.errors import UsageError
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.backends.c import model_source
+from hsdsl.engine.runtime.compiler import FLAGS
+from hsdsl.engine.runtime.library import RUNTIME
 from hsdsl.export.c.problem import header, numbers
 from hsdsl.export.c.text import comment
 from hsdsl.export.source import Source
-from hsdsl.runtime.compiler import FLAGS
-from hsdsl.runtime.library import RUNTIME
 
 PARTS = Path(__file__).parent / "parts"
 COMPILED = ("model.c", "problem.c", "instance.c", "runtime/hs.c")  # with -I. -Iruntime, and linked with -lm

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from hsdsl.backends.c import constant_bodies, initial_bodies
+from hsdsl.engine.backends.c import constant_bodies, initial_bodies
+from hsdsl.engine.simulate import Problem
 from hsdsl.export.c.text import array, function
 from hsdsl.export.parameters import derived, given, structural
-from hsdsl.simulate import Problem
 
 _DERIVE = """
 int problem_derive(hs_real *p) {{
@@ -16,7 +16,7 @@ int problem_derive(hs_real *p) {{
 }}
 """
 _START = """
-/* See hsdsl/model/values.py: initial_columns. */
+/* See hsdsl/engine/preparation/values.py: initial_columns. */
 int problem_start(const hs_real *p, const char *given, hs_real *x) {{
   hs_real row[PROBLEM_PARAMETERS + {width}] = {{0}}, own[{width}] = {{0}}, *const initial = row + PROBLEM_PARAMETERS;
   char known[{width}] = {{0}};

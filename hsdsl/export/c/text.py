@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable, Sequence
 
-from hsdsl.names import visible
+from hsdsl.base.names import visible
 
 _PLAIN = frozenset(map(chr, range(0x20, 0x7F))) - set('"\\?')
 

@@ -10,13 +10,13 @@ from collections.abc import Mapping, Sequence
 from io import BytesIO
 from pathlib import Path
 
-from hsdsl.errors import UsageError
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.runtime.compiler import FLAGS, NoCompiler, find_compiler
+from hsdsl.engine.runtime.library import EFFORT, loop_object
+from hsdsl.engine.runtime.process import workshop
 from hsdsl.export.c.sources import c_sources
 from hsdsl.export.fmi import tables
 from hsdsl.export.fmi.variables import Unit
-from hsdsl.runtime.compiler import FLAGS, NoCompiler, find_compiler
-from hsdsl.runtime.library import EFFORT, loop_object
-from hsdsl.runtime.process import workshop
 
 FOLDER = Path(__file__).parent
 LOOP = "hs.c"

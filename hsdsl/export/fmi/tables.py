@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from hsdsl.backends.c import constant_bodies, routine_functions
-from hsdsl.backends.c.printer import literal
+from hsdsl.base.parts import numbered
+from hsdsl.engine.backends.c import constant_bodies, routine_functions
+from hsdsl.engine.backends.c.printer import literal
 from hsdsl.export.c.text import array, comment, function, string
 from hsdsl.export.fmi.variables import Unit, switched
-from hsdsl.lower.slopes import lower_given
-from hsdsl.parts import numbered
+from hsdsl.mathematics.lower.slopes import lower_given
 
 _HEADER = """
 #ifndef VARIABLES_H

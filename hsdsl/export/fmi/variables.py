@@ -11,17 +11,17 @@ from typing import Literal
 
 import numpy as np
 
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.backends.text import compile_routines
-from hsdsl.elaborate.inputs import switch_name
-from hsdsl.execution import Execution
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.base.parts import numbered
+from hsdsl.engine.backends.text import compile_routines
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.simulate import Problem
+from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.export import Modes
 from hsdsl.export.parameters import derived, structural
 from hsdsl.export.source import Source, drivable
-from hsdsl.lower.slopes import Slopes, lower_given, lower_slopes
-from hsdsl.parts import numbered
-from hsdsl.simulate import Problem
-from hsdsl.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.language.elaborate.inputs import switch_name
+from hsdsl.mathematics.lower.slopes import Slopes, lower_given, lower_slopes
 
 Kind = Literal["time", "state", "derivative", "parameter", "input", "output", "mode", "indicator"]
 _FIRST = re.compile(r"\ba(\d+)\b")

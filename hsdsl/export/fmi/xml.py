@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.etree import ElementTree
 
-from hsdsl.lint.units.unit import Unit, UnknownUnit, read
-from hsdsl.names import visible
+from hsdsl.analysis.lint.units.unit import Unit, UnknownUnit, read
+from hsdsl.base.names import visible
 
 Element = ElementTree.Element
 _BASE = {

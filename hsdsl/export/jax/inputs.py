@@ -8,7 +8,7 @@ from bisect import bisect_right
 from hsdsl.export.jax.language import function, literal
 from hsdsl.export.routines import definitions, parameters_in
 from hsdsl.export.source import Source
-from hsdsl.program import Program
+from hsdsl.mathematics.program import Program
 
 SWITCHES = "it decides when a function of time switches"
 SAMPLES = "it decides when an input has a sample"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Mapping, Sequence
 
-from hsdsl.backends.printer import C_OPERATORS, Language, number_text
+from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text
 
 
 def literal(value: float) -> str:

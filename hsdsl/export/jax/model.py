@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hsdsl.backends.c.source import width
+from hsdsl.engine.backends.c.source import width
+from hsdsl.engine.integrators import ButcherTableau
+from hsdsl.engine.integrators.numbers import table_numbers
+from hsdsl.engine.simulate import Problem
 from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
 from hsdsl.export.jax.language import function, literal
 from hsdsl.export.parameters import derived, followed
 from hsdsl.export.routines import data_names, definitions, mode_definitions, parameters_in
 from hsdsl.export.source import Source
-from hsdsl.integrators import ButcherTableau
-from hsdsl.integrators.numbers import table_numbers
-from hsdsl.program import ModeProgram, Program
-from hsdsl.simulate import Problem
+from hsdsl.mathematics.program import ModeProgram, Program
 
 
 def values_text(source: Source) -> list[str]:

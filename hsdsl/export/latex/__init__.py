@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hsdsl.elaborate.functions import named_functions
-from hsdsl.errors import UsageError
+from hsdsl.base.errors import UsageError
+from hsdsl.base.graphs import closure
+from hsdsl.base.names import without_memory
 from hsdsl.export.automata import Pairs, document_of, pairs, texts
 from hsdsl.export.latex.automata import of_parts
 from hsdsl.export.latex.escaping import escaped
 from hsdsl.export.latex.layout import equations, stacked
 from hsdsl.export.latex.mathematics import Mathematics
 from hsdsl.export.source import Source
-from hsdsl.expression.plain import names_in
-from hsdsl.expression.scope import state
-from hsdsl.graphs import closure
-from hsdsl.names import without_memory
-from hsdsl.schema import ModeDocument, ModelDocument, TransitionDocument
-from hsdsl.system import Edge, HybridSystem, Mode
+from hsdsl.language.elaborate.functions import named_functions
+from hsdsl.language.expression.plain import names_in
+from hsdsl.language.expression.scope import state
+from hsdsl.language.schema import ModeDocument, ModelDocument, TransitionDocument
+from hsdsl.language.system import Edge, HybridSystem, Mode
 
 _HEAD = r"""\documentclass[11pt,a4paper]{article}
 \usepackage[margin=25mm]{geometry}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import unicodedata
 
-from hsdsl.names import visible
+from hsdsl.base.names import visible
 
 _SIGNS = {
     "\\": r"\textbackslash{}",

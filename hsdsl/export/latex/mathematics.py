@@ -9,12 +9,12 @@ from typing import Any
 
 from sympy.printing.latex import LatexPrinter
 
-from hsdsl import decimals
+from hsdsl.base.functions import below
+from hsdsl.base.numbers import decimals
 from hsdsl.export.latex.escaping import GREEK, escaped, greek_name
-from hsdsl.expression import plain
-from hsdsl.expression.scope import Function, symbol
-from hsdsl.expression.selection import cases
-from hsdsl.functions import below
+from hsdsl.language.expression import plain
+from hsdsl.language.expression.scope import Function, symbol
+from hsdsl.language.expression.selection import cases
 
 _SIGNS = {">=": r"\geq", "<=": r"\leq", ">": ">", "<": "<"}
 _PARTS = re.compile(r"(.*?[^0-9])([0-9]+)")

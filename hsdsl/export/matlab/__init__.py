@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from textwrap import wrap
 
+from hsdsl.base.names import visible
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.matlab.language import body, helpers, literal
 from hsdsl.export.matlab.model import ModelText, parameter_fields
@@ -15,7 +16,6 @@ from hsdsl.export.matlab.text import comment, string
 from hsdsl.export.parameters import derived, followed, structural
 from hsdsl.export.routines import definitions
 from hsdsl.export.source import Source
-from hsdsl.names import visible
 
 PARTS = Path(__file__).parent / "parts"
 

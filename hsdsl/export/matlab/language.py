@@ -6,7 +6,7 @@ import ast
 import re
 from collections.abc import Mapping, Sequence
 
-from hsdsl.backends.printer import C_OPERATORS, Language, number_text
+from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text
 
 _WORDS = """
 break case catch classdef continue do else elseif end end_try_catch end_unwind_protect endfor endfunction endif

@@ -6,7 +6,10 @@ import ast
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from hsdsl.backends.c import width
+from hsdsl.base.names import visible
+from hsdsl.base.parts import layout_of
+from hsdsl.engine.backends.c import width
+from hsdsl.engine.simulate.control import LARGEST_SHARE
 from hsdsl.export import routines
 from hsdsl.export.identifiers import identifiers
 from hsdsl.export.matlab.language import KEYWORDS, body, helpers, reserved
@@ -14,10 +17,7 @@ from hsdsl.export.matlab.settings import run_fields
 from hsdsl.export.matlab.text import cell, comment, string, strings, vector
 from hsdsl.export.routines import mode_definitions
 from hsdsl.export.source import Source
-from hsdsl.names import visible
-from hsdsl.parts import layout_of
-from hsdsl.program import ModeProgram, Program
-from hsdsl.simulate.control import LARGEST_SHARE
+from hsdsl.mathematics.program import ModeProgram, Program
 
 _LAST = """
 function k = enabled(m, x, t, p)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from hsdsl.engine.simulate import Problem
 from hsdsl.export.matlab.text import matrix, string, vector
-from hsdsl.simulate import Problem
 
 
 def run_fields(problem: Problem) -> Iterable[tuple[str, str]]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from hsdsl.base.names import visible
 from hsdsl.export.matlab.language import literal
-from hsdsl.names import visible
 
 _WIDTH = 100
 

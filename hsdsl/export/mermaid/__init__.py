@@ -6,11 +6,11 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
+from hsdsl.base.names import visible, without_memory
+from hsdsl.base.written import event_text, written_edges, written_modes
 from hsdsl.export.automata import Automata, automata_of, pairs
 from hsdsl.export.source import Source
-from hsdsl.names import visible, without_memory
-from hsdsl.system import Edge, Mode
-from hsdsl.written import event_text, written_edges, written_modes
+from hsdsl.language.system import Edge, Mode
 
 _ALIKE = str.maketrans({"*": "\u2217", "`": "\u02cb", "~": "\u223c"})
 _OUTER = re.compile(r"(?<![^\W_])_|_(?![^\W_])")  # underscores that are not inside a word

@@ -11,14 +11,14 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+from hsdsl.engine.runtime.compiler import NoCompiler
+from hsdsl.engine.runtime.kernel import CompiledModel, runtime
+from hsdsl.engine.simulate import prepare
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.identifiers import identifiers
 from hsdsl.export.parameters import structural
 from hsdsl.export.rust.model import literal, model_text, string
 from hsdsl.export.source import Source
-from hsdsl.runtime.compiler import NoCompiler
-from hsdsl.runtime.kernel import CompiledModel, runtime
-from hsdsl.simulate import prepare
 
 MOST = 100  # transitions; of longer runs these are enough
 

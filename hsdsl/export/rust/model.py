@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hsdsl.arithmetic import FLOAT64
-from hsdsl.backends.c import width
-from hsdsl.backends.printer import number_text
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.base.parts import layout_of
+from hsdsl.engine.backends.c import width
+from hsdsl.engine.backends.printer import number_text
+from hsdsl.engine.runtime.methods import method_table
+from hsdsl.engine.simulate import Problem
+from hsdsl.engine.simulate.control import make_control
 from hsdsl.export.source import Source
-from hsdsl.parts import layout_of
-from hsdsl.program import ModeProgram, Program
-from hsdsl.runtime.methods import method_table
-from hsdsl.simulate import Problem
-from hsdsl.simulate.control import make_control
+from hsdsl.mathematics.program import ModeProgram, Program
 
 _HEAD = "use crate::names::*;\nuse crate::Settings;\npub use crate::{follow, initial, parameters};\n"
 

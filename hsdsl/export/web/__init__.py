@@ -8,16 +8,16 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from hsdsl.execution import Execution
+from hsdsl.analysis.plot.parts import filled, inert, scripts, shared
+from hsdsl.base.names import visible
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.preparation.visible import visible_run
+from hsdsl.engine.runtime.compiler import NoCompiler
+from hsdsl.engine.runtime.kernel import CompiledModel
+from hsdsl.engine.simulate import Problem, prepare
 from hsdsl.export.source import Source
 from hsdsl.export.web.model import model_of
 from hsdsl.export.web.wasm import PARTS, wasm_module
-from hsdsl.model.visible import visible_run
-from hsdsl.names import visible
-from hsdsl.plot.parts import filled, inert, scripts, shared
-from hsdsl.runtime.compiler import NoCompiler
-from hsdsl.runtime.kernel import CompiledModel
-from hsdsl.simulate import Problem, prepare
 
 SCRIPTS = ("controls.js", "scene.js", "facts.js", "parts.js", "page.js")
 
@@ -38,8 +38,8 @@ def with_scene(source: Source) -> Source:
     system = source.system
     if not system.scene:
         return source
-    from hsdsl.elaborate.scene import scene_as_outputs
-    from hsdsl.lower import lower
+    from hsdsl.language.elaborate.scene import scene_as_outputs
+    from hsdsl.mathematics.lower import lower
 
     system = scene_as_outputs(system)
     given = source.problem

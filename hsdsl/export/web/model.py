@@ -7,17 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.backends.c import width
-from hsdsl.execution import Execution
+from hsdsl.analysis.plot.style import colours
+from hsdsl.analysis.report import words
+from hsdsl.analysis.report.alike import condensed
+from hsdsl.base.names import visible, without_memory
+from hsdsl.base.parts import layout_of, numbered
+from hsdsl.engine.backends.c import width
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.runtime import structures
 from hsdsl.export.source import Source
 from hsdsl.export.web.numbers import SETTINGS, fixed
-from hsdsl.names import visible, without_memory
-from hsdsl.parts import layout_of, numbered
-from hsdsl.plot.style import colours
-from hsdsl.program import ModeProgram, Program
-from hsdsl.report import words
-from hsdsl.report.alike import condensed
-from hsdsl.runtime import structures
+from hsdsl.mathematics.program import ModeProgram, Program
 
 Data = dict[str, Any]
 MOST_COLOURS = 28  # of product modes; then they begin again

@@ -6,19 +6,19 @@ import re
 from collections.abc import Iterable
 from itertools import pairwise
 
-from hsdsl import limits
-from hsdsl.arithmetic import FLOAT64, TIE, Number
-from hsdsl.backends.c import constant_bodies, switching_bodies
-from hsdsl.backends.c.printer import literal
-from hsdsl.defaults import DEFAULTS
+from hsdsl.base import limits
+from hsdsl.base.defaults import DEFAULTS
+from hsdsl.base.graphs import closure
+from hsdsl.base.numbers.arithmetic import FLOAT64, TIE, Number
+from hsdsl.engine.backends.c import constant_bodies, switching_bodies
+from hsdsl.engine.backends.c.printer import literal
+from hsdsl.engine.simulate import Problem
+from hsdsl.engine.simulate.control import LARGEST_SHARE
+from hsdsl.engine.simulate.state_layouts import StateLayouts
+from hsdsl.engine.simulate.switches import same
 from hsdsl.export.c.text import array, function
 from hsdsl.export.parameters import derived, used_by, with_sources
-from hsdsl.graphs import closure
-from hsdsl.program import Program
-from hsdsl.simulate import Problem
-from hsdsl.simulate.control import LARGEST_SHARE
-from hsdsl.simulate.state_layouts import StateLayouts
-from hsdsl.simulate.switches import same
+from hsdsl.mathematics.program import Program
 
 SETTINGS = ("until", "step", "relaxation", "max_transitions", "scale")  # in the order of page.h
 MEMORY = 1 << 28  # bytes of rows that a page may keep

@@ -7,14 +7,14 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from hsdsl import limits
-from hsdsl.cache import find, keep, key_of
-from hsdsl.errors import UsageError
+from hsdsl.base import limits
+from hsdsl.base.cache import find, keep, key_of
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.runtime.compiler import Compiler, NoCompiler, zig_compiler
+from hsdsl.engine.runtime.process import workshop
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.source import Source
 from hsdsl.export.web.numbers import page_numbers
-from hsdsl.runtime.compiler import Compiler, NoCompiler, zig_compiler
-from hsdsl.runtime.process import workshop
 
 PARTS = Path(__file__).parent / "parts"
 FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-Wl,--strip-all", *EXACT_FLAGS)

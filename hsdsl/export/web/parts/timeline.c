@@ -1,5 +1,5 @@
 /* Inputs over time, cut at samples and where switches change.
-   See hsdsl/simulate/input_segments.py and hsdsl/simulate/switches.py. */
+   See hsdsl/engine/simulate/input_segments.py and hsdsl/engine/simulate/switches.py. */
 
 #include <string.h>
 

@@ -1,0 +1,77 @@
+"""Edits that take an entry out of a mapping or an item out of a list; comments and layout stay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence as Items
+
+from hsdsl.base.errors import Edit
+from hsdsl.language.source import Mapping, Node, Sequence, SourceRange
+
+_Range = tuple[int, int]
+
+
+def without_entry(mapping: Node | None, name: str) -> tuple[Edit, ...]:
+    """The edit that removes an entry of a mapping; none where that cannot be done safely."""
+    if not isinstance(mapping, Mapping) or name not in mapping.entries:
+        return ()
+    ranges = [(key.place.start[0], _end(value, key.place)) for key, value in mapping]
+    return _removed(mapping.place, ranges, list(mapping.entries).index(name))
+
+
+def without_item(items: Node | None, index: int) -> tuple[Edit, ...]:
+    """The edit that removes an item of a list written in brackets; none for another list."""
+    if not isinstance(items, Sequence):
+        return ()
+    ranges = [(item.place.start[0], item.place.end[0]) for item in items.items]
+    content = items.place.text.content
+    return _removed(items.place, ranges, index) if content[items.place.start[0]] == "[" else ()
+
+
+def _end(value: Node, key: SourceRange) -> int:
+    """Behind the value; a value that is left out ends with the colon of its key."""
+    if value.place.end[0] > value.place.start[0]:
+        return _trimmed(value.place.text.content, value.place.end[0])
+    return key.text.content.index(":", key.end[0]) + 1
+
+
+def _trimmed(content: str, end: int) -> int:
+    """YAML ends a block where the next thing begins, after blanks and comments: go back to its last line of content."""
+    while True:
+        end = len(content[:end].rstrip())
+        line = content.rfind("\n", 0, end) + 1
+        if not content[line:end].lstrip().startswith("#"):
+            return end
+        end = line
+
+
+def _removed(whole: SourceRange, ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
+    content = whole.text.content
+    if content[whole.start[0]] in "{[":
+        return _from_flow(ranges, index)
+    return _from_block(content, ranges, index)
+
+
+def _from_flow(ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
+    start, end = ranges[index]
+    if index + 1 < len(ranges):
+        return (Edit(start, ranges[index + 1][0]),)
+    if index > 0:
+        return (Edit(ranges[index - 1][1], end),)
+    return (Edit(start, end),)
+
+
+def _from_block(content: str, ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
+    start, end = ranges[index]
+    if "#" in content[start:end]:
+        return ()  # a comment within would go too
+    line = content.rfind("\n", 0, start) + 1
+    after = content.find("\n", end)
+    rest = content[end : after if after >= 0 else len(content)]
+    if content[line:start].strip():  # the first key of a list item, behind its dash
+        follows = index + 1 < len(ranges) and not rest.strip()
+        return (
+            (Edit(start, ranges[index + 1][0]),) if follows and "#" not in content[end : ranges[index + 1][0]] else ()
+        )
+    if rest.strip():  # a comment stays, in a line of its own
+        return (Edit(start, end + len(rest) - len(rest.lstrip())),)
+    return (Edit(line, after + 1 if after >= 0 else len(content)),)

@@ -1,0 +1,100 @@
+"""The lint rules by code: name, check and severity of each; their pages are the Markdown files here, one a family."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from hsdsl.analysis.lint.finding import Finding
+from hsdsl.analysis.lint.rules import experiment, guards, names, regularity, scene, shape, tangency, transitions, units
+from hsdsl.analysis.lint.subject import Subject
+
+FAMILIES = {
+    "names": ("HS400", "HS419"),
+    "shape": ("HS420", "HS439"),
+    "scene": ("HS440", "HS459"),
+    "experiment": ("HS460", "HS479"),
+    "comments": ("HS490", "HS499"),
+    "mathematics": ("HS500", "HS599"),
+    "units": ("HS600", "HS699"),
+}
+Check = Callable[[Subject], Iterable[Finding]]
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule: its name, its check, and the severity of its findings.
+
+    A warning is a probable mistake. A note is a remark: notes alone leave the exit code at 0. Rules about comments
+    have no check, because they see what the others find.
+    """
+
+    name: str
+    check: Check | None = None
+    severity: Literal["warning", "note"] = "warning"
+
+
+def family(code: str) -> str:
+    """The family that a code belongs to."""
+    return next(name for name, (first, last) in FAMILIES.items() if first <= code <= last)
+
+
+RULES: dict[str, Rule] = {
+    "HS401": Rule("unused-parameter", names.unused_name("parameter")),
+    "HS402": Rule("unused-input", names.unused_name("input")),
+    "HS403": Rule("unused-let", names.unused_let),
+    "HS404": Rule("unused-state", names.unused_state),
+    "HS405": Rule("shadowed-name", names.shadowed_name, "note"),
+    "HS406": Rule("unreachable-mode", names.unreachable_mode),
+    "HS407": Rule("confusable-names", names.confusable_names),
+    "HS408": Rule("misleading-name", names.misleading_name),
+    "HS409": Rule("misnamed-output", names.misnamed_output),
+    "HS410": Rule("unused-function", names.unused_name("function")),
+    "HS421": Rule("identity-reset", shape.identity_reset),
+    "HS422": Rule("missing-reset", shape.missing_reset),
+    "HS425": Rule("dead-end", shape.dead_end),
+    "HS426": Rule("duplicate-transition", shape.duplicate_transition),
+    "HS427": Rule("shadowed-transition", shape.shadowed_transition),
+    "HS428": Rule("constant-condition", shape.constant_condition),
+    "HS429": Rule("empty-section", shape.empty_section, "note"),
+    "HS430": Rule("idle-priority", shape.idle_priority),
+    "HS441": Rule("idle-state", scene.idle_state, "note"),
+    "HS442": Rule("idle-parameter", scene.idle_parameter, "note"),
+    "HS443": Rule("twin-modes", scene.twin_modes),
+    "HS444": Rule("constant-state", scene.constant_state, "note"),
+    "HS445": Rule("repeated-default", scene.repeated_default, "note"),
+    "HS446": Rule("repeated-wall", scene.repeated_wall),
+    "HS447": Rule("after-the-end", scene.after_the_end),
+    "HS461": Rule("starts-outside", experiment.starts_outside),
+    "HS462": Rule("starts-on-guard", experiment.starts_on_guard, "note"),
+    "HS463": Rule("ends-on-event", experiment.ends_on_event, "note"),
+    "HS464": Rule("large-relaxation", experiment.large_relaxation),
+    "HS466": Rule("odd-samples", experiment.odd_samples),
+    "HS467": Rule("odd-step", experiment.odd_step),
+    "HS468": Rule("late-reference", experiment.late_reference),
+    "HS490": Rule("unused-ignore"),
+    "HS491": Rule("unknown-ignore"),
+    "HS492": Rule("undecided", severity="note"),
+    "HS501": Rule("guard-never-crossed", guards.guard_never_crossed),
+    "HS502": Rule("condition-beyond-surface", guards.condition_beyond_surface),
+    "HS503": Rule("guard-inside-domain", guards.guard_inside_domain, "note"),
+    "HS504": Rule("guard-turns-inward", guards.guard_turns_inward, "note"),
+    "HS505": Rule("tangency", tangency.tangency, "note"),
+    "HS506": Rule("reset-lands-beyond", transitions.reset_lands_beyond),
+    "HS507": Rule("reset-lands-on-guard", transitions.reset_lands_on_guard, "note"),
+    "HS508": Rule("overlapping-guards", guards.overlapping_guards),
+    "HS509": Rule("sliding", transitions.sliding),
+    "HS510": Rule("zero-time-cycle", transitions.zero_time_cycle),
+    "HS511": Rule("jump-inside-mode", regularity.jump_inside_mode),
+    "HS512": Rule("kink-inside-mode", regularity.kink_inside_mode, "note"),
+    "HS513": Rule("vanishing-divisor", regularity.vanishing_divisor),
+    "HS514": Rule("outside-real-domain", regularity.outside_real_domain),
+    "HS515": Rule("not-lipschitz", regularity.not_lipschitz),
+    "HS517": Rule("degenerate-surface", tangency.degenerate_surface),
+    "HS601": Rule("unknown-unit", units.unknown_unit),
+    "HS602": Rule("inconsistent-units", units.misfits("sum", units.CONVERT)),
+    "HS603": Rule("argument-units", units.misfits("argument", units.PLAIN)),
+    "HS604": Rule("flow-units", units.flow_units),
+    "HS605": Rule("value-units", units.value_units),
+}

@@ -1,0 +1,132 @@
+# pyright: basic
+"""Rules about the shape of modes and transitions: resets without effect, duplicates, shadowed transitions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import sympy as sp
+
+from hsdsl.analysis.lint.edits import without_entry
+from hsdsl.analysis.lint.finding import Finding
+from hsdsl.analysis.lint.subject import EdgePart, Subject
+from hsdsl.language.expression.scope import symbol
+from hsdsl.language.source import Mapping, Node, Scalar, children, is_empty
+
+_SECTIONS = ("parameters", "inputs", "let", "outputs", "units", "reference")
+_SECTIONS_OF_A_MODE = ("let", "domain", "outputs", "transitions")
+
+_SIGNS: dict[Any, tuple[str, str]] = {  # of left less right, where the comparison holds and where not
+    sp.Gt: ("is_positive", "is_nonpositive"),
+    sp.Ge: ("is_nonnegative", "is_negative"),
+    sp.Lt: ("is_negative", "is_nonnegative"),
+    sp.Le: ("is_nonpositive", "is_positive"),
+    sp.Eq: ("is_zero", "is_nonzero"),
+    sp.Ne: ("is_nonzero", "is_zero"),
+}
+
+
+def identity_reset(subject: Subject) -> Iterator[Finding]:
+    """Find resets of a state to itself."""
+    for part, edge in subject.edges:
+        values = edge.edge.values
+        for name in edge.document.reset:
+            if values[name] == symbol(name) and name in part.mode.states:
+                fix = without_entry(subject.node(*edge.path, "reset"), str(name))
+                yield Finding(name.place.span, f"the state '{name}' keeps its value anyway", "leave it out", fix=fix)
+
+
+def missing_reset(subject: Subject) -> Iterator[Finding]:
+    """Find transitions to their own mode that change nothing."""
+    for part, edge in subject.edges:
+        if edge.edge.target == part.mode.name and edge.edge.reset == tuple(map(symbol, part.mode.states)):
+            message = f"this transition leads back to '{part.key}' and changes nothing, so it fires again at once"
+            yield Finding(edge.target_span, message, "write what it does under `reset`")
+
+
+def dead_end(subject: Subject) -> Iterator[Finding]:
+    """Find modes that transitions enter and none leaves."""
+    entered = {edge.edge.target for _, edge in subject.edges}
+    for part in subject.modes:
+        if part.mode.name in entered and not part.mode.edges and not part.mode.final:
+            message = f"the mode '{part.key}' is entered and never left"
+            yield Finding(part.key.place.span, message, "write `final: true`, or the transition that leads out")
+
+
+def duplicate_transition(subject: Subject) -> Iterator[Finding]:
+    """Find transitions that repeat another one of their mode."""
+    first: dict[Any, EdgePart] = {}
+    for part, item in subject.edges:
+        edge = item.edge
+        kind = (part.mode.name, edge.surface.residual, edge.condition, edge.target, edge.reset)
+        earlier = first.setdefault(kind, item)
+        if earlier is not item:
+            line = earlier.document.when.place.span.line
+            message = f"this transition is the same as the one of line {line}"
+            yield Finding(item.document.when.place.span, message, "remove it, or change it")
+
+
+def shadowed_transition(subject: Subject) -> Iterator[Finding]:
+    """Find transitions that an earlier one on the same surface shadows."""
+    for part in subject.modes:
+        winners: dict[Any, EdgePart] = {}
+        for item in sorted(part.edges, key=lambda item: (-item.edge.priority, item.index)):
+            residual, condition = item.edge.surface.residual, item.edge.condition
+            winner = winners.get((residual, None)) or winners.get((residual, condition))
+            if winner is None:
+                winners[residual, condition] = item
+            elif (winner.edge.target, winner.edge.reset) != (item.edge.target, item.edge.reset):
+                message = f"this transition never fires: '{winner.edge.name}' goes first on the same surface"
+                hint = "put the stricter one first, or give the other one a condition"
+                yield Finding(item.document.when.place.span, message, hint)
+
+
+def constant_condition(subject: Subject) -> Iterator[Finding]:
+    """Find conditions that are always true or always false."""
+    for _, item in subject.edges:
+        scalar = item.document.condition
+        truth = None if scalar is None else _constant_truth(item.edge.condition)
+        if scalar is not None and truth is not None:
+            hint = "remove it" if truth else "remove the transition, or write when it is to fire"
+            yield Finding(scalar.place.span, f"this condition is always {str(truth).lower()}", hint)
+
+
+def _constant_truth(condition: Any) -> bool | None:
+    truths = {relation: _truth(relation) for relation in condition.atoms(sp.core.relational.Relational)}
+    left = condition.xreplace({relation: sp.true if t else sp.false for relation, t in truths.items() if t is not None})
+    return bool(left) if left in (sp.true, sp.false) else None
+
+
+def _truth(relation: Any) -> bool | None:
+    """The truth of a comparison, where the sign of the difference is the same everywhere."""
+    difference: Any = sp.expand(relation.lhs - relation.rhs)
+    truth, contrary = (getattr(difference, sign) for sign in _SIGNS[type(relation)])
+    return truth if contrary is None else not contrary
+
+
+def empty_section(subject: Subject) -> Iterator[Finding]:
+    """Find empty sections."""
+    yield from _empty(subject.root, _SECTIONS)
+    for part in subject.modes:
+        yield from _empty(subject.node("modes", str(part.key)), _SECTIONS_OF_A_MODE)
+        for edge in part.edges:
+            yield from _empty(subject.node(*edge.path), ("reset",))
+
+
+def _empty(mapping: Node | None, keys: tuple[str, ...]) -> Iterator[Finding]:
+    for key, value in mapping if isinstance(mapping, Mapping) else ():
+        if key in keys and (is_empty(value) or not (isinstance(value, Scalar) or any(children(value)))):
+            fix = without_entry(mapping, str(key))
+            yield Finding(key.place.span, f"`{key}` is empty", "leave it out", fix=fix)
+
+
+def idle_priority(subject: Subject) -> Iterator[Finding]:
+    """Find priorities of modes where all priorities are equal."""
+    for part, item in subject.edges:
+        mapping = subject.node(*item.path)
+        equal = len({edge.priority for edge in part.mode.edges}) == 1
+        if equal and item.edge.priority and isinstance(mapping, Mapping) and "priority" in mapping.entries:
+            key, _ = mapping.entries["priority"]
+            message = f"no transition of the mode '{part.key}' has another priority"
+            yield Finding(key.place.span, message, "leave it out", fix=without_entry(mapping, "priority"))

@@ -1,0 +1,192 @@
+"""How far apart are two points of the hybrid quotient space, or of the relaxed one?
+
+The distance is the length of the shortest connected curve (Def. 4, 5, 12 and 19): straight pieces inside domains, free
+passage between a guard point and its reset image in either direction; on the relaxed space every passage costs the
+relaxation and a strip has the metric of Def. 15.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from hsdsl.analysis.metrics.budget import Budget
+from hsdsl.analysis.metrics.geometry import Space
+from hsdsl.analysis.metrics.guard_clearance import highest
+from hsdsl.analysis.metrics.interval import CERTIFIED, INFINITE, ZERO, Interval, weakest
+from hsdsl.analysis.metrics.neighbours import Neighbours
+from hsdsl.analysis.metrics.nonaffine import search_nonaffine
+from hsdsl.analysis.metrics.paths import PathPiece, PointDistance, SpacePoint, answer, coordinates, ends_of, status_of
+from hsdsl.analysis.metrics.search import End, Query, search
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Array
+
+__all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]
+
+QUICK, SLOW = 50_000, 20_000
+
+
+def distance(
+    space: Space,
+    p: SpacePoint,
+    q: SpacePoint,
+    relaxation: float | None = None,
+    hops: int | None = None,
+    budget: Budget | None = None,
+) -> PointDistance:
+    """The distance between two points of a space, or with a ``relaxation`` (Def. 19) of its relaxed one.
+
+    Without it a point of a strip counts as its guard point. ``hops`` caps the passages of the compared paths; by
+    default at eight more than the fewest that connect the modes. The lower end holds for paths with more, too. When the
+    budget is spent, the best that is known is returned.
+
+    Raises ValueError for a place that does not fit: unknown mode or edge, wrong number of states, missing time,
+    impossible depth.
+    """
+    starts, ends = ends_of(space, p, relaxation, False), ends_of(space, q, relaxation, True)
+    if p == q:
+        return PointDistance(ZERO, (), "certified")
+    a, b = starts[0], ends[0]
+    if b.mode not in space.fewest(a.mode):
+        return PointDistance(INFINITE, (), "certified: no edges connect the modes")
+    strip = _along_strip(p, q, a, b, relaxation)
+    query = Query(space, starts, ends, relaxation or 0.0, hops, budget or Budget(), strip)
+    return answer(space, search(query) if space.affine else search_nonaffine(query), query.most)
+
+
+def distances(
+    space: Space,
+    mode_p: str,
+    p: Array,
+    mode_q: str,
+    q: Array,
+    relaxation: float | None = None,
+    neighbours: Neighbours | None = None,
+    enough: float = 0.0,
+    hops: int | None = None,
+    budget: Budget | None = None,
+) -> tuple[Array, Array, str]:
+    """Lower and upper bounds of the distances of N pairs, rows of p and q, in two modes' domains; and their status.
+
+    Columns are the mode's states and, where ``space.timed``, time. Where something is not affine, ``neighbours`` are
+    paths of earlier pairs to begin with, and bounds of at most ``enough`` need not be close.
+    """
+    start, end = _rows(space, mode_p, p, len(p)), _rows(space, mode_q, q, len(p))
+    toll, budget = relaxation or 0.0, budget or Budget()
+    if end.mode not in space.fewest(start.mode):
+        infinite = np.full(len(start.x), np.inf)
+        return infinite, infinite, CERTIFIED
+    if not space.affine:
+        found = (neighbours or Neighbours(space, toll, budget, hops)).bound(start, end, enough)
+    else:
+        query = Query(space, [start], [end], toll, hops, budget)
+        result = search(query)
+        found = np.minimum(result.lower, result.cut), result.upper, status_of(result, query.most)
+    for ends in zip(*(x[found[0] > found[1]] for x in found[:2]), strict=True):
+        Interval(*ends)  # which they contradict
+    return found
+
+
+def _rows(space: Space, name: str, x: Array, count: int) -> End:
+    try:
+        mode = space.mode_index(name)
+    except KeyError as error:
+        raise ValueError(f"there is no mode {error}") from None
+    x, names = np.asarray(x, dtype=float), space.domains[mode].coordinates
+    if x.shape != (count, len(names)):
+        raise ValueError(f"mode {name}: expected rows of {', '.join(names)}, got shape {x.shape}")
+    return End(mode, x)
+
+
+def _along_strip(p: SpacePoint, q: SpacePoint, a: End, b: End, relaxation: float | None) -> float:
+    """The distance inside one strip (Def. 15), inf where the two are not in one."""
+    if relaxation is None or p.edge is None or (p.edge, p.mode) != (q.edge, q.mode):
+        return np.inf
+    return float(np.linalg.norm(a.x - b.x)) + abs(p.depth - q.depth)
+
+
+@dataclass(frozen=True, eq=False)
+class ModePoints:
+    """n points of one mode: states (n, d), times, and the edge (else empty) and depth of a strip they are in."""
+
+    mode: str
+    x: Array
+    t: Array
+    edge: Array
+    depth: Array
+
+
+@dataclass(frozen=True)
+class SpaceMetric:
+    """The distance on M or, with a ``relaxation``, on the relaxed space."""
+
+    space: Space
+    relaxation: float | None = None
+    budget: Budget = field(default_factory=Budget)
+    hops: int | None = None
+    _statuses: set[str] = field(default_factory=set[str], repr=False)
+
+    @property
+    def status(self) -> str:
+        """What all bounds given so far rest on."""
+        return weakest(*self._statuses)
+
+    @property
+    def timed(self) -> bool:
+        """Whether time is a coordinate of the domains."""
+        return self.space.timed
+
+    @property
+    def evaluations(self) -> int:
+        """How many distances a search may take: they are quick where everything is affine, and slow elsewhere."""
+        return QUICK if self.space.affine else SLOW
+
+    @cached_property
+    def _neighbours(self) -> Neighbours:
+        return Neighbours(self.space, self.relaxation or 0.0, self.budget, self.hops)
+
+    def contains(self, mode: str, low: Array, high: Array) -> Array:
+        """Whether whole boxes are known to be in a mode's domain, or that domain to be convex."""
+        domain = self.space.domains[self.space.mode_index(self._named(mode))]
+        inside = np.ones(len(low), dtype=bool)
+        for formula in domain.curved:
+            inside &= highest(formula, low, high) <= 0
+        return inside
+
+    def between(self, p: ModePoints, q: ModePoints, enough: float = 0.0) -> tuple[Array, Array]:
+        """Bound the distances of pairs from below and above; bounds of at most ``enough`` need not be close."""
+        lower, upper = np.zeros(len(p.t)), np.full(len(p.t), np.inf)
+        waits = (p.edge != "") | (q.edge != "")
+        flows = np.flatnonzero(~waits)
+        if len(flows):
+            lower[flows], upper[flows] = self._flowing(p, q, flows, enough)
+        for k in np.flatnonzero(waits).tolist():
+            ends = self._place(p, k), self._place(q, k)
+            found = distance(self.space, *ends, self.relaxation, self.hops, self.budget)
+            lower[k], upper[k] = found.interval.lower, found.interval.upper
+            self._statuses.add(found.status)
+        return lower, upper
+
+    def _flowing(self, p: ModePoints, q: ModePoints, chosen: Array, enough: float) -> tuple[Array, Array]:
+        (mode_p, x), (mode_q, y) = ((self._named(e.mode), self._coordinates(e, chosen)) for e in (p, q))
+        known = None if self.space.affine else self._neighbours
+        where = self.space, mode_p, x, mode_q, y, self.relaxation
+        lower, upper, status = distances(*where, known, enough, self.hops, self.budget)
+        self._statuses.add(status)
+        return lower, upper
+
+    def _named(self, mode: str) -> str:
+        if mode not in self.space.modes:
+            raise UsageError(f"the model has no mode '{mode}', which a run is in")
+        return mode
+
+    def _coordinates(self, points: ModePoints, chosen: Array) -> Array:
+        x = points.x[chosen]
+        return np.column_stack([x, points.t[chosen]]) if self.timed else x
+
+    def _place(self, points: ModePoints, k: int) -> SpacePoint:
+        x, edge = tuple(points.x[k].tolist()), str(points.edge[k]) or None
+        depth = min(float(points.depth[k]), self.relaxation or 0.0)
+        return SpacePoint(points.mode, x, edge, depth, float(points.t[k]) if self.timed else None)

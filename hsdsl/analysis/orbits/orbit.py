@@ -1,0 +1,147 @@
+"""A periodic orbit: its state at the section, its period, its multipliers and its stability."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hsdsl.analysis.orbits.shooting import Closed
+from hsdsl.analysis.sensitivity.result import Sensitivity
+from hsdsl.base.calls import checks_methods
+from hsdsl.base.names import called
+from hsdsl.engine.execution import Array, Execution
+
+LEAST_MARGIN = 1e-8  # multipliers are not known better than this
+
+
+@checks_methods
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A periodic orbit of a hybrid system.
+
+    Attributes
+    ----------
+    section : str
+        The transition that is the section; the orbit closes after ``laps`` of them.
+    mode, state : str, dict
+        The mode and the state right after that transition.
+    phase : float or None
+        The time of the state within the period of the forcing; None for a system that does not depend on time.
+    period : float
+        The duration of one period.
+    multipliers : array, complex
+        The Floquet multipliers, the largest first, without those of drifting states and, for an autonomous system,
+        without the 1 along the orbit.
+    drift : dict
+        The change in a period of states on which nothing depends, such as the position of a runner.
+    residual : float
+        The gap between start and end, relative to the sizes of the states.
+    verdict : {"stable", "unstable", "undecided"}
+        The stability by the multipliers; ``reasons`` has details.
+    sides : dict
+        The multipliers for each edge that goes first, if transitions are simultaneous and their order matters.
+    """
+
+    section: str
+    laps: int
+    mode: str
+    state: dict[str, float]
+    phase: float | None
+    period: float
+    multipliers: Array
+    drift: dict[str, float]
+    residual: float
+    verdict: str
+    reasons: tuple[str, ...]
+    sides: dict[str, Array]
+    overrides: dict[str, Any]
+    closed: Closed = field(repr=False)
+
+    @property
+    def execution(self) -> Execution:
+        """The run over one period, with the derivatives as further states."""
+        return self.sensitivity.execution
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object of `orbit --json`."""
+        from hsdsl.analysis.orbits.summary import as_json
+
+        return as_json(self)
+
+    @property
+    def summary(self) -> str:
+        """The orbit as lines of text."""
+        from hsdsl.analysis.orbits.summary import summary
+
+        return summary(self)
+
+    def plot(self, path: str | os.PathLike[str]) -> None:
+        """Draw the orbit and its multipliers to a .png or .svg file."""
+        from hsdsl.analysis.orbits.summary import shown
+        from hsdsl.analysis.plot.orbit import plot_orbit
+
+        states = [x for x in self.state if x not in self.drift]
+        name = called(self.execution.title, self.execution.model)
+        title = f"{name}: {self.verdict}, multipliers {shown(self.multipliers)}"
+        plot_orbit(path, self.execution, states, self.multipliers, self.period, title, self.units)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The units of the model, by name."""
+        return self.sensitivity.setting.plain.program.units
+
+    @property
+    def sensitivity(self) -> Sensitivity:
+        """The derivatives over one period."""
+        return self.closed.passage.sensitivity
+
+
+def multipliers_of(found: Closed, slopes: Array, forced: bool) -> Array:
+    """Return the eigenvalues of a return map, the largest first, without the zero along the flow and those of shifts.
+
+    The map does not depend on where along the flow it begins: that direction has the eigenvalue zero.
+    """
+    matrix, of = return_matrix(slopes, forced), found.symmetry
+    count = len(found.point) + forced
+    values = np.linalg.eigvals(of.without_shifts(matrix[:count])[:, of.kept(count)])
+    order = np.argsort(-np.abs(values), kind="stable")
+    return values[order][:-1]
+
+
+def return_matrix(slopes: Array, forced: bool) -> Array:
+    """Return the derivatives of the state and phase at the end of a lap with respect to those at its beginning."""
+    n = len(slopes) - 1
+    matrix = slopes[:, : n + 1].copy()
+    if forced:
+        matrix[n, n] += 1  # the phase moves with the time
+    return matrix
+
+
+def returning(found: Closed, forced: bool) -> dict[str, dict[str, float]]:
+    """Return the directions of nearby executions after a lap, for each direction a lap before.
+
+    Off a surface that a lap ends on none is, and where a lap ends in one point there is none.
+    """
+    wrt, sizes = found.passage.sensitivity.wrt, np.append(found.sizes, found.passage.time)[: len(found.point) + forced]
+    matrix = return_matrix(found.passage.slopes, forced)[: len(wrt), : len(wrt)] * sizes
+    matrix[np.abs(matrix) <= LEAST_MARGIN * sizes[:, None]] = 0
+    return {
+        by: dict(zip(wrt, column, strict=True))
+        for by, column in zip(wrt, matrix.T.tolist(), strict=True)
+        if any(column)
+    }
+
+
+def judged(multipliers: Array, error: float) -> tuple[str, str]:
+    """Return the verdict of multipliers that are known up to an error, with its reasons."""
+    if not len(multipliers):
+        return "stable", "the section has one point"
+    largest, margin = float(np.abs(multipliers[0])), max(LEAST_MARGIN, 10 * error)
+    size = largest if largest >= LEAST_MARGIN else 0
+    known = f"the largest multiplier has the size {size:.10g}, known to {margin:.1g}"
+    if largest < 1 - margin:
+        return "stable", known
+    return ("unstable" if largest > 1 + margin else "undecided"), known

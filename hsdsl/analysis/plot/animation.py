@@ -1,0 +1,160 @@
+# pyright: reportUnknownMemberType=false
+"""The scene of a run as a film: GIF by Pillow, MP4 by ffmpeg; the mode and the time are below the shapes."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from shutil import which
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hsdsl.analysis.plot.curves import curves
+from hsdsl.analysis.plot.shapes import draw_shape, shapes_at
+from hsdsl.analysis.plot.style import check_suffixes, fills, styled
+from hsdsl.analysis.report import words
+from hsdsl.base.atomic import replacing
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import shown, visible
+from hsdsl.engine.execution import Array, Execution, Samples
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FORMATS = (".gif", ".mp4")
+FPS = 25
+SHORTEST, LONGEST = 4.0, 20.0  # seconds of a film whose speed nobody chose
+MOST = 5000  # frames
+FAR = 100  # pictures: what reaches farther, at the end of a run that failed, would take minutes to draw
+INCHES, DPI = 6.4, 100
+HINT = "write a .gif, which needs nothing else, or install ffmpeg"
+
+
+def check(path: str | os.PathLike[str]) -> Path:
+    """Refuse what cannot be written, before a run.
+
+    Raises UsageError: the suffix is not one of a film, or ffmpeg is missing.
+    """
+    (target,) = check_suffixes(path, formats=FORMATS)
+    if target.suffix.lower() == ".mp4" and which("ffmpeg") is None:
+        raise UsageError(f"{target}: an .mp4 needs the program ffmpeg, which is not there", HINT)
+    if not target.parent.is_dir():
+        raise UsageError(f"{target}: there is no folder {target.parent}")
+    return target
+
+
+def frame_times(run: Execution, speed: float | None) -> Array:
+    """Return the time of each frame; ``speed`` is time of the run by seconds of the film.
+
+    Raises UsageError: the speed is not positive, or the film would have more than `MOST` frames.
+    """
+    start, end = map(float, run.time_span)
+    if speed is None:
+        seconds = min(LONGEST, max(SHORTEST, end - start))
+    elif not speed > 0 or not math.isfinite(speed):
+        raise UsageError(f"expected a positive speed, got {speed}")
+    else:
+        seconds = (end - start) / speed
+    if seconds * FPS > MOST:
+        faster = f"{(end - start) * FPS / MOST:.3g}"
+        raise UsageError(f"the film would have {seconds * FPS:,.0f} frames, and {MOST:,} is the most: choose a speed of"
+                         f" at least {faster}")  # fmt: skip
+    return np.linspace(start, end, max(2, round(seconds * FPS) + 1)) if end > start else np.array([start])
+
+
+def animate(
+    run: Execution,
+    shapes: Sequence[Any],
+    path: str | os.PathLike[str],
+    speed: float | None = None,
+    unit: str | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Write the film of a run whose outputs are the numbers of its scene.
+
+    Parameters
+    ----------
+    shapes : sequence of `hsdsl.language.system.Shape`
+    speed : float, optional
+        Time of the run by seconds of the film; left out, 1 where the film then lasts 4 to 20 s, else what fits.
+    unit : str, optional
+        The unit of time.
+    progress : callable, optional
+        Called after each frame with how many there are, and how many there will be.
+
+    Raises UsageError: as :func:`check` and :func:`frame_times`.
+    """
+    target = check(path)
+    times = frame_times(run, speed)
+    samples = run.sample(times)
+    with styled(), TemporaryDirectory() as folder:
+        from matplotlib.figure import Figure
+
+        figure, scene, cursor = _set_up(Figure(layout="constrained"), run, samples, shapes)
+        ends = np.array([scene.get_xlim(), scene.get_ylim()])
+        middle, view = ends.mean(axis=1), float(np.ptp(ends, axis=1).max())
+        file = Path(folder) / f"film{target.suffix.lower()}"
+        with _writer(target).saving(figure, str(file), DPI) as writer:
+            for row, time in enumerate(times.tolist()):
+                if row == 1:
+                    figure.set_layout_engine("none")  # keeps the places of the first frame
+                for artist in [*scene.patches, *scene.lines]:
+                    artist.remove()
+                for drawn in shapes_at(samples, shapes, row):
+                    if drawn.reach(middle) <= FAR * view:
+                        draw_shape(scene, drawn)
+                cursor.set_xdata([time, time])
+                label = f"t = {words.number(time, 4)}{f' {unit}' if unit else ''}, {shown(str(samples.mode[row]), 40)}"
+                scene.set_xlabel(visible(label), loc="left", parse_math=False)
+                writer.grab_frame()
+                if progress is not None:
+                    progress(row + 1, len(times))
+        with replacing(target) as out:
+            out.write(file.read_bytes())
+
+
+def _writer(target: Path) -> Any:
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    if target.suffix.lower() == ".gif":
+        return PillowWriter(fps=FPS)
+    return FFMpegWriter(fps=FPS, extra_args=["-pix_fmt", "yuv420p", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"])
+
+
+def _set_up(figure: Figure, run: Execution, samples: Samples, shapes: Sequence[Any]) -> tuple[Figure, Axes, Any]:
+    """Size the picture after everything that the shapes reach, and draw what no frame changes."""
+    (left, right), (low, high) = _box(run, samples, shapes)
+    shape = min(1.6, max(0.35, (high - low) / (right - left)))
+    figure.set_size_inches(INCHES, round(INCHES * shape, 1) + 1.0)
+    grid = figure.add_gridspec(2, 1, height_ratios=[INCHES * shape, 0.18])
+    scene, ribbon = figure.add_subplot(grid[0]), figure.add_subplot(grid[1])
+    scene.set(xlim=(left, right), ylim=(low, high), aspect="equal", xticks=[], yticks=[])
+    scene.spines[:].set_visible(False)
+    scene.set_title(shown(words.heading(run), 70), loc="left", fontsize=10, fontweight="bold", parse_math=False)
+    data = curves(run)
+    for mode, fill in fills(data.modes, light=False).items():
+        spans = [(begin, end - begin) for name, begin, end in data.bands if name == mode]
+        ribbon.broken_barh(spans, (0, 1), label=mode, **fill)
+    start, end = data.span
+    ribbon.set(xlim=(start, end if end > start else start + 1), ylim=(0, 1), yticks=[])
+    ribbon.spines[:].set_visible(False)
+    ribbon.tick_params(labelsize=7)
+    return figure, scene, ribbon.axvline(start, color="#000000", linewidth=2.0)
+
+
+def _box(run: Execution, samples: Samples, shapes: Sequence[Any]) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Find the ends of both axes; what a run that stopped early does at its end is arbitrary."""
+    rows = len(samples) if run.stop.complete else max(1, int(0.97 * len(samples)))
+    reached = [drawn.extent for row in range(rows) for drawn in shapes_at(samples, shapes, row)]
+    points = np.concatenate(reached) if reached else np.zeros((1, 2))
+    low, high = points.min(axis=0), points.max(axis=0)
+    size = float(max(*(high - low), 1e-9 * np.abs(points).max())) or 1.0
+    room, least = 0.06 * size, 0.05 * size
+    ends = [(float(a) - room - least * (b - a < least), float(b) + room + least * (b - a < least))
+            for a, b in zip(low, high, strict=True)]  # fmt: skip
+    return ends[0], ends[1]

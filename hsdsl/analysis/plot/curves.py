@@ -1,0 +1,202 @@
+"""A run as curves to draw: dense enough to look smooth, thin enough to draw, broken where the run jumps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from hsdsl.engine.execution import Array, Execution, Samples
+from hsdsl.engine.execution.sampling import evaluate
+
+POINTS = 4000  # that a curve should have at least, where its pieces are not straight
+CELLS = 3000  # of the picture's width and height: two points in one cell look like one
+BANDS = 400  # with more changes of mode than this, time is cut into BINS and a bin may be of several modes
+BINS = 1500
+MOVING = 1000  # points of a guard that moves
+SEVERAL = "several modes"
+ROUND_OFF = 1e-12  # of the size of a state
+
+
+@dataclass(frozen=True)
+class GuardLine:
+    """A guard that is a level of one state: in ``mode`` something fires where ``state`` reaches ``value``.
+
+    A guard that moves has its values at times in ``moving``, and not-a-number for ``value``.
+    """
+
+    mode: str
+    state: str
+    value: float
+    label: str
+    moving: Callable[[Array], Array] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """The points of a run, in float64.
+
+    ``begins`` marks the first point of each arc, ``jumps`` are the indices of points behind transitions. ``bands`` are
+    the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many.
+    ``error`` is how much of its size a state may be off: one that changes by less is drawn as a constant.
+    """
+
+    samples: Samples
+    begins: Array
+    jumps: Array
+    bands: list[tuple[str, float, float]]
+    ends_badly: bool = False
+    error: float = ROUND_OFF
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The first and the last time."""
+        return float(self.samples.time[0]), float(self.samples.time[-1])
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """The modes of the bands, in the order of their first."""
+        return tuple(dict.fromkeys(mode for mode, _, _ in self.bands))
+
+    def has_values(self, name: str) -> bool:
+        """Whether a state or output has a number anywhere."""
+        return bool(np.isfinite(self.column(name)).any())
+
+    def column(self, name: str) -> Array:
+        """Return a state or output, not-a-number where there is nothing to draw."""
+        if name not in self.samples.names:
+            return np.full(len(self.samples), np.nan)
+        values = self.samples[name]
+        return np.where(np.isfinite(values), values, np.nan)
+
+
+def moving_levels(runs: Sequence[Curves], guards: Sequence[GuardLine]) -> Iterator[tuple[GuardLine, Array, Array]]:
+    """Each guard that moves, times of each run, and its values there; finite at most while its mode is occupied."""
+    for guard in guards:
+        for run in runs if guard.moving else ():
+            own = [(begin, end) for mode, begin, end in run.bands if mode in (guard.mode, SEVERAL)]
+            times = np.linspace(*run.span, MOVING)
+            inside = np.any([(begin <= times) & (times <= end) for begin, end in own], axis=0) if own else times < 0
+            assert guard.moving is not None
+            yield guard, times, np.where(inside, guard.moving(times), np.nan)
+
+
+def modes_of(runs: Sequence[Curves]) -> tuple[str, ...]:
+    """Return the modes of all runs, in the order of their first."""
+    return tuple(dict.fromkeys(mode for run in runs for mode in run.modes))
+
+
+def curves(execution: Execution) -> Curves:
+    """Make the curves of a run."""
+    run = _in_float64(execution)
+    rows, times = _points(run)
+    samples = evaluate(run, rows, times)
+    first = np.array([arc.first for arc in run.arcs])
+    begins = np.zeros(len(rows), dtype=bool)
+    begins[np.searchsorted(rows, first)] = True
+    jumps = np.flatnonzero(np.diff(samples.jump)) + 1
+    error = max(ROUND_OFF, 10 * float(run.settings.get("tolerance") or 0))
+    return Curves(samples, begins, jumps, _bands(run), not run.stop.complete, error)
+
+
+def _in_float64(execution: Execution) -> Execution:
+    if execution.digits is None:
+        return execution
+    columns = ("times", "values", "outputs", "depth", "coefficients")
+    return replace(execution, digits=None, **{name: getattr(execution, name).astype(float) for name in columns})
+
+
+def _points(run: Execution) -> tuple[Array, Array]:
+    """Divide each piece that is not a straight line evenly, the longer ones into more parts."""
+    n = len(run.times)
+    duration = np.diff(run.times, append=run.times[-1])
+    parts = np.ones(n, dtype=int)
+    if run.coefficients.shape[1] > 1 or run.output_function is not None:
+        share = np.maximum(duration / max(float(duration.sum()), np.finfo(float).tiny), 1 / n)
+        parts = np.where(duration > 0, np.maximum(np.ceil(POINTS * share), 1), 1).astype(int)
+    for arc in run.arcs:
+        parts[arc.last] = 1
+        if arc.kind == "strip":
+            parts[arc.first : arc.last] = 1
+    rows = np.repeat(np.arange(n), parts)
+    within = np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts)
+    return rows, run.times[rows] + duration[rows] * (within / parts[rows])
+
+
+def _bands(run: Execution) -> list[tuple[str, float, float]]:
+    bands = merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
+    if len(bands) <= BANDS:
+        return _visible(bands)
+    edges = np.linspace(bands[0][1], bands[-1][2], BINS + 1)
+    begins, ends = np.array([band[1] for band in bands]), np.array([band[2] for band in bands])
+    earliest: list[int] = np.searchsorted(ends, edges[:-1], side="right").tolist()
+    latest: list[int] = (np.searchsorted(begins, edges[1:], side="left") - 1).tolist()
+    modes = [bands[i][0] if i == k else SEVERAL for i, k in zip(earliest, latest, strict=True)]
+    return merged(list(zip(modes, edges[:-1].tolist(), edges[1:].tolist(), strict=True)))
+
+
+def _visible(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
+    """Leave out the bands narrower than a cell; the band before one covers it."""
+    if not bands:
+        return bands
+    start, end = bands[0][1], bands[-1][2]
+    wide = [band for band in bands if band[2] - band[1] >= (end - start) / CELLS]
+    begins = [start, *(band[1] for band in wide[1:]), end]
+    return merged([(band[0], *span) for band, span in zip(wide, pairwise(begins), strict=True)])
+
+
+def merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
+    """Make one band of those that follow each other in one mode."""
+    merged: list[tuple[str, float, float]] = []
+    for mode, begin, end in bands:
+        if begin == end:
+            continue
+        if merged and merged[-1][0] == mode:
+            begin = merged.pop()[1]
+        merged.append((mode, begin, end))
+    return merged
+
+
+def line(x: Array, y: Array, begins: Array, limits: tuple[float, float, float, float]) -> tuple[Array, Array]:
+    """Make a line to draw: not-a-number where an arc begins elsewhere, and no two points in a row in one cell."""
+    x0, x1, y0, y1 = limits
+    with np.errstate(invalid="ignore", over="ignore"):
+        cells = np.stack([(x - x0) / (x1 - x0) * CELLS, (y - y0) / (y1 - y0) * CELLS])
+        cells = np.round(np.clip(np.nan_to_num(cells, nan=-9e9), -9e9, 9e9))
+    moved = np.any(np.diff(cells, axis=1) != 0, axis=0)
+    broken = begins[1:] & ((x[1:] != x[:-1]) | (y[1:] != y[:-1])) & moved
+    keep = np.ones(len(x), dtype=bool)
+    keep[1:-1] = moved[:-1] | broken[1:]  # the last point before a break must stay
+    where = np.flatnonzero(np.concatenate([[False], broken])[keep])
+    return np.insert(x[keep], where, np.nan), np.insert(y[keep], where, np.nan)
+
+
+def limits_of(runs: Sequence[Curves], name: str) -> tuple[float, float]:
+    """Choose the ends of an axis on which all runs are."""
+    ends = [
+        limits(run.column(name), run.samples.time, run.ends_badly, run.error) for run in runs if run.has_values(name)
+    ]
+    return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else (-1.0, 1.0)
+
+
+def limits(values: Array, time: Array, ends_badly: bool, error: float = ROUND_OFF) -> tuple[float, float]:
+    """Choose the lower and upper end of an axis.
+
+    A range within the error of the values is shown as constant; small values are not. Where the run ended badly
+    its last values are arbitrary, and the last thirtieth of the time does not count.
+    """
+    if ends_badly and len(time) > 1:
+        before = time <= time[0] + 0.97 * (time[-1] - time[0])
+        values = values[before] if np.isfinite(values[before]).any() else values
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return -1.0, 1.0
+    low, high = float(finite.min()), float(finite.max())
+    size = max(abs(low), abs(high))
+    if high - low <= error * size:
+        room = 0.1 * size or 1.0
+        return low - room, high + room
+    room = high / 16 - low / 16
+    return low - room, high + room

@@ -1,0 +1,202 @@
+"""The parts of a run in words, the same in text, in HTML and on a plot."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hsdsl.analysis.report.alike import condensed
+from hsdsl.analysis.report.remedies import remedies_of
+from hsdsl.base.defaults import kept_digits
+from hsdsl.base.names import called, seen, without_memory
+from hsdsl.base.numbers import decimals
+from hsdsl.base.parts import change, compact, of_all
+from hsdsl.engine.execution import Execution, Transition
+
+DIGITS = 10  # of a run without a tolerance, whose error nothing says
+_LEAST_DIGITS, _MOST_DIGITS = 3, 16
+MOST_WORDS = 25  # of a sentence
+_CLAUSE = re.compile(r"[:;,] ")
+COLUMNS = ("#", "time", "delay", "edge", "from -> to", "state")
+
+
+def number(x: Any, digits: int = 6) -> str:
+    """Write a number to a few significant digits, zero without a sign; text and None as they are."""
+    if isinstance(x, (bool, int)) or not (isinstance(x, float) or decimals.is_multiprecision(x)):
+        return str(x)
+    return f"{float(x) + 0.0:.{digits}g}"
+
+
+def values(named: Mapping[str, Any], digits: int = DIGITS) -> str:
+    """Write named values."""
+    return ", ".join(f"{name} = {number(value, digits)}" for name, value in named.items())
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows of cells as lines, with columns as wide as their widest cell."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def meant_digits(execution: Execution) -> int:
+    """How many digits of its times and states a run means: those of its tolerance and one more, where it has one."""
+    tolerance = execution.settings.get("tolerance")
+    if not tolerance:
+        return DIGITS
+    finest = 10.0 ** (1 - _MOST_DIGITS)  # of many digits it may be below all floats
+    return max(_LEAST_DIGITS, 1 - math.floor(math.log10(max(tolerance, finest))))
+
+
+def heading(execution: Execution) -> str:
+    """Name the run: the model's title, or its file."""
+    return called(execution.title, execution.model)
+
+
+def settings(execution: Execution) -> list[str]:
+    """List the scheme, the method and the settings of a run, which has equal bits by either engine."""
+    chosen = [f"{execution.scheme} {execution.method}"]
+    shown = {"scheme", "method", "engine", "method_chosen"}
+    for name, value in execution.settings.items():
+        if name not in shown and value is not None and not isinstance(value, (Mapping, list, tuple)):
+            chosen.append(f"{name} {number(value)}")
+    if execution.digits is not None and "precision" not in execution.settings:
+        chosen.append(f"{execution.digits} digits{_kept(execution)}")
+    return chosen
+
+
+def _kept(execution: Execution) -> str:
+    """The number of digits that the tolerance keeps, where these are far fewer than there are."""
+    tolerance, digits = execution.settings.get("tolerance"), execution.digits
+    if tolerance is None or digits is None:
+        return ""
+    kept = len(str(int(1 / tolerance + 0.5))) - 1
+    return f", of which the tolerance keeps {kept}" if kept < kept_digits(digits) else ""
+
+
+def overrides(execution: Execution) -> str:
+    """Parameters and initial values that are not those of the file; `settings` has the others."""
+    given = {n: v for n, v in execution.overrides.items() if not n.startswith("experiment.")}
+    alike = Counter((of_all(name), values({"": value})) for name, value in given.items())
+    found: dict[str, Any] = {}
+    for name, value in given.items():
+        count = alike[of_all(name), values({"": value})]
+        found[name if count == 1 else f"{of_all(name)} of {count} instances"] = value
+    return values(found)
+
+
+def facts(execution: Execution) -> Iterator[tuple[str, str]]:
+    """Labels and texts of the end of a run: warnings, verdict, its reasons where it has more to say, and seconds."""
+    final, left_out = execution.final, execution.settings.get("left_out")
+    count = f"{final.jump} transition{'' if final.jump == 1 else 's'}"
+    waiting = ", waiting in a strip" if final.kind == "strip" else ""
+    yield "stop", stop(execution)
+    yield "final", f"mode {compact(final.mode)} after {count}{waiting}"
+    digits = meant_digits(execution)
+    yield "state", values(seen(final.state), digits)
+    yield "outputs", values({name: value for name, value in final.outputs.items() if value == value}, digits)
+    if left_out is not None:
+        yield "left out", f"{', '.join(left_out['states'])}: {left_out['reason']}"
+    yield from (("warning", each) for each in condensed([warning.message for warning in execution.warnings]))
+    yield "verdict", conclusion(execution)
+    if conclusion(execution) != ": ".join((execution.verdict.theorem, *reasons(execution))):
+        yield from (("reason", each) for each in reasons(execution))
+    if execution.verdict.theorem == "unknown":
+        yield from (("remedy", each) for each in remedies_of(execution.verdict.reasons))
+    yield "time", ", ".join(f"{stage} {value:.3g} s" for stage, value in execution.seconds.items())
+
+
+def conclusion(execution: Execution) -> str:
+    """The verdict with its first reason, as many clauses of that as make one short sentence."""
+    theorem, first = execution.verdict.theorem, next(iter(reasons(execution)), "")
+    if not first:
+        return theorem
+    most = MOST_WORDS - 2  # the theorem, and where to read more
+    clauses = [first[: place.start()] for place in _CLAUSE.finditer(first)]
+    fitting = [clause for clause in (*clauses, first) if len(clause.split()) <= most]
+    return f"{theorem}: {fitting[-1] if fitting else ' '.join(first.split()[:most])}"
+
+
+def reasons(execution: Execution) -> list[str]:
+    """The reasons of the verdict; a stop that the lines above describe is only named."""
+    reason, message = execution.stop.reason, execution.stop.message
+    stops = f"the run stops ({reason})"
+    named = [text.replace(message, stops) for text in execution.verdict.reasons]
+    return condensed([text for text in named if text != stops or sum(stops in other for other in named) == 1])
+
+
+def stop(execution: Execution) -> str:
+    """Why and when the run ended."""
+    reason, message = execution.stop.reason, execution.stop.message
+    when = "" if "t = " in message else f" at t = {number(execution.stop.time, 10)}"
+    return f"{reason}{when}: {message}"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of transitions by `COLUMNS`; after the first ``cut`` of them ``left_out`` are missing."""
+
+    rows: Sequence[tuple[str, ...]]
+    cut: int
+    left_out: int
+
+    @staticmethod
+    def of(execution: Execution, limit: int) -> Table:
+        """Write the first and the last transitions, ``limit`` in all."""
+        transitions, digits = execution.transitions, meant_digits(execution)
+        count = len(transitions)
+        cut = (limit + 1) // 2 if count > limit else count
+        chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
+        instants = times([t.time for t in chosen], digits)
+        rows = [
+            (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t, min(6, digits)))
+            for t, instant in zip(chosen, instants, strict=True)
+        ]
+        return Table(rows, cut, count - len(chosen))
+
+
+def times(values: Sequence[Any], digits: int) -> list[str]:
+    """Write times with one number of decimals, about so many significant digits for the largest."""
+    finite = [float(t) for t in values if decimals.is_finite(t)]
+    largest = max((abs(t) for t in finite), default=0.0)
+    if largest >= 1e9 or 0.0 < largest < 1e-3:
+        return [f"{float(t):.{digits}g}" for t in values]
+    zeros = max(0, -math.floor(math.log10(largest)) - 1) if largest else 0  # behind the point, before its digits
+    places = max(0, digits - len(str(int(largest)))) + zeros
+    return [f"{float(t):.{places}f}" for t in values]
+
+
+def _delay(transition: Transition) -> str:
+    """The duration of the strip, ``-`` where there was none."""
+    if transition.resumed is None:
+        return "open"
+    waited = float(transition.resumed - transition.time)
+    return f"{waited:.2e}" if waited else "-"
+
+
+def _changes(transition: Transition, digits: int) -> str:
+    """What a transition changed in the state, and what is special about it."""
+    words = [_state(transition, digits)]
+    if transition.entry:
+        words.append("at once on entering the mode")
+    if transition.alternatives:
+        words.append("reached too: " + ", ".join(transition.alternatives))
+    return "; ".join(words)
+
+
+def _state(transition: Transition, digits: int) -> str:
+    before, after = transition.before, transition.after
+    if after is None:
+        return "the run ended in the strip"
+    old, new = without_memory(before), without_memory(after)
+    words = [
+        f"{name}: {number(before[name], digits)} -> {number(after[name], digits)}"
+        for name in new
+        if name in before and before[name] != after[name]
+    ]
+    words += [f"{name}: {number(after[name], digits)} (new)" for name in new if name not in before]
+    words += [f"{name} dropped" for name in old if name not in after]
+    return ", ".join(words) or "unchanged"

@@ -1,0 +1,271 @@
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportReturnType=false
+"""A hybrid system with the derivatives of its states as further states, which any engine can run.
+
+With x' = f along an arc, S = dx/dp obeys S' = f_x S + f_p. At a crossing of a guard r, at the rate L = L_f r, the time
+of the crossing moves by T = -(r_x S + r_p) / L. A reset R to a mode with the flow g takes S to
+
+    R_x S + R_p + (R_t + R_x f - g) T,
+
+which is the saltation matrix where r and R depend on states alone (M. A. Aizerman and F. R. Gantmakher, Quarterly
+Journal of Mechanics and Applied Mathematics 11, 1958). A transition on entry keeps the T of the instant.
+
+Each derivative has a state of its own, and each T has one that stays as it is between transitions; those that are zero
+in every run are left out.
+
+A stiff flow is a small difference of large terms, f = k (z - x): the last digit of x is k units of it. The end of an
+implicit step tells it without them, from the states' increments. So where an implicit method runs the system, L and
+R_x f take slopes that the method puts into states of their own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import sympy as sp
+
+from hsdsl.analysis.sensitivity.chain import Slopes, slopes
+from hsdsl.analysis.sensitivity.dependence import Dependence, Jump
+from hsdsl.analysis.sensitivity.derivatives import Derivatives
+from hsdsl.analysis.sensitivity.overrides import Overridden
+from hsdsl.analysis.sensitivity.state_names import (
+    ERROR,
+    LAST,
+    MEASURED,
+    SPAN,
+    UNIT,
+    derivative_name,
+    rate_name,
+    shift_name,
+    slope_name,
+    still_rate_name,
+)
+from hsdsl.analysis.sensitivity.targets import Target
+from hsdsl.base.functions import below, maximum, sign
+from hsdsl.language.expression.scope import symbol
+from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Parameter, started
+
+
+def augmented(given: Overridden, by: Sequence[Target], entries: bool = False, implicit: bool = False) -> HybridSystem:
+    """Write a system with the derivatives of its states.
+
+    ``entries`` lets it make transitions on entry; without it those of a run have the derivative of a crossing.
+    With ``implicit`` an implicit method runs it, and its Jacobian has the second derivatives of the flow. Without these
+    the derivatives would follow the states an iteration later, and no factors of a step would serve for the next.
+    """
+    return _Writer(given, by, entries, implicit).system()
+
+
+def preferring(system: HybridSystem, firsts: Sequence[str]) -> HybridSystem:
+    """The system in which some edges go before others that are tied with them."""
+    if not firsts:
+        return system
+    highest = 1 + max(edge.priority for edge in system.edges)
+    modes = (
+        replace(m, edges=tuple(replace(e, priority=highest) if e.name in firsts else e for e in m.edges))
+        for m in system.modes
+    )
+    return replace(system, modes=tuple(modes))
+
+
+class _Writer:
+    def __init__(self, given: Overridden, by: Sequence[Target], entries: bool, implicit: bool) -> None:
+        self.base, self.labels, self.entries = given.system, [t.label for t in by], entries
+        self.implicit, self.ends_at_rest = implicit, any(not mode.states for mode in self.base.modes)
+        self.of = Derivatives(given, by)
+        self.start = self._start(given, by)
+        self.dependence = Dependence(self.of, self.start, self.base.initial.mode)
+        self.columns = self.of.columns
+        self.flowing = {m.name: [x for x, f in zip(m.states, m.flow, strict=True) if f != 0] for m in self.base.modes}
+
+    def system(self) -> HybridSystem:
+        """The whole system."""
+        base, names = self.base, [name for name, _ in self.base.initial.values]
+        states = tuple(self._states(base.initial.mode, names))
+        values = dict(base.initial.in_order) | {
+            derivative_name(x, self.labels[k]): value for (x, k), value in self.start.items()
+        }
+        values |= {name: sp.S.Zero for name in states if name not in values}
+        return replace(
+            base,
+            parameters=(*base.parameters, *(Parameter(name, sp.S.One, "1") for name in (UNIT, SPAN, ERROR))),
+            inputs=tuple(self.of.inputs),
+            modes=tuple(map(self._mode, base.modes)),
+            outputs=tuple(self._output_names()),
+            units={},
+            initial=started(base.initial.mode, states, tuple(values.items())),
+            experiment=replace(
+                base.experiment,
+                until=symbol(SPAN),
+                scheme=None,
+                method=None,
+                step=None,
+                tolerance=None,
+                samples=None,
+                every=None,
+            ),
+            reference=(),
+            scene=(),
+        )
+
+    def _start(self, given: Overridden, by: Sequence[Target]) -> dict[tuple[str, int], sp.Expr]:
+        """The derivatives of the initial state that are not zero."""
+        found: dict[tuple[str, int], sp.Expr] = {}
+        earlier: list[sp.Symbol] = []
+        for name, value in given.system.initial.in_order:
+            (row,) = slopes([value], [*self.of.moving, *earlier])
+            earlier.append(symbol(name))
+            for k, target in enumerate(by):
+                through = (row[x] * found.get((x.name, k), sp.S.Zero) for x in earlier if x in row)
+                slope = sp.S.Zero if name in given.placed else sp.Add(self.of.by(row, k), *through)
+                slope = sp.S.One if target.initial and target.name == name else slope
+                if slope != 0:
+                    found[name, k] = slope
+        return found
+
+    def _states(self, mode: str, names: Sequence[str]) -> Iterator[str]:
+        """The states of a mode: the model's, their derivatives, those of the last transition's time."""
+        yield from names
+        yield from (derivative_name(x, self.labels[k]) for k, x in self._pairs(mode, names))
+        yield from (shift_name(self.labels[k]) for k in self._shifting(mode))
+        if self.entries:
+            yield LAST
+        if measured := self._measured(mode):
+            yield from (*map(slope_name, measured), MEASURED)
+
+    def _measured(self, mode: str) -> list[str]:
+        """The states of a mode whose slopes decide how its transitions move."""
+        jumps = self.dependence.jumps[mode] if self.implicit and self.dependence.times else ()
+        rows = [
+            row for j in jumps for row in (j.guard, *(r for r, leap in zip(j.resets, j.leaps, strict=True) if leap))
+        ]
+        return [x for x in self.flowing[mode] if any(symbol(x) in row for row in rows)]
+
+    def _slopes(self, mode: Mode) -> list[sp.Expr]:
+        """The flow of a mode at the end of an arc, measured where it is."""
+        measured, known = self._measured(mode.name), symbol(MEASURED)
+        return [
+            (1 - known) * f + known * symbol(slope_name(x)) if x in measured else f
+            for x, f in zip(mode.states, mode.flow, strict=True)
+        ]
+
+    def _pairs(self, mode: str, names: Sequence[str]) -> list[tuple[int, str]]:
+        """The derivatives that a mode has, column by column."""
+        return [(k, x) for k in self.columns for x in names if (mode, x, k) in self.dependence.states]
+
+    def _derivatives(self, mode: str, names: Sequence[str]) -> Iterator[str]:
+        yield from (derivative_name(x, self.labels[k]) for k, x in self._pairs(mode, names))
+
+    def _varied(self, mode: Mode) -> Iterator[tuple[int, ...]]:
+        pairs = self._pairs(mode.name, mode.states)
+        for k in self.columns if self.implicit else ():
+            if column := tuple(mode.states.index(x) for j, x in pairs if j == k):
+                yield column
+
+    def _shifting(self, mode: str) -> list[int]:
+        return [k for k in self.columns if (mode, k) in self.dependence.times]
+
+    def _total(self, row: Slopes, mode: Mode, k: int) -> sp.Expr:
+        """A derivative at a fixed time: g_x S + g_p."""
+        moved = (
+            (symbol(x), symbol(derivative_name(x, self.labels[k])))
+            for j, x in self._pairs(mode.name, mode.states)
+            if j == k
+        )
+        return sp.Add(*(row.get(x, sp.S.Zero) * s for x, s in moved), self.of.by(row, k))
+
+    def _mode(self, mode: Mode) -> Mode:
+        rows = dict(zip(mode.states, self.dependence.flows[mode.name], strict=True))
+        derivatives = [self._total(rows[x], mode, k) for k, x in self._pairs(mode.name, mode.states)]
+        states = tuple(self._states(mode.name, mode.states)) if mode.states else ()
+        still = [sp.S.Zero] * (len(states) - len(mode.flow) - len(derivatives))
+        jumps = self.dependence.jumps[mode.name]
+        return replace(
+            mode,
+            derived=len(states) - len(mode.states),
+            varied=tuple(self._varied(mode)),
+            measured=tuple(map(mode.states.index, self._measured(mode.name))) if mode.states else (),
+            states=states,
+            flow=(*mode.flow, *derivatives, *still),
+            flow_texts=(*mode.flow_texts, *(f"the {name}" for name in states[len(mode.flow) :])),
+            edges=tuple(self._edge(mode, edge, jump) for edge, jump in zip(mode.edges, jumps, strict=True)),
+            outputs=tuple(self._outputs(mode)),
+            queues=tuple(replace(q, values=(*q.values, *self._derivatives(mode.name, q.values))) for q in mode.queues),
+            scene=(),
+        )
+
+    def _output_names(self) -> Iterator[str]:
+        for y in self.base.outputs:
+            yield from (y, rate_name(y), *([still_rate_name(y)] if self.ends_at_rest else []))
+            yield from (derivative_name(y, label) for label in self.labels)
+
+    def _outputs(self, mode: Mode) -> Iterator[sp.Expr | None]:
+        rows = iter(self.of.rows([y for y in mode.outputs if y is not None], mode.states))
+        for y in mode.outputs:
+            if y is None:
+                yield from [None] * (2 + self.ends_at_rest + len(self.labels))
+            else:
+                row = next(rows)
+                yield from (y, self.of.along(row, mode), *([self.of.by_time(row)] if self.ends_at_rest else []))
+                yield from (self._total(row, mode, k) for k in self.columns)
+
+    def _edge(self, mode: Mode, edge: Edge, jump: Jump) -> Edge:
+        shifts, entered = self._shifts(mode, edge, jump), self.dependence.entered(mode, edge)
+        rows = dict(zip(edge.target_states, zip(jump.resets, jump.leaps, strict=True), strict=True))
+        slopes, after = self._slopes(mode), dict(zip(edge.target_states, jump.after, strict=True))
+        leaps = {
+            x: self.of.along(row, mode, slopes) - after[x] if leap != 0 else leap for x, (row, leap) in rows.items()
+        }
+        derivatives = [
+            self._total(rows[x][0], mode, k) + leaps[x] * shifts[k] for k, x in self._pairs(entered, edge.target_states)
+        ]
+        states = tuple(self._states(entered, edge.target_states))
+        further = (*derivatives, *(shifts[k] for k in self._shifting(entered)), *([TIME] if self.entries else []))
+        further = (*further, *[sp.S.Zero] * (len(states) - len(edge.reset) - len(further)))  # nothing is measured yet
+        texts = (*edge.reset_texts, *(f"the {name}" for name in states[len(edge.reset) :]))
+        reset = (*edge.reset, *further)
+        return replace(edge, target_states=states, reset=reset, reset_texts=texts, derived=len(further))
+
+    def _rate(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
+        """The rate at which a guard is crossed; 0 where an error of the run decides whether it is.
+
+        A surface that rises at the rate a and bends by b stays crossed while it moves by less than a**2 / (2 |b|).
+        """
+        (bends,) = self.of.rows([jump.rate], mode.states)
+        rate = self.of.along(jump.guard, mode, self._slopes(mode))
+        margin = rate**2 - 2 * _size(self.of.along(bends, mode)) * symbol(ERROR) * self._sizes(mode, edge, jump)
+        return below(-margin, 0, rate, sp.S.Zero)
+
+    def _sizes(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
+        """The sizes of the numbers that a guard is computed from."""
+        guard, surface = jump.guard, edge.surface
+        terms = [surface.left, surface.right, self.of.by_time(guard) * TIME]
+        terms += [guard[x] * x for x in map(symbol, mode.states) if x in guard]
+        return sp.Add(*map(_size, terms))
+
+    def _shifts(self, mode: Mode, edge: Edge, jump: Jump) -> list[sp.Expr]:
+        """How fast the time of a transition moves, by each target."""
+        moved = [-self._total(jump.guard, mode, k) for k in self.columns]
+        crossing = self._rate(mode, edge, jump)
+        if not self.entries or edge.condition is not None:
+            return [m / crossing for m in moved]
+        beyond, tie = self._beyond(mode, edge, jump), self._tie()
+        earlier = maximum(sign(TIME - symbol(LAST) - tie), sp.S.Zero)  # 1 where an input's jump is what fires it
+        known = self._shifting(mode.name)
+        before = [symbol(shift_name(self.labels[k])) * (1 - earlier) if k in known else sp.S.Zero for k in self.columns]
+        divisor = (1 - beyond) * crossing + beyond
+        return [(1 - beyond) * m / divisor + beyond * b for m, b in zip(moved, before, strict=True)]
+
+    def _tie(self) -> sp.Expr:
+        return sp.Rational(1, 10**12) * (TIME + symbol(SPAN))
+
+    def _beyond(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
+        """1 where the state is beyond the guard by more than round-off, or on it and does not move; else 0."""
+        bound = 32 * symbol(UNIT) * self._sizes(mode, edge, jump) + 2 * self._tie() * _size(jump.rate)
+        moves = below(-_size(jump.rate), 0, sp.S.Zero, sp.S.One)
+        return below(bound - edge.surface.residual, 0, sp.S.One, moves)
+
+
+def _size(term: sp.Expr) -> sp.Expr:
+    """The size of a number in a reset. A step has no boundary where it bends, as it has where |u| of time does."""
+    return below(term, 0, -term, term)

@@ -1,0 +1,172 @@
+"""The manifest of a sweep's dataset: which model, values and settings its rows are of, as JSON in ``_sweep.json``.
+
+Readers of Parquet skip files whose names begin with an underscore.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+from hsdsl.analysis.store.sidecar import versions
+from hsdsl.analysis.sweep.recording import Recording
+from hsdsl.analysis.sweep.variation import Draw, Grid, Variation
+from hsdsl.base.atomic import replacing
+from hsdsl.base.errors import UsageError
+
+FILE, FORMAT, VERSION = "_sweep.json", "hsdsl sweep", 1
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """What a dataset is of.
+
+    ``digest`` is the checksum of the model with its data, ``arguments`` are those of every run, ``states`` and
+    ``outputs`` the names that have columns, ``chunk`` the number of rows of a file.
+    ``tag`` is a checksum of all that decides what is in the rows; each file of the dataset carries it.
+    """
+
+    model: str
+    digest: str
+    title: str | None
+    units: dict[str, str]
+    variation: Variation
+    recording: Recording
+    arguments: dict[str, Any]
+    states: tuple[str, ...]
+    outputs: tuple[str, ...]
+    chunk: int
+    made_with: dict[str, str]
+    tag: str = ""
+
+    @property
+    def chunks(self) -> int:
+        """How many files a complete dataset has."""
+        return -(-self.variation.rows // self.chunk)
+
+    def rows_of(self, chunk: int) -> tuple[int, int]:
+        """The first row of a chunk, and one more than the last."""
+        return chunk * self.chunk, min((chunk + 1) * self.chunk, self.variation.rows)
+
+    def plain(self) -> dict[str, Any]:
+        """As JSON has it."""
+        variation = self.variation
+        content = {
+            "format": FORMAT,
+            "version": VERSION,
+            "tag": self.tag,
+            "hsdsl": self.made_with.get("hsdsl", ""),
+            "versions": self.made_with,
+            "model": self.model,
+            "sha256": self.digest,
+            "title": self.title,
+            "units": self.units,
+            "vary": [asdict(each) for each in (*variation.grids, *variation.draws)],
+            "random": variation.random,
+            "seed": variation.seed if variation.draws else None,
+            "record": self.recording.plain(),
+            "settings": self.arguments,
+            "states": self.states,
+            "outputs": self.outputs,
+            "rows": variation.rows,
+            "chunk": self.chunk,
+        }
+        return cast("dict[str, Any]", json.loads(json.dumps(content)))
+
+    def write(self, folder: Path) -> None:
+        """Write it into a folder."""
+        with replacing(folder / FILE) as file:
+            file.write((json.dumps(self.plain(), indent=1) + "\n").encode())
+
+    def check_same(self, other: Manifest, folder: Path) -> None:
+        """Refuse to go on with a dataset of something else.
+
+        Raises UsageError: the other one is of another model, or other values or settings.
+        """
+        differing = [name for name, mine, theirs in _differences(self.plain(), other.plain()) if mine != theirs]
+        if differing:
+            raise UsageError(
+                f"{folder} holds a sweep that differs in {', '.join(differing)}",
+                "choose another folder, or remove this one to begin anew",
+            )
+
+
+DECIDING = {
+    "sha256": "the model", "hsdsl": "the version of hsdsl", "vary": "what varies", "random": "the number of draws",
+    "seed": "the seed", "record": "what is recorded", "settings": "the settings", "states": "the columns",
+    "outputs": "the columns",
+}  # fmt: skip
+
+
+def _differences(mine: Mapping[str, Any], theirs: Mapping[str, Any]) -> Iterator[tuple[str, Any, Any]]:
+    for key, name in DECIDING.items():
+        if key == "settings":
+            yield name, _numbers(mine[key]), _numbers(theirs[key])
+            continue
+        detail = f"{name} ({theirs[key]}, not {mine[key]})" if key in ("hsdsl", "random", "seed") else name
+        yield detail, mine[key], theirs[key]
+
+
+def _numbers(settings: Any) -> Any:
+    """Settings with each number as one, also where a command line gave its text."""
+    if isinstance(settings, Mapping):
+        return {name: _numbers(value) for name, value in cast("Mapping[str, Any]", settings).items()}
+    if isinstance(settings, list):
+        return [_numbers(value) for value in cast("list[Any]", settings)]
+    if isinstance(settings, str):
+        try:
+            return float(settings)
+        except ValueError:
+            return settings.strip()
+    return settings
+
+
+def new(**fields: Any) -> Manifest:
+    """A manifest of what this version of hsdsl writes."""
+    untagged = Manifest(**fields, made_with=versions())
+    text = json.dumps([untagged.plain()[key] for key in DECIDING], sort_keys=True)
+    return replace(untagged, tag=hashlib.sha256(text.encode()).hexdigest())
+
+
+def read(folder: Path) -> Manifest:
+    """Read the manifest of a dataset.
+
+    Raises UsageError: there is none, it is damaged, or a later version of hsdsl wrote it.
+    """
+    path = folder / FILE
+    try:
+        content = cast("dict[str, Any]", json.loads(path.read_bytes()))
+        if content["format"] != FORMAT or type(content["version"]) is not int or content["version"] < 1:
+            raise ValueError("another format")
+        if content["version"] > VERSION:
+            reason = f"a later version of hsdsl wrote it, in format {content['version']}; this one reads {VERSION}"
+            raise UsageError(f"cannot read {path}: {reason}", "update hsdsl")
+        return _parsed(content)
+    except FileNotFoundError:
+        raise UsageError(f"{folder} is not a sweep: it has no {FILE}") from None
+    except OSError as error:
+        raise UsageError(f"cannot read {path}: {error.strerror or error}") from None
+    except (ValueError, KeyError, TypeError, RecursionError):
+        raise UsageError(f"cannot read {path}: it is damaged, or not the manifest of a sweep") from None
+
+
+def _parsed(content: Mapping[str, Any]) -> Manifest:
+    grids, draws = list[Grid](), list[Draw]()
+    for item in content["vary"]:
+        if "values" in item:
+            grids.append(Grid(str(item["name"]), tuple(map(float, item["values"])), bool(item["logarithmic"])))
+        else:
+            draws.append(Draw(str(item["name"]), str(item["distribution"]), tuple(map(float, item["arguments"]))))
+    variation = Variation(tuple(grids), tuple(draws), int(content["random"]), int(content["seed"] or 0))
+    chunk = int(content["chunk"])
+    if variation.rows != content["rows"] or chunk < 1:
+        raise ValueError("other rows")
+    return Manifest(
+        str(content["model"]), str(content["sha256"]), content["title"], dict(content["units"]), variation,
+        Recording(**content["record"]), dict(content["settings"]), tuple(content["states"]), tuple(content["outputs"]),
+        chunk, dict(content["versions"]), str(content["tag"]),
+    )  # fmt: skip

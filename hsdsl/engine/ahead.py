@@ -1,0 +1,267 @@
+"""A model that is elaborated, lowered and compiled in another process, while this one loads what runs it.
+
+The other process is a copy of this one from before anything large was loaded. It answers with the program or with the
+errors of the model; where it ends without an answer, this process does the work itself. Large models are lowered in
+two processes. Then it makes what is missing in the cache of compiled code, even where this process ends before.
+"""
+
+from __future__ import annotations
+
+import atexit
+import os
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Generic, NamedTuple, NoReturn, TypeVar
+
+from hsdsl.base import interrupts
+from hsdsl.base.errors import ModelError, UsageError
+from hsdsl.base.limits import applied, cores, current
+from hsdsl.language.files import ModelFiles
+from hsdsl.mathematics import program_cache
+from hsdsl.mathematics.program import Program
+
+First = TypeVar("First")
+Second = TypeVar("Second")
+Result = TypeVar("Result")
+
+
+class Lowered(NamedTuple):
+    """The program of a model, the one with modes of sliding where it has them, and all bytes they were made from."""
+
+    program: Program
+    sliding: Program | None
+    files: ModelFiles
+
+
+Answer = Lowered | ModelError | None
+LARGE = 0.03  # seconds to elaborate a model, from which on a copy takes less time than half of the lowering
+NICE = 5  # the run that needs no compiled code goes first
+# what pydantic and SymPy load where they first look for plugins and tensors, of which no model has any: for nothing
+_UNUSED: dict[str, dict[str, type]] = {
+    "pydantic.plugin._loader": {"get_plugins": tuple},
+    "sympy.tensor.tensor": {name: type(name, (), {}) for name in ("TensAdd", "TensExpr")},
+}
+
+
+@dataclass(frozen=True)
+class _Copy(Generic[Result]):
+    """A copy of this process that does some work, and where its answer is read."""
+
+    process: int
+    answer: int
+
+    def wait(self) -> Result | None:
+        """Its answer; None where it ends without one."""
+        import pickle  # what was compiled before needs none
+
+        with open(self.answer, "rb", closefd=False) as stream:
+            written = stream.read()
+        with suppress(EOFError, pickle.UnpicklingError):
+            return pickle.loads(written)
+        return None
+
+    def end(self) -> None:
+        """End the process, if it has not ended; until it is waited for, its number is no other's."""
+        from signal import SIGKILL
+
+        os.close(self.answer)
+        with suppress(ProcessLookupError):
+            os.kill(self.process, SIGKILL)
+        with suppress(ChildProcessError):
+            os.waitpid(self.process, 0)
+
+
+_begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
+_seen: list[ModelFiles] = []
+_going_on: list[int] = []  # copies that have answered
+
+
+def begin(files: ModelFiles, compiled: bool = True) -> None:
+    """Begin to lower a model in another process, where that saves time, and to compile it: see :func:`taken`."""
+    if files in _seen:
+        return
+    _seen.append(files)
+    if _saves_time() and not program_cache.is_kept(files):
+        with suppress(OSError):  # there may be no more processes
+            _begun.append((files, _copy(lambda: _lowered(files), _compile if compiled else None)))
+
+
+def begin_run(words: list[str]) -> None:
+    """Begin with the model of a command line that runs it as it is, before what reads other command lines is loaded."""
+    match words:
+        case ["run", model, *options] if set(options) <= {"--json", "--quiet", "-q"} and os.path.isfile(model):
+            with suppress(UsageError):  # which the command reports
+                begin(ModelFiles.read(Path(model)))
+        case _:
+            pass
+
+
+def _saves_time() -> bool:
+    """Whether this process has one thread, nothing large is loaded, and there are two processors or more."""
+    return (
+        sys.platform == "linux"  # elsewhere a copy may not use the libraries of the system, or there is none
+        and cores() > 1
+        and not sys.modules.keys() & {"numpy", "sympy"}
+        and len(os.listdir("/proc/self/task")) == 1
+    )
+
+
+def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
+    """The programs of a model that was begun; None if there are none.
+
+    Modules that are needed afterwards are imported while the other process works.
+
+    Raises ModelError: the model has errors.
+    """
+    for one in [each for each in _begun if each[0] == files]:
+        for name in needed:
+            import_module(name)
+        answer = one[1].wait()
+        _begun.remove(one)
+        if isinstance(answer, Lowered):
+            os.close(one[1].answer)
+            _going_on.append(one[1].process)
+            return answer
+        one[1].end()
+        if answer is not None:
+            raise answer
+    return None
+
+
+def compiling() -> bool:
+    """Whether another process compiles what it has lowered for this one."""
+    for process in [*_going_on]:
+        try:
+            ended = os.waitpid(process, os.WNOHANG)[0]
+        except ChildProcessError:  # this process keeps no ends of others
+            ended = True
+        if ended:
+            _going_on.remove(process)
+    return bool(_going_on)
+
+
+def _copy(work: Callable[[], Result], then: Callable[[Result], object] | None = None) -> _Copy[Result]:
+    """Begin some work in a copy of this process, which may go on by itself when it has answered.
+
+    Raises OSError: there may be no more processes.
+    """
+    answer, to_answer = os.pipe()
+    try:
+        process = os.fork()
+    except OSError:
+        os.close(answer)
+        raise
+    else:
+        if process == 0:
+            os.close(answer)  # else a large answer is waited with for ever where the reader has ended
+            _work(work, to_answer, then)
+        return _Copy(process, answer)
+    finally:
+        os.close(to_answer)
+
+
+def _work(work: Callable[[], Result], to_answer: int, then: Callable[[Result], object] | None) -> NoReturn:
+    """Answer, go on, and end this process without what its copy does at its end."""
+    import ctypes
+    import pickle
+    import signal
+
+    try:
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: nobody reads what it answers then
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # the other one says that it was interrupted
+        answer = work()
+        content = pickle.dumps(answer)
+        with open(to_answer, "wb") as stream:
+            stream.write(content)
+        if then is not None:
+            ctypes.CDLL(None).prctl(1, 0)
+            _leave()
+            then(answer)
+    finally:
+        os._exit(0)
+
+
+def _leave() -> None:
+    """Keep nothing open that others wait for, be it a pipe or a lock, get no Ctrl-C, and let others work first."""
+    os.setpgid(0, 0)
+    os.nice(NICE)
+    os.closerange(0, 1 + max(map(int, os.listdir("/proc/self/fd"))))
+    for _ in range(3):
+        os.open(os.devnull, os.O_RDWR)
+
+
+def _both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
+    """Do two things at once, the second in a copy of this process, and here where that gives no answer."""
+    try:
+        other = _copy(lambda: _in_time(second))
+    except OSError:  # there may be no more processes
+        return first(), second()
+    try:
+        done, answer = first(), other.wait()
+    finally:
+        other.end()
+    return done, second() if answer is None else answer
+
+
+def _in_time(work: Callable[[], Result]) -> Result:
+    """Do some work within the limits in force, which are watched in each process."""
+    from hsdsl.language.expression.timebox import timebox
+
+    with timebox(current().seconds):
+        return work()
+
+
+def _lowered(files: ModelFiles) -> Answer:
+    import gc
+    import time
+
+    for name, names in _UNUSED.items():
+        sys.modules[name] = module = ModuleType(name)
+        vars(module).update(names)
+    gc.disable()  # imports leave no garbage; to look for it costs time
+    from hsdsl.language.elaborate import elaborate_files
+    from hsdsl.mathematics.completion import with_sliding
+    from hsdsl.mathematics.lower import in_turn, lower
+
+    gc.freeze()
+    gc.enable()
+    try:
+        began = time.process_time()
+        system = elaborate_files(files).system
+        both = _both if time.process_time() - began > LARGE else in_turn
+        with applied(files.limits):
+            program = sliding = lower(system, both)
+            if system.experiment.completion != "auto":
+                sliding = None
+            elif (slides := with_sliding(system)) is not system:
+                sliding = lower(slides, both)
+            return Lowered(program, sliding, files.with_data(system.files))
+    except ModelError as error:
+        return error
+
+
+def _compile(lowered: Answer) -> None:
+    """Compile the program that runs, for the cache; where there is none, let a run that is shorter than this end."""
+    import time
+
+    from hsdsl.engine.runtime import programs
+    from hsdsl.engine.runtime.compiler import NoCompiler
+
+    if isinstance(lowered, Lowered):
+        with applied(lowered.files.limits), suppress(NoCompiler):  # the run that needs it reports the failure
+            if not programs.keep(lowered.sliding or lowered.program):
+                time.sleep(time.process_time())
+
+
+@atexit.register
+def _end_all() -> None:
+    while _begun:
+        _begun.pop()[1].end()
+
+
+interrupts.before_leaving.append(_end_all)

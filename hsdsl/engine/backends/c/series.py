@@ -1,0 +1,211 @@
+"""A tape as C functions that write Taylor coefficients: coefficient 0 of every line, then a loop over the others.
+
+The constants of a tape are arguments, so that modes which differ in numbers alone share one function. Of a large tape
+each coefficient is written by pieces (`pieces`), which the functions of motions along guards call too.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from itertools import chain
+
+from hsdsl.engine.backends.c.pieces import LARGE, Assignment, pieces
+from hsdsl.engine.backends.c.printer import C
+from hsdsl.engine.backends.c.shared import arrays, shared, statements
+from hsdsl.engine.backends.tape import Language, coefficient_of, value_of
+from hsdsl.mathematics.program import Tape
+
+_LINE = re.compile(r"\bl(\d+)\b")
+_FLOW = """\
+static int NAME(const hs_real *restrict c, int order, hs_real t, const hs_real *restrict x,
+                hs_real *restrict lines) {{
+  int bad = 0;
+  const int length = order + 2;
+  (void)c, (void)t, (void)x;
+{pointers}{arrays}
+  l0[0] = t;
+  l0[1] = 1.0;
+  for (int k = 2; k < length; k++) l0[k] = 0.0;
+{values}
+  if (bad) return bad;
+  for (int k = 1; k <= order; k++) {{
+{coefficients}
+  }}
+  return bad;
+}}
+"""
+_SURFACES = """\
+static int NAME(const hs_real *restrict c, int order, hs_real *restrict lines) {{
+  int bad = 0;
+  const int length = order + 2;
+{pointers}
+  (void)c, (void)l0;
+{values}
+  if (bad) return bad;
+  for (int k = 1; k <= order; k++) {{
+{coefficients}
+  }}
+  return bad;
+}}
+"""
+_PIECE = """\
+static HS_APART int {name}(const hs_real *restrict c, int k, int length, hs_real *restrict lines) {{
+  int bad = 0;
+  (void)c, (void)k, (void)length, (void)lines;
+{body}
+  return bad;
+}}
+"""
+_CALLS = """\
+static int NAME(const hs_real *c, int k, int length, hs_real *lines) {{
+  return {calls};
+}}
+"""
+
+
+def line_count(tape: Tape, dimension: int) -> int:
+    """How many lines there are: time, the states, operations."""
+    return 1 + dimension + len(tape.operations)
+
+
+def is_large(tape: Tape, dimension: int) -> bool:
+    """Whether a tape's lines are written in pieces."""
+    return line_count(tape, dimension) > LARGE
+
+
+def flow_lines(tape: Tape, dimension: int, further: Container[int], in_pairs: bool = False) -> str:
+    """Write the function of the lines that the flow needs; its name is to be put in for ``NAME``.
+
+    The states' newest coefficients stay in variables ``w``: each waits for the one before, and memory is slower. Those
+    of other lines are put into memory where something reads them there: ``further`` are lines that others read. With
+    ``in_pairs`` products go in vectors of two.
+    """
+    first, states = dimension + 1, range(1, dimension + 1)
+
+    def value(line: int) -> str:
+        return "t" if line == 0 else f"x[{line - 1}]" if line < first else f"v{line}"
+
+    def newest(line: int) -> str:
+        return "l0[k]" if line == 0 else f"w{line}" if line < first else f"v{line}"
+
+    own = range(first, first + tape.needed)
+    groups = shared(tape, own, first, in_pairs)
+    sums = {i: text for group in groups for i, text in group.sums.items()}
+    texts = [(i, sums.get(i, text)) for i, text in _coefficients(tape, own, first, newest)]
+    loops = {i: keeping + loop for i, (keeping, loop) in statements(groups, newest).items()}
+    read = _lines_in([*(text for _, text in texts), *chain(*loops.values())])
+    read.update(i for i in own if i in further)
+    values = [f"l{i}[0] = {value(i)};" for i in states]
+    kept = {i: keeping for i, (keeping, _) in statements(groups, value).items()}
+    values += _straight(_values(tape, own, first, value), read, kept)
+    values += [f"hs_real w{i} = l{i}[1] = {value(tape.flow[i - 1])}; (void)w{i};" for i in states]
+    coefficients = _straight(texts, read, loops)
+    coefficients += [f"const hs_real u{i} = {newest(tape.flow[i - 1])} * hs_inverse[k + 1];" for i in states]
+    coefficients += [f"w{i} = l{i}[k + 1] = u{i};" for i in states]
+    return _filled(_FLOW, values, coefficients, [*arrays(groups).values()])
+
+
+def surface_lines(tape: Tape, dimension: int) -> str:
+    """Write the function of the further lines, which surfaces need."""
+    first = dimension + 1
+    own = range(first + tape.needed, first + len(tape.operations))
+
+    def value(line: int) -> str:
+        return f"v{line}" if line in own else f"l{line}[0]"
+
+    def newest(line: int) -> str:
+        return f"v{line}" if line in own else f"l{line}[k]"
+
+    values, coefficients = (each(tape, own, first, name) for each, name in ((_values, value), (_coefficients, newest)))
+    return _filled(_SURFACES, _straight(values, own), _straight(coefficients, own))
+
+
+def piecewise(tape: Tape, dimension: int, own: range, states: Iterable[int]) -> tuple[str, list[str]]:
+    """Write a function ``NAME`` for coefficient k of ``own`` lines, then k + 1 of ``states``, and its pieces.
+
+    States are lines too. The pieces are functions of a name that begins with ``NAME_``.
+    """
+    first = dimension + 1
+
+    def ordered(texts: list[tuple[int, str]]) -> list[Assignment]:
+        places = {line: place for place, (line, _) in enumerate(texts)}
+        needs = {i: [places[j] for j in tape.operations[i - first].lines if j in places and j < i] for i, _ in texts}
+        return [Assignment(f"l{i}[k]", text, needs[i]) for i, text in texts]
+
+    values = ordered(_values(tape, own, first, "l{}[0]".format))
+    coefficients = ordered(_coefficients(tape, own, first, "l{}[k]".format))
+    after = [Assignment(f"l{i}[k + 1]", f"l{tape.flow[i - 1]}[k] * hs_inverse[k + 1]") for i in states]
+    parts: list[str] = []
+    calls: list[str] = []
+    for kind, assignments in (("values", values), ("coefficients", coefficients), ("states", after)):
+        names = list[str]()
+        for body in pieces(assignments):
+            names.append(f"NAME_{kind}_{len(names)}")
+            parts.append(_PIECE.format(name=names[-1], body="\n".join(f"  {line}" for line in body)))
+        calls.append("(" + " || ".join(f"{name}(c, k, length, lines)" for name in names) + ")")
+    values_text, coefficients_text, states_text = calls
+    return _CALLS.format(calls=f"(k ? {coefficients_text} : {values_text}) || {states_text}"), parts
+
+
+def _straight(
+    texts: list[tuple[int, str]], kept: Container[int], before: Mapping[int, Sequence[str]] | None = None
+) -> list[str]:
+    """The statements for lines that are variables too, ``v``; those in ``kept`` go into memory."""
+    found: list[str] = []
+    for i, text in texts:
+        found += (before or {}).get(i, ())
+        found.append(f"const hs_real v{i} = {text};")
+        if i in kept:
+            found.append(f"l{i}[@] = v{i};")
+    return found
+
+
+def read_by_surfaces(tape: Tape) -> set[int]:
+    """The lines that surfaces are, or are computed from."""
+    further = {line for operation in tape.operations[tape.needed :] for line in operation.lines}
+    return further | {line for line in tape.surfaces if line is not None}
+
+
+def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
+    found: list[tuple[int, str]] = []
+    language = _language("c{}".format, "n{}".format, "q_0_1")
+    for i in lines:
+        operation = tape.operations[i - first]
+        names = {f"n{line}": name(line) for line in operation.lines}
+        names[f"c{operation.constant}"] = f"c[{operation.constant}]"
+        found.append((i, C.expression(value_of(operation, language), names)))
+    return found
+
+
+def _coefficients(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
+    language = _language("c[{}]".format, name, "0.0")
+    return [(i, coefficient_of(i, tape.operations[i - first], language)) for i in lines]
+
+
+def _language(constant: Callable[[int], str], name: Callable[[int], str], zero: str) -> Language:
+    return Language(
+        series="l{}".format,
+        value=name,
+        newest=name,
+        constant=constant,
+        zero=zero,
+        call="hs_",
+        bad=", &bad",
+        least="k < {0} ? k : {0}".format,
+    )
+
+
+def _lines_in(texts: Iterable[str]) -> set[int]:
+    """The lines that texts read in memory."""
+    return {int(i) for text in texts for i in _LINE.findall(text)}
+
+
+def _filled(template: str, values: list[str], coefficients: list[str], pairs: Sequence[str] = ()) -> str:
+    used = sorted({0} | _lines_in((*values, *coefficients)))
+    return template.format(
+        pointers="\n".join(f"  hs_real *const l{i} = lines + {i} * length;" for i in used),
+        arrays="".join(f"\n  hs_pair {name}[HS_MOST_ORDER + 2];" for name in pairs),
+        values="\n".join(f"  {text.replace('[@]', '[0]')}" for text in values),
+        coefficients="\n".join(f"    {text.replace('[@]', '[k]')}" for text in coefficients),
+    )

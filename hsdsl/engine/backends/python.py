@@ -1,0 +1,195 @@
+"""The Python kernel: a program's routines executed as Python functions, over any number type.
+
+The text comes from `lower`; it names states, parameters and
+constants only by number, so nothing a model file says reaches the interpreter as code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
+from hsdsl.engine.backends.text import compile_routines, each_apart
+from hsdsl.engine.kernel import ModeKernel, Routine, Taylor, Vector
+from hsdsl.mathematics.program import EdgeProgram, Program, Routines
+
+
+class PythonKernel:
+    """A program over one number type. Modes are compiled when they are first entered."""
+
+    def __init__(self, program: Program, arithmetic: Arithmetic) -> None:
+        self.arithmetic = arithmetic
+        self._program = program
+        self._over: dict[str, PythonKernel] = {}
+        self._modes: dict[int, Callable[..., tuple[Routine, ...]]] = {}
+        self._apart: dict[int, Callable[..., tuple[Routine, ...]]] = {}
+        self._tapes: dict[int, Callable[[Sequence[Number]], Taylor]] = {}
+        self._further: dict[tuple[int, str], Callable[..., tuple[Routine, ...]]] = {}
+        self._switches: dict[str, Callable[..., tuple[Routine, ...]]] = {}
+        self._bound: dict[int, tuple[Sequence[Number], ModeKernel]] = {}
+        constants = compile_routines(program.constants, arithmetic, "constants")
+        self._constants = dict(zip(program.constants.names, constants(), strict=True))
+
+    @property
+    def enclosing(self) -> PythonKernel:
+        """The same program over interval arithmetic."""
+        from hsdsl.base.numbers.enclosures import ENCLOSED  # only verdicts ask for it
+
+        return self.over(ENCLOSED)
+
+    def over(self, arithmetic: Arithmetic) -> PythonKernel:
+        """The same program over another number type."""
+        if arithmetic.name not in self._over:
+            self._over[arithmetic.name] = PythonKernel(self._program, arithmetic)
+        return self._over[arithmetic.name]
+
+    def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
+        """Evaluate one of ``Program.constants``' routines at parameter values."""
+        return self._constants[name](*parameters)
+
+    def switching(self, data: Sequence[Number]) -> dict[str, Routine]:
+        """Return the routines of ``Program.switching`` by name."""
+        return self._switching(self.arithmetic, data)
+
+    def enclosed_switching(self, data: Sequence[Any]) -> dict[str, Routine]:
+        """Return them over ranges of numbers."""
+        from hsdsl.base.numbers.enclosures import ENCLOSED  # only models with switches that are not linear pay for it
+
+        return self._switching(ENCLOSED, data)
+
+    def _switching(self, arithmetic: Arithmetic, data: Sequence[Any]) -> dict[str, Routine]:
+        routines = self._program.switching
+        if arithmetic.name not in self._switches:
+            self._switches[arithmetic.name] = compile_routines(routines, arithmetic, "switches")
+        return dict(zip(routines.names, self._switches[arithmetic.name](*data), strict=True))
+
+    def has_constant(self, name: str) -> bool:
+        """Whether the program gives this constant."""
+        return name in self._constants
+
+    def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
+        """Bind a mode to parameter values and input segments; the last binding of each mode is kept."""
+        last = self._bound.get(mode)
+        if last is None or last[0] is not data or not isinstance(data, tuple):  # what else there is may have changed
+            last = self._bound[mode] = data, self._bind(mode, data)
+        return last[1]
+
+    def _bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
+        routines = self._program.flows[mode].routines
+        if mode not in self._modes:
+            self._modes[mode] = compile_routines(routines, self.arithmetic, f"mode {mode}")
+        bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
+        program = self._program.flows[mode]
+        n, zero = len(program.states), self.arithmetic.zero
+        slopes = (spread_out(bound[f"gradient_{k}"], row, n + 1, zero) for k, row in enumerate(program.slopes))
+        return ModeKernel(
+            **{name: bound[name] for name in PLAIN},
+            outputs=self._outputs(mode, data, bound["outputs"]),
+            gradients=tuple(slopes),
+            rates=tuple(bound[f"rate_{k}"] for k in range(len(program.slopes))),
+            conditions=tuple(conjunction([bound[name] for name in parts]) for parts in program.conditions),
+            resets=tuple(changed(bound[f"reset_{k}"], edge, 1) for k, edge in enumerate(program.edges)),
+            spreads=tuple(changed(bound[f"spread_{k}"], edge, n + 1) for k, edge in enumerate(program.edges)),
+        )
+
+    def _outputs(self, mode: int, data: Sequence[Number], together: Routine) -> Routine:
+        """Evaluate outputs together; each apart, compiled on first use, where one of them has no value."""
+
+        def outputs(*arguments: Number) -> Vector:
+            try:
+                return together(*arguments)
+            except DOMAIN_ERRORS:
+                if mode not in self._apart:
+                    text = each_apart(self._program.flows[mode].routines, "outputs")
+                    self._apart[mode] = compile_routines(text, self.arithmetic, f"outputs of mode {mode}")
+                return self._apart[mode](*data)[0](*arguments)
+
+        return outputs
+
+    def taylor(self, mode: int, data: Sequence[Number]) -> Taylor | None:
+        """Return Taylor coefficients along a mode's flow; None where the flow is kinked."""
+        from hsdsl.engine.backends.taylor import compile_tape  # only Taylor's method needs it
+
+        program = self._program.flows[mode]
+        if program.tape is None:
+            return None
+        if mode not in self._tapes:
+            self._tapes[mode] = compile_tape(program.tape, len(program.states), self.arithmetic, f"mode {mode}")
+        return self._tapes[mode](data)
+
+    def jacobian(self, mode: int, data: Sequence[Number]) -> Routine:
+        """Return the derivatives of a mode's flow by its states; compiled on first use."""
+        program = self._program.flows[mode]
+        routine = self._compiled(mode, program.jacobian.routines, data)
+        return spread_out(routine, program.jacobian.places, len(program.states) ** 2, self.arithmetic.zero)
+
+    def terms(self, mode: int, data: Sequence[Number]) -> Routine | None:
+        """Return the sizes of the terms of a mode's flow; None if last digits tell them."""
+        routines = self._program.flows[mode].terms
+        return None if routines is None else self._compiled(mode, routines, data)
+
+    def _compiled(self, mode: int, routines: Routines, data: Sequence[Number]) -> Routine:
+        """The one routine of some that few runs need; compiled on first use."""
+        (name,) = routines.names
+        if (mode, name) not in self._further:
+            self._further[mode, name] = compile_routines(routines, self.arithmetic, f"{name} of mode {mode}")
+        return self._further[mode, name](*data)[0]
+
+    def expressions(self, mode: int, data: Sequence[Number]) -> tuple[tuple[str, Routine], ...]:
+        """Return a mode's expressions one by one, named for a person."""
+        program = self._program.flows[mode]
+        functions = compile_routines(program.diagnosis, self.arithmetic, f"expressions of mode {mode}")(*data)
+        return tuple(zip(program.expressions, functions, strict=True))
+
+
+def changed(routine: Routine, edge: EdgeProgram, first: int) -> Routine:
+    """Put what an edge changes in its place among the values that its target's states have as arguments."""
+    count = len(edge.target_states)
+    if len(edge.changes) == count:
+        return routine
+
+    def whole(*arguments: Number) -> Vector:
+        found = list(arguments[first : first + count])
+        for place, value in zip(edge.changes, routine(*arguments), strict=True):
+            found[place] = value
+        return tuple(found)
+
+    return whole
+
+
+def spread_out(routine: Routine, places: Sequence[int], size: int, zero: Number) -> Routine:
+    """Put a routine's values in their places among zeros."""
+    if len(places) == size:
+        return routine
+
+    def spread(*arguments: Number) -> Vector:
+        whole = [zero] * size
+        for place, value in zip(places, routine(*arguments), strict=True):
+            whole[place] = value
+        return tuple(whole)
+
+    return spread
+
+
+PLAIN = ("flow", "surfaces", "magnitudes")
+
+
+def conjunction(parts: Sequence[Callable[..., tuple[bool, ...]]]) -> Callable[..., tuple[bool, ...]]:
+    """Make `and` of parts: one that is false decides, even if another has no value."""
+    if len(parts) == 1:
+        return parts[0]
+
+    def holds(*arguments: Number) -> tuple[bool, ...]:
+        without_value: Exception | None = None
+        for part in parts:
+            try:
+                if not part(*arguments)[0]:
+                    return (False,)
+            except DOMAIN_ERRORS as error:
+                without_value = error
+        if without_value is not None:
+            raise without_value
+        return (True,)
+
+    return holds

@@ -1,0 +1,192 @@
+"""Many runs of one model at once: their results as arrays."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from hsdsl.base.calls import checks_methods
+from hsdsl.base.names import called, visible
+from hsdsl.engine.execution.parts import COMPLETE
+from hsdsl.engine.execution.run import Execution
+from hsdsl.engine.execution.samples import Array
+
+
+@dataclass(frozen=True)
+class Failure:
+    """An instance that did not reach its end.
+
+    ``reason`` is one of :data:`hsdsl.engine.execution.REASONS`, or ``refused`` if it could not be started. ``message`` is a
+    sentence for a person.
+    """
+
+    index: tuple[int, ...]
+    reason: str
+    message: str
+
+
+@dataclass(frozen=True, eq=False)
+class TransitionTable:
+    """Every transition of an ensemble's instances, ordered by instance and then by time.
+
+    Attributes
+    ----------
+    first : array of int, shape (instances + 1,)
+        The index of the first transition of each instance (in the order of the flattened arrays); the last element is
+        the end.
+    time, edge, entry : array, shape (transitions,)
+        The time and the name of each transition, and whether it fired at once on entry to its mode.
+    before, after : dict of array, shape (transitions,)
+        States by name; not-a-number if the mode lacks the state, and after a transition in which a run ended.
+    """
+
+    first: Array
+    time: Array
+    edge: Array
+    entry: Array
+    before: dict[str, Array]
+    after: dict[str, Array]
+
+    def of(self, instance: int) -> slice:
+        """Return the slice of the transitions of an instance."""
+        return slice(int(self.first[instance]), int(self.first[instance + 1]))
+
+
+@checks_methods
+@dataclass(frozen=True, eq=False)
+class Ensemble:
+    """The runs of an ensemble. The shape of every array begins with :attr:`shape`, the common shape of the varied
+    values.
+
+    Attributes
+    ----------
+    varied : dict
+        The varied values of parameters, and of initial states as ``initial.NAME``.
+    stop : array of str
+        The reason of each run's end: one of :data:`hsdsl.engine.execution.REASONS`; ``refused`` if an instance could not be
+        started, ``interrupted`` if Ctrl-C came first.
+    time : array of float
+        The time of its end (not-a-number if it was not run).
+    mode : array of str
+        The mode at the end; empty if it was not run.
+    state, outputs : dict of array
+        The values at the end by name; not-a-number if the mode lacks the state.
+    transitions : array of int
+        The number of transitions.
+    warnings : array of str
+        The codes of the runs' own warnings (`hsdsl.base.errors.WARNINGS`), separated by spaces; empty if there are none.
+        They concern walls that were not checked, motion along guards, limits of accumulating transitions, sliding, and
+        waits in strips. The other codes need a verdict: ``ensemble.run(...).warnings``.
+    transition_times : array, shape (..., n)
+        The times of the first n transitions, for a positive n; not-a-number if fewer were made.
+    sample_times : array, shape (..., n)
+    samples : dict of array, shape (..., n)
+        The states and outputs at these times by name; not-a-number beyond a run's end; empty without sample times.
+    transition_table : TransitionTable or None
+        Every transition, if they were kept.
+    """
+
+    model: str
+    digest: str
+    engine: str
+    scheme: str
+    method: str
+    shape: tuple[int, ...]
+    varied: dict[str, Array]
+    stop: Array
+    time: Array
+    mode: Array
+    state: dict[str, Array]
+    outputs: dict[str, Array]
+    transitions: Array
+    warnings: Array
+    transition_times: Array
+    sample_times: Array
+    samples: dict[str, Array]
+    seconds: dict[str, float]
+    refusals: Mapping[tuple[int, ...], str]
+    transition_table: TransitionTable | None = field(repr=False)
+    again: Callable[[tuple[int, ...]], Execution] = field(repr=False)
+    title: str | None = None
+
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
+        how = f"{self.scheme} {self.method}, shape {self.shape}"
+        return f"<Ensemble of {visible(called(self.title, self.model))}: {how}, stops: {counts or 'none'}>"
+
+    def _repr_html_(self) -> str:
+        """Show the varied values, the ends of the runs, and a picture in notebooks."""
+        from hsdsl.analysis.plot.notebook import ensemble_html
+
+        return ensemble_html(self)
+
+    def to_pandas(self, what: Literal["runs", "samples", "transitions"] = "runs") -> Any:
+        """Make a pandas DataFrame with a row for each run, each sample, or each transition.
+
+        Parameters
+        ----------
+        what : {"runs", "samples", "transitions"}
+            ``runs``: what was varied, ``stop``, ``time``, ``mode``, final states and outputs, ``transitions``,
+            ``warnings``, and ``transition_0``, ... where times were kept. ``samples``: what was varied, ``time``, and
+            values then.
+            ``transitions``: what was varied, ``time``, ``edge``, and ``before.NAME`` and ``after.NAME`` of each state.
+            A state or output of the name of another column is ``state.NAME`` or ``output.NAME``.
+
+        Returns
+        -------
+        DataFrame
+            Its index is the instance, by one number for each dimension of :attr:`shape`.
+
+        Raises UsageError: pandas is not installed, or the ensemble has kept no samples or transitions.
+        """
+        from hsdsl.engine.execution.frames import frame
+
+        return frame(self, what)
+
+    @property
+    def reasons(self) -> dict[str, int]:
+        """The number of instances for each reason of the end."""
+        found, counts = np.unique(self.stop, return_counts=True)
+        return dict(zip(found.tolist(), counts.tolist(), strict=True))
+
+    @property
+    def warning_counts(self) -> dict[str, int]:
+        """The number of instances for each code of :attr:`warnings`."""
+        return dict(sorted(Counter(" ".join(self.warnings.ravel().tolist()).split()).items()))
+
+    @property
+    def failed(self) -> Array:
+        """Whether each instance failed to reach its end: array of bool."""
+        return ~np.isin(self.stop, COMPLETE)
+
+    def failures(self, most: int = 100) -> tuple[Failure, ...]:
+        """Name the first failed instances; each is run again for its message.
+
+        Parameters
+        ----------
+        most : int
+            The largest number of instances to name.
+        """
+        places = [tuple(map(int, place)) for place in np.argwhere(self.failed)[:most]]
+        return tuple(self._failure(place) for place in places)
+
+    def _failure(self, place: tuple[int, ...]) -> Failure:
+        reason = str(self.stop[place])
+        if reason == "refused":
+            return Failure(place, reason, self.refusals[place])
+        if reason == "interrupted":
+            return Failure(place, reason, "the ensemble was interrupted before this instance was run to its end")
+        return Failure(place, reason, self.run(*place).stop.message)
+
+    def run(self, *index: int) -> Execution:
+        """Run one instance again, and return the whole execution.
+
+        Raises IndexError: there is no such instance.
+        """
+        if len(index) != len(self.shape) or any(not -n <= i < n for i, n in zip(index, self.shape, strict=True)):
+            raise IndexError(f"expected an index of an ensemble of shape {self.shape}, got {index}")
+        return self.again(tuple(i % n for i, n in zip(index, self.shape, strict=True)))

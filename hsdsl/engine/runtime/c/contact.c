@@ -1,0 +1,356 @@
+/* Motion along guards (M11): a state that its own resets keep while the flow pushes it out. While it lasts,
+   run->here.table is that of the mode's motions, whose edges are those of the mode and then some that release it, and
+   run->here.p has the numbers that say which contacts hold.
+   See hsdsl/engine/simulate/contact.py. Functions return 1 or 0, or RAISED where a routine has no value. */
+
+#include "functions.h"
+
+#define SAME_UNITS 4
+#define ZERO_UNITS 16
+#define FURTHER 16
+
+/* The size that a state has had, or that of the numbers that it was computed from on entry. */
+static hs_real state_size(const hs_run *run, int s) { return hs_max(run->scales[s], fabs(run->scale[s])); }
+
+/* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. See simulate/scales.py. */
+static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope) {
+  const int n = run->here.dimension;
+  const hs_sparse *const rows = &run->here.table->jacobian;
+  if (rows->values(run->here.p, t, x, run->jacobian)) return RAISED;
+  for (int i = 0; i < n; i++) run->flow_sizes[i] = fabs(slope[i]);
+  for (int k = 0; k < rows->count; k++) {
+    hs_real *const size = &run->flow_sizes[rows->place[k] / n];
+    *size = *size + fabs(run->jacobian[k]) * state_size(run, rows->place[k] % n);
+  }
+  return 0;
+}
+
+/* The entry of a sparse matrix, whose places rise, at a place; 0.0 where it has none. */
+static hs_real entry_at(const hs_sparse *rows, const hs_real *values, int place) {
+  int low = 0, high = rows->count;
+  while (low < high) {
+    const int middle = (low + high) / 2;
+    if (rows->place[middle] < place)
+      low = middle + 1;
+    else
+      high = middle;
+  }
+  return low < rows->count && rows->place[low] == place ? values[low] : 0.0;
+}
+
+/* The sizes that the flow gives the states within the run, from a start in a mode with motion along guards, to
+   run->scale. See simulate/scales.py. */
+static void start_sizes(hs_run *run, int mode, hs_time t) {
+  const hs_mode *const table = &run->model->mode[mode];
+  const hs_sparse *const rows = &table->jacobian;
+  const int n = table->dimension;
+  const hs_real *const p = segment_data(run, segment_at(run->task->timeline, t));
+  hs_real back = 0.0, all = 0.0, *const first = run->at, *const moved = run->near;
+  if (table->held < 0 || table->flow(p, t, run->x, first) || rows->values(p, t, run->x, run->jacobian)) return;
+  for (int i = 0; i < n; i++) moved[i] = 0.0;
+  for (int e = 0; e < rows->count; e++) {
+    const int i = rows->place[e] / n, k = rows->place[e] % n;
+    moved[i] = moved[i] + fabs(run->jacobian[e]) * fabs(entry_at(rows, run->jacobian, k * n + i));
+  }
+  for (int i = 0; i < n; i++) back = hs_max(back, moved[i]), moved[i] = 0.0;
+  const hs_real time = run->until / (1 + run->until * sqrt(back)); /* in which motion turns back */
+  for (int i = 0; i < n; i++) first[i] = hs_max(fabs(run->x[i]), time * fabs(first[i]));
+  for (int e = 0; e < rows->count; e++) {
+    hs_real *const size = &moved[rows->place[e] / n];
+    *size = *size + fabs(run->jacobian[e]) * first[rows->place[e] % n];
+  }
+  for (int i = 0; i < n; i++) all = all + (moved[i] = hs_max(first[i], time * moved[i]));
+  for (int i = 0; i < n && hs_finite(all); i++) run->scale[i] = moved[i];
+}
+
+/* What the reset of edge k, its branch for slow impacts, makes of a state, but for states that it counts with, to
+   `out`. */
+static int reset_but_counts(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *out) {
+  const hs_mode *const own = run->here.table;
+  const hs_edge *const edge = &own->edge[k];
+  const hs_edge *const by = edge->branched ? &run->model->mode[own->held].edge[k] : edge;
+  if (hs_changed(by, by->reset, run->here.p, t, x, x, out)) return RAISED;
+  for (int i = 0; i < edge->counts; i++) out[edge->count[i]] = x[edge->count[i]];
+  return 0;
+}
+
+/* Whether the reset of edge k leaves the state where it is. */
+static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
+  const hs_mode_state *here = &run->here;
+  int still = 1;
+  if (reset_but_counts(run, k, t, x, run->after)) return RAISED;
+  for (int s = 0; s < here->dimension; s++)
+    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * state_size(run, s);
+  return still;
+}
+
+/* Whether the flow, of these sizes, is tangent to surface k, to round-off. */
+static int is_tangent(hs_run *run, hs_time t, const hs_real *x, int k) {
+  const hs_mode_state *here = &run->here;
+  const hs_sparse *const row = &here->table->gradients[k];
+  hs_real rate, size = 0.0;
+  if (row->values(here->p, t, x, run->gradient) || here->table->rates[k](here->p, t, x, &rate)) return RAISED;
+  for (int i = 0; i < row->count; i++)
+    size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
+  return fabs(rate) <= ZERO_UNITS * HS_UNIT * size;
+}
+
+/* Number the marks of walls anew where a table has `more` edges than the one before. */
+static void move_walls(int *marks, const hs_mode *from, int more) {
+  if (more > 0)
+    for (int j = from->surfaces; j-- > from->edges;) marks[j + more] = marks[j];
+  else if (more < 0)
+    for (int j = from->edges; j < from->surfaces; j++) marks[j + more] = marks[j];
+  for (int j = 0; j < more; j++) marks[from->edges + j] = 0;
+}
+
+/* Count the surfaces that the state is on. */
+static void count_active(hs_run *run) {
+  run->here.standing = 0;
+  for (int j = 0; j < run->here.table->surfaces; j++) run->here.standing += run->active_surfaces[j];
+}
+
+/* The number of a contact of the state's mode: 0, HS_LOOKED_AT or HS_HELD. */
+static hs_real *level_of(const hs_run *run, int contact) { return &run->held_p[run->model->data + contact]; }
+
+/* Bind routines to the mode's motions along guards: of those edges `kept`, the pushes are looked at, and those `held`
+   hold the state. `held` may be 0 for none. */
+static void bind_contacts(hs_run *run, const int *held, const int *kept) {
+  hs_mode_state *const here = &run->here;
+  const hs_mode *const own = &run->model->mode[here->mode];
+  if (here->p != run->held_p) run->own_p = here->p;
+  for (int i = 0; i < run->model->data; i++) run->held_p[i] = run->own_p[i];
+  for (int i = 0; i < run->model->contacts; i++) *level_of(run, i) = 0.0;
+  for (int k = 0; k < own->edges; k++)
+    if (own->edge[k].contact >= 0)
+      *level_of(run, own->edge[k].contact) = held && held[k] ? HS_HELD : kept[k] ? HS_LOOKED_AT : 0.0;
+  here->table = &run->model->mode[own->held];
+  here->p = run->held_p;
+}
+
+/* Bind them to the mode itself again. */
+static void bind_mode(hs_run *run) {
+  run->here.table = &run->model->mode[run->here.mode];
+  run->here.p = run->own_p;
+}
+
+/* The flow at a point that the guards of edges `touched`, 0 for none, without k and with it, leave. */
+static int flow_beside(hs_run *run, int k, int with, hs_time t, const hs_real *x, const int *touched, hs_real *flow) {
+  const hs_mode *const own = run->here.table;
+  int count = 0;
+  for (int j = 0; j < own->edges; j++) count += run->others[j] = j == k ? with : touched && touched[j];
+  if (count) bind_contacts(run, run->others, run->others);
+  const int raised = run->here.table->flow(run->here.p, t, x, flow);
+  if (count) bind_mode(run);
+  return raised;
+}
+
+/* Where the flow presses a state, by what the guard of edge k would take away of the flow that those of `touched`, 0
+   for none, leave: off by round-off where the reset of edge k changes it, to run->after. */
+static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
+  const hs_edge *const edge = &run->here.table->edge[k];
+  const int n = run->here.dimension;
+  hs_real after = 0.0, *const slope = run->at, *const left = run->after;
+  if (flow_beside(run, k, 0, t, x, touched, slope)) return RAISED;
+  if (edge->contact >= 0) {
+    if (flow_beside(run, k, 1, t, x, touched, left)) return RAISED;
+    for (int s = 0; s < n; s++) slope[s] = slope[s] - left[s];
+  }
+  for (int i = 0; i < edge->changes; i++) {
+    const int s = edge->change[i];
+    if (slope[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * state_size(run, s) / fabs(slope[s]));
+  }
+  if (!(after > 0)) after = HS_UNIT * run->until; /* where these states have been zero only */
+  for (int s = 0; s < n; s++) run->after[s] = x[s] + after * slope[s];
+  return 0;
+}
+
+/* Whether the `if` of edge k, of the state's mode, holds at a point, or next along the flow that others leave. */
+static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
+  const int now = condition(run, k, t, x);
+  if (now || !run->here.table->edge[k].conditional) return now == 1;
+  return !pressed(run, k, t, x, touched) && condition(run, k, t, run->after) == 1;
+}
+
+/* Whether the `if` of an edge that leads back, of a surface that the state is on, holds next along the flow. */
+static int holds_next(hs_run *run, int k, hs_time t, const hs_real *x) {
+  const hs_mode_state *here = &run->here;
+  const hs_edge *edge = &here->table->edge[k];
+  const int returns = edge->target == here->mode && here->dimension && here->dimension == here->table->dimension;
+  return returns && is_possible(run, k, t, x, 0);
+}
+
+/* Of the edges marked in `marks`, keep those whose guards hold the state where the flow presses on them; return how
+   many. */
+static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
+  const hs_mode_state *here = &run->here;
+  int count = 0, sized = 0; /* sized: whether the flow's sizes are known, -1 where they have no value */
+  for (int k = 0; k < here->table->edges; k++) {
+    const hs_edge *edge = &here->table->edge[k];
+    const int marked = marks[k];
+    marks[k] = 0;
+    if (!marked || edge->contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) continue;
+    if (edge->push_order == 2) {
+      if (!sized) sized = here->table->flow(here->p, t, x, run->end) || flow_sizes(run, t, x, run->end) ? -1 : 1;
+      if (sized < 0 || is_tangent(run, t, x, k) != 1) continue;
+    }
+    count += marks[k] = 1;
+  }
+  return count;
+}
+
+/* Whether the push on the guard of edge k, which is looked at and zero now, is first negative where the flow makes it
+   differ from zero. */
+static int lifts_next(hs_run *run, hs_time from, const hs_real *x, int k) {
+  hs_real r, noise, *const y = run->after;
+  hs_time t = from;
+  copy(y, x, run->here.dimension);
+  for (hs_real after = HS_UNIT * run->until; from + after < segment_end(run); after = after * FURTHER) {
+    const hs_time time = from + after;
+    if (run->here.table->flow(run->here.p, t, y, run->at)) return 0;
+    for (int s = 0; s < run->here.dimension; s++) y[s] = y[s] + (time - t) * run->at[s];
+    t = time;
+    if (surface(run, k, t, y, &r) || roundoff_bound(run, k, t, y, 0, &noise)) return 0;
+    if (fabs(r) > noise) return r > 0;
+  }
+  return 0;
+}
+
+/* Of the edges `kept`, mark those in `pushed` that the flow presses on while those `held` hold the state: 1 where they
+   are the same, else 0; RAISED where these have no flow together. */
+static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, const int *kept, int *pushed) {
+  const int edges = run->here.table->edges;
+  int same = 1, apart = 0;
+  bind_contacts(run, held, kept);
+  const hs_mode *const table = run->here.table;
+  const int raised = table->values(run->here.p, t, x, run->values) || magnitudes_at(run, t, x, run->magnitudes);
+  for (int k = 0; k < edges; k++) {
+    const int active = run->active_surfaces[k];
+    pushed[k] = 0;
+    if (kept[k] && !raised) {
+      run->active_surfaces[k] = 0;
+      const hs_real r = run->values[k], noise = bound_from(run, run->magnitudes, k, t, x, 0);
+      pushed[k] = r < -noise || (r <= noise && !lifts_next(run, t, x, k));
+      run->active_surfaces[k] = active;
+      apart |= r != r;
+    }
+  }
+  bind_contacts(run, 0, kept);
+  for (int k = 0; k < edges; k++) pushed[k] += pushed[k] && condition(run, k, t, x) == 1; /* 2: surely */
+  bind_mode(run);
+  for (int k = 0; k < edges; k++) {
+    pushed[k] = pushed[k] == 2 || (pushed[k] && is_possible(run, k, t, x, held));
+    same &= !pushed[k] == !held[k];
+  }
+  return apart ? RAISED : same;
+}
+
+/* Those of the edges `kept`, `count` of them, that hold the state together, to `held`; 0 where that is not one choice. */
+static int pressing(hs_run *run, hs_time t, const hs_real *x, const int *kept, int count, int *held, int *pushed) {
+  const int edges = run->here.table->edges;
+  for (int k = 0; k < edges; k++) held[k] = kept[k];
+  for (int i = 0; i < count + 2; i++) {
+    const int same = pushes(run, t, x, held, kept, pushed);
+    if (same == RAISED) return 0;
+    for (int k = 0; k < edges; k++) held[k] = pushed[k];
+    if (same || count == 1) return 1;
+  }
+  return 0;
+}
+
+/* Be in contact with the guards of the edges `held`. */
+static void in_contact(hs_run *run, const int *held) {
+  const hs_mode *const own = run->here.table;
+  bind_contacts(run, held, held);
+  for (int k = 0; k < own->edges; k++)
+    if (held[k]) run->active_surfaces[k] = 0;
+  run->here.emerging = 0;
+  move_walls(run->active_surfaces, own, run->here.table->edges - own->edges);
+  count_active(run);
+}
+
+/* Whether the guards of the edges `held`, which hold the state together, have a flow. */
+static int flows(hs_run *run, const int *held) {
+  int is = 1;
+  bind_contacts(run, held, held);
+  if (!run->here.table->flow(run->here.p, run->here.t, run->x, run->at))
+    for (int s = 0; s < run->here.dimension; s++) is &= run->at[s] == run->at[s];
+  bind_mode(run);
+  return is;
+}
+
+/* Be in contact with every guard that holds the state: GOES_ON, or a stop where they have no one motion. */
+static int contact_at(hs_run *run) {
+  hs_mode_state *const here = &run->here;
+  const hs_mode *const own = here->table;
+  int *const kept = run->kept, *const held = run->held, any = 0, first = -1;
+  if (!here->standing || own->held < 0 || here->dimension != own->dimension || !here->dimension) return GOES_ON;
+  for (int k = 0; k < own->edges; k++) kept[k] = run->active_surfaces[k];
+  const int count = keeping(run, here->t, run->x, kept);
+  if (!count) return GOES_ON;
+  const int one = pressing(run, here->t, run->x, kept, count, held, run->beyond);
+  for (int k = 0; k < own->edges; k++) any += held[k] != 0;
+  if (!one || (any > 1 && !flows(run, held))) {
+    for (int k = own->edges; k-- > 0;) first = kept[k] ? k : first;
+    note(run, HS_COUPLED, first, 0, here->t, here->t);
+    return stopped(run, HS_ACCUMULATED, here->t);
+  }
+  if (any) in_contact(run, held);
+  return GOES_ON;
+}
+
+/* Whether surface j of the present table ends a contact that holds the state. */
+static int releases(const hs_run *run, int j) {
+  const hs_mode *const table = run->here.table;
+  return j < table->edges && table->edge[j].releases >= 0 && *level_of(run, table->edge[j].releases) == HS_HELD;
+}
+
+/* Whether surface j of the present table is the push on a guard, which is off by the sizes that states have had. */
+static int is_push(const hs_run *run, int j) {
+  const hs_mode *const table = run->here.table;
+  return j < table->edges && table->edge[j].releases >= 0 && *level_of(run, table->edge[j].releases) != 0;
+}
+
+/* Whether the state is in contact with the guard of edge k of its mode. */
+static int in_touch(const hs_run *run, int k) {
+  return k < run->model->mode[run->here.mode].edges && releases(run, k);
+}
+
+/* End all contacts. */
+static void after_contact(hs_run *run) {
+  hs_mode_state *const here = &run->here;
+  const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
+  for (int k = 0; k < own->edges; k++)
+    if (releases(run, k)) run->active_surfaces[k] = 1;
+  move_walls(run->active_surfaces, held, own->edges - held->edges);
+  bind_mode(run);
+  count_active(run);
+}
+
+/* Move t, where surface j of the contact rises through zero, to behind the end of a part of an `if` in contact, and the
+   state run->x to run->z: whether an `if` does not hold there. Surface j is above round-off there, if all hold. */
+static int behind_end(hs_run *run, int j, hs_time *t) {
+  const hs_mode_state *here = &run->here;
+  const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
+  const hs_time from = *t;
+  const hs_real most = sqrt((hs_real)HS_UNIT) * run->until; /* further on a line is no motion */
+  hs_real r, noise;
+  int of = 0, raised = held->flow(here->p, from, run->x, run->end);
+  while (own->edge[of].contact != held->edge[j].releases) of++;
+  for (int k = 0; k < own->edges; k++) run->kept[k] = in_touch(run, k);
+  for (hs_real after = HS_UNIT * run->until; !raised; after = after * 2) {
+    int holds = 1;
+    *t = earlier(from + after, segment_end(run));
+    for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + (*t - from) * run->end[s];
+    bind_mode(run);
+    for (int k = 0; k < own->edges && holds; k++) holds = !run->kept[k] || is_possible(run, k, *t, run->z, run->kept);
+    raised = holds && pressed(run, of, *t, run->z, run->kept);
+    bind_contacts(run, run->kept, run->kept);
+    if (!holds) return 1;
+    raised = raised || surface(run, j, *t, run->after, &r) || roundoff_bound(run, j, *t, run->z, 0, &noise);
+    if (!raised && (r > noise || !(after < most && *t < segment_end(run)))) return 0;
+  }
+  *t = from;
+  copy(run->z, run->x, here->dimension);
+  return 1;
+}

@@ -1,0 +1,223 @@
+/* The runtime: one translation unit, each file the twin of one in hsdsl/engine/simulate or hsdsl/engine/integrators. */
+
+#include "functions.h"
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("tree-pre") /* of what -O2 does beyond -O1 the part that makes it faster, by a tenth */
+#endif
+
+#include "table.c"
+#include "taylor.c"
+#include "scales.c"
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC push_options
+#pragma GCC optimize("O2")
+#endif
+#include "linear.c"
+#include "sparse.c"
+#include "newton.c"
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC pop_options
+#endif
+#include "stepper.c"
+
+#include "control.c"
+#include "stall_detection.c"
+#include "surfaces.c"
+#include "input_segments.c"
+#include "queues.c"
+#include "recorder.c"
+#include "run.c"
+#include "entry.c"
+#include "cascade.c"
+#include "chatter.c"
+#include "relaxed.c"
+#include "root_isolation.c"
+#include "surface_polynomials.c"
+#include "dense_steps.c"
+#include "contact.c"
+#include "zeno.c"
+#include "touching.c"
+#include "located.c"
+#if !defined(HS_FLOAT32)
+#include "sample.c"
+#endif
+
+static void *take(hs_store *store, int64_t count, size_t size) {
+  double *start = store->numbers ? store->numbers + store->used : 0;
+  store->used += (count * (int64_t)size + (int64_t)sizeof(double) - 1) / (int64_t)sizeof(double);
+  return start;
+}
+
+static hs_real *numbers(hs_store *store, int64_t count) { return take(store, count, sizeof(hs_real)); }
+
+static hs_polynomial polynomial(hs_store *store, const hs_run *run) {
+  const int degree = run->method->degree > 3 ? run->method->degree : 3;
+  hs_polynomial piece;
+  piece.degree = 0;
+  piece.c = numbers(store, (int64_t)degree * run->width);
+  return piece;
+}
+
+/* Give every array of a run its place. */
+static void lay_out(hs_run *run, hs_store *store) {
+  const int w = run->width, m = run->model->surfaces, e = run->model->edges;
+  const int stages = run->method->stages, all = stages + 1 + run->method->extra;
+  hs_real **states[] = {&run->x,      &run->slope,   &run->z,     &run->end,    &run->at,   &run->scale,
+                       &run->entered, &run->after, &run->landed, &run->error, 0};
+  for (hs_real ***state = states; *state; state++) **state = numbers(store, w);
+  hs_real **own[] = {&run->scales, &run->resolved, &run->least, &run->unmoved, &run->near, &run->nearby,
+                    &run->flow_sizes, 0};
+  for (hs_real ***each = own; *each; each++) **each = numbers(store, w);
+  run->known = numbers(store, run->model->states);
+  run->lifted = take(store, w, sizeof(int));
+  run->k = take(store, all, sizeof(hs_real *));
+  for (int i = 1; i < all; i++) {
+    hs_real *stage = numbers(store, w);
+    if (store->numbers) run->k[i] = stage;
+  }
+  if (store->numbers) run->k[0] = run->slope, run->k[stages] = run->end;
+  lay_out_method(run, store);
+  run->values = numbers(store, m);
+  run->ahead = numbers(store, m);
+  run->magnitudes = numbers(store, m);
+  run->begun = numbers(store, m);
+  run->noise = numbers(store, m);
+  run->gradient = numbers(store, w + 1);
+  run->both = numbers(store, 2 * (int64_t)w);
+  run->active_surfaces = take(store, m, sizeof(int));
+  run->beyond = take(store, m, sizeof(int));
+  run->emerging = take(store, m, sizeof(int));
+  run->tied = take(store, e, sizeof(int));
+  run->alternatives = take(store, e, sizeof(int));
+  run->held_p = numbers(store, run->model->data + run->model->contacts);
+  run->others = take(store, m, sizeof(int));
+  run->jacobian = numbers(store, run->model->derivatives);
+  run->stood = numbers(store, m);
+  for (int i = 0; store->numbers && i < m; i++) run->stood[i] = 0.0;
+  run->cascade.x = numbers(store, w);
+  run->source = numbers(store, w);
+  run->trial.piece = polynomial(store, run);
+  run->cubic = polynomial(store, run);
+  run->crossings = take(store, m, sizeof(hs_crossing));
+  for (int i = 0; i < m; i++) {
+    hs_real *state = numbers(store, w);
+    if (store->numbers) run->crossings[i].state = state;
+  }
+}
+
+/* Degrees of polynomials that surfaces are along steps. */
+static int most_degree(const hs_method *method) {
+  const int own = method->degree > method->order ? method->degree : method->order;
+  return own > LEAST_MOST_DEGREE ? own : LEAST_MOST_DEGREE;
+}
+
+static hs_span lay_out_span(const hs_run *run, hs_store *store) {
+  hs_span span = {0, 0, 0, 0, 0, {0, 0}};
+  span.x = numbers(store, run->width);
+  span.largest = numbers(store, run->width);
+  span.piece = polynomial(store, run);
+  return span;
+}
+
+/* The same for the arrays of the located scheme. */
+static void lay_out_located(hs_run *run, hs_store *store) {
+  const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
+  const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;
+  run->kept = take(store, m, sizeof(int));
+  run->held = take(store, m, sizeof(int));
+  run->tail = take(store, m, sizeof(int));
+  run->turn = numbers(store, 2 * (int64_t)w);
+  run->span = lay_out_span(run, store);
+  run->before = lay_out_span(run, store);
+  hs_real **states[] = {&run->q, &run->other_end, 0};
+  for (hs_real ***state = states; *state; state++) **state = numbers(store, w);
+  run->other_k = take(store, all, sizeof(hs_real *));
+  for (int i = 1; i < all; i++) {
+    hs_real *stage = numbers(store, w);
+    if (store->numbers) run->other_k[i] = stage;
+  }
+  run->ends = numbers(store, m);
+  run->starts = numbers(store, m);
+  run->middle = numbers(store, m);
+  run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
+  run->began = numbers(store, w);
+  run->left = numbers(store, most + 1);
+  run->bernstein = numbers(store, most + 1);
+  run->binomials = numbers(store, (int64_t)(most + 1) * (most + 2) / 2);
+  if (store->numbers) fill_binomials(run->binomials, most);
+  run->cuts = take(store, MOST_CUTS, sizeof(hs_cut));
+  for (int i = 0; i < MOST_CUTS; i++) {
+    hs_real *b = numbers(store, most + 1);
+    if (store->numbers) run->cuts[i].b = b;
+  }
+  run->unsettled = take(store, (int64_t)run->model->modes * m, sizeof(int));
+  for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->unsettled[i] = 0;
+  run->reach = numbers(store, run->model->modes);
+  run->lost = take(store, run->model->modes, sizeof(int));
+  for (int i = 0; store->numbers && i < run->model->modes; i++) run->reach[i] = 0.0, run->lost[i] = 0;
+  run->curves.room = most + 1;
+  run->curves.start = numbers(store, MOST_PARTS);
+  run->curves.width = numbers(store, MOST_PARTS);
+  run->curves.c = numbers(store, (int64_t)MOST_PARTS * m * run->curves.room);
+  run->curves.off = numbers(store, (int64_t)MOST_PARTS * m);
+  run->curves.degree = take(store, (int64_t)MOST_PARTS * m, sizeof(int));
+  run->curves.certain = take(store, (int64_t)MOST_PARTS * m, sizeof(int));
+}
+
+static hs_run make_run(const hs_model *model, const hs_method *method, hs_scheme scheme, hs_store *store) {
+  static const hs_run empty;
+  hs_run run = empty;
+  run.model = model;
+  run.method = method;
+  run.width = model->width;
+  lay_out(&run, store);
+  if (scheme == HS_LOCATED) lay_out_located(&run, store);
+  return run;
+}
+
+/* How many numbers a run's workspace needs. */
+int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme) {
+  hs_store store = {0, 0};
+  make_run(model, method, scheme, &store);
+  return store.used;
+}
+
+/* A run of a task in its workspace, before it enters its first mode. */
+static hs_run open_run(hs_task *task) {
+  hs_store store = {task->workspace, 0};
+  hs_run run = make_run(task->model, task->method, (hs_scheme)task->settings.scheme, &store);
+  hs_chunk *const chunk = &task->chunk;
+  chunk->rows = chunk->arcs = chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
+  task->now = 0.0;
+  task->made = task->entries = 0;
+  run.task = task;
+  run.pause = INFINITY;
+  run.epsilon = task->settings.relaxation;
+  run.until = task->settings.until;
+  run.control.h = task->settings.step;
+  run.control.tolerance = task->settings.tolerance;
+  run.control.largest = task->settings.largest;
+  run.control.least = hs_max(task->settings.tolerance, sqrt((hs_real)HS_UNIT)) * task->settings.largest;
+  run.control.order = task->method->order;
+  run.control.failed_at = NAN;
+  run.control.implicit = is_implicit(task->method);
+  run.steps_to_poll = run.poll_steps = 32;
+  run.full_queue = -1;
+  copy(run.x, task->x, task->dimension);
+  for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
+  for (int i = 0; i < run.model->states; i++) run.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
+  return run;
+}
+
+void hs_simulate(hs_task *task) {
+  hs_run run = open_run(task);
+  start_sizes(&run, task->mode, 0.0);
+  const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
+  if (task->settings.scheme == HS_LOCATED)
+    located(&run, entered);
+  else
+    relaxed(&run, entered);
+}
+
+#include "pause.c"

@@ -1,0 +1,322 @@
+/* A run under way: what stays, and where it is. See hsdsl/engine/simulate/run.py. */
+
+#ifndef HS_RUN_H
+#define HS_RUN_H
+
+#if !defined(HS_NO_CLOCK) /* given where there is none */
+#include <time.h>
+#endif
+
+#include "hs_math.h"
+#include "hs_simulate.h"
+
+#if defined(HS_INLINE) /* given by who compiles: sanitizers take minutes over code that is inlined everywhere */
+#elif defined(__GNUC__)
+#define HS_INLINE static inline __attribute__((always_inline))
+#else
+#define HS_INLINE static inline
+#endif
+
+#if defined(HS_LANES) /* defined where the compiler follows this pragma */
+#define HS_SIMD _Pragma("omp simd")
+#else
+#define HS_SIMD
+#endif
+
+#if defined(HS_FLOAT32)
+#define HS_BITS 24
+#define HS_UNIT 0x1p-24f
+#define HS_TIE 0x1p-20f
+#define HS_NOTHING 0x1p-96f
+#else
+#define HS_BITS 53
+#define HS_UNIT 0x1p-53
+#define HS_TIE 1e-12
+#define HS_NOTHING 0x1p-960 /* below it numbers have no digits left */
+#endif
+#define HS_TIME_UNIT 0x1p-53
+#define FREE 16 /* transitions within the relaxation that cost no time; so many are remembered */
+#define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
+#define MOST_SPLITS 30
+#ifndef MOST_PIECES
+#define MOST_PIECES 1000 /* of a push over time; who lacks memory takes fewer */
+#endif
+#define MOST_PARTS (MOST_PIECES + MOST_SPLITS + 2)
+#define LEAST_MOST_DEGREE 8 /* of interpolation where a method asks for less */
+
+enum { NO_VALUE = 1, NO_CONVERGENCE = 2 }; /* why a step has no end */
+
+/* A step's interpolant: x + c_1 s + c_2 s**2 + ..., power m at c[m*width]. */
+typedef struct {
+  int degree;
+  hs_real *c;
+} hs_polynomial;
+
+typedef struct {
+  int edge;
+  hs_real theta, depth;
+  hs_time time;
+  hs_real *state;
+  const hs_polynomial *piece; /* of the whole step; 0 where the crossing is its start */
+} hs_crossing;
+
+/* The mode that a run is in, and the point there. */
+typedef struct {
+  int mode, dimension;
+  const hs_mode *table;
+  int64_t segment;
+  const hs_real *p;
+  hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
+  const hs_real *outputs_p;
+  int standing, emerging;  /* numbers of surfaces in active_surfaces and in run->emerging */
+  hs_time t;
+} hs_mode_state;
+
+/* One step as tried, from (t, x) to (t1, z). */
+typedef struct {
+  hs_time t, t1;
+  hs_real h;
+  int looked, ends; /* whether the flow at the end was evaluated, and has a value */
+  int has_piece;
+  hs_polynomial piece;
+} hs_trial;
+
+/* What a trial step found: crossings, an failure, or nothing. */
+typedef struct {
+  hs_step_failure failure;
+  int surface;
+  int crossings;
+} hs_found;
+
+typedef struct {
+  hs_real h, tolerance, largest, least;
+  int order;
+  int implicit;
+  hs_real before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
+  int64_t accepted, rejected; /* in a stretch of time */
+  hs_real stretch;
+  hs_time failed_at; /* where the last step began that was too wrong; before the first, not-a-number */
+  int closer;       /* whether a look at the flow's round-off let one pass */
+} hs_control;
+
+/* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
+   the derivatives should be renewed for the next step. */
+typedef struct {
+  hs_real rate, left;
+  int aged;
+} hs_convergence;
+
+/* What Radau IIA knows from one step to the next, and its scratch: vectors of `width`, matrices of `factors`. */
+typedef struct {
+  int derived, factored, stepped; /* whether there are derivatives, factors of their matrices, and a last step */
+  hs_time derived_at, start;
+  hs_real factored_for, length;
+  hs_convergence convergence;
+  hs_real *rows, *fresh;            /* the flow's derivatives; of a sparse system those that are not zero */
+  hs_real *real, *re, *im;          /* factors of the real matrix and of the complex one */
+  int *order, *turned;             /* the order of their rows */
+  hs_real *scratch[2];             /* of sparse systems */
+  hs_real *linked, *spread[4];     /* of variations: see blocks.c */
+  hs_real *lasting;                /* of variations: which share of an error of a derivative lasts */
+  hs_real *z[3], *last[3];          /* increments: as they are now, and of the last step */
+  hs_real *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
+  hs_real *slopes[3], *right[3];
+  hs_real *largest, *error;
+  const hs_real *scales; /* of the states, as the last step was solved with them */
+  hs_real *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */
+  int lifted;
+} hs_radau;
+
+/* A mode's columns of derivatives; exported C has none. */
+static inline const hs_variation *columns_of(const hs_mode *mode) {
+#if defined(HS_COLUMNS)
+  return mode->variation;
+#else
+  return (void)mode, (const hs_variation *)0;
+#endif
+}
+
+/* What a step solves for: n states that flow, the `own` ones of which have a matrix, and columns of derivatives of them
+   where they have a variation; 0 for none. `of` is the pattern of the matrix where it is sparse, else 0. `whole` says
+   that every column has derivatives of all own states: then n is (1 + columns) own. */
+typedef struct {
+  int n, own;
+  const hs_variation *v;
+  const hs_elimination *of;
+  int whole;
+} hs_blocks;
+
+/* Numbers that lay_out_method() takes of it, as a constant: see workspace.h. */
+#define HS_RADAU_SPACE(w, factors) (5 * HS_NUMBERS(factors) + 23 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
+#define HS_IMPLICIT_SPACE(kind, w, factors) ((kind) == HS_RADAU ? HS_RADAU_SPACE(w, factors) : 0)
+
+typedef struct {
+  hs_time reached;
+  int idle, creeping;
+} hs_stall;
+
+/* What is remembered of a transition. */
+typedef struct {
+  hs_time time, resumed;
+  int mode, edge, target, entry;
+} hs_made;
+
+/* A state that transitions without flow between them led to, and how many followed: room 0 for none. */
+typedef struct {
+  int mode;
+  long length, room;
+  hs_real *x;
+} hs_cascade;
+
+/* A part of an interval, with the Bernstein coefficients of a polynomial on it. */
+typedef struct {
+  hs_real low, high, *b;
+} hs_cut;
+
+/* Surfaces along one step: on part i, from start[i] on, surface k is a polynomial of the share of that part. */
+typedef struct {
+  int parts, count, room; /* room: numbers for each polynomial */
+  hs_real *start, *width, *c, *off; /* off: how far it may be off; rises that are lower tell nothing */
+  int *degree, *certain; /* for each part and surface */
+} hs_curves;
+
+/* One step of the located scheme. */
+typedef struct {
+  hs_time t, t1;
+  hs_real h;
+  hs_real *x, *largest; /* where it began; of a table, the largest of its stages */
+  hs_polynomial piece;
+} hs_span;
+
+typedef struct {
+  hs_task *task;
+  const hs_model *model;
+  const hs_method *method;
+  int width;
+  hs_real epsilon;
+  hs_time until;
+  hs_mode_state here;
+  hs_trial trial;
+  hs_control control;
+  int64_t placed; /* arcs of flow that were begun */
+  hs_stall stall;
+  hs_cascade cascade;
+  int chatter;
+  /* in the workspace, a state's room each unless said otherwise */
+  hs_real *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
+  /* scale: the sizes of the numbers that the state was computed from on entry, negative where the terms of a reset gave
+     them: the next reset reads no more than the value of such a state, and no size multiplies */
+  hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
+  hs_real *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
+  int *lifted;
+  hs_real *flow_sizes, *jacobian; /* see contact.c; jacobian: model->derivatives */
+  hs_real *held_p; /* in contact: what routines are bound to, model->data and then model->contacts numbers */
+  const hs_real *own_p; /* what they are bound to else */
+  int *kept, *held; /* one for each edge: whether it may hold the state, and does */
+  hs_real *stood;   /* one for each surface: how far off it a state is that stood on it, on entry */
+  int *others;      /* one for each edge: whether it holds the state where the `if` of another is looked at */
+  int *tail;        /* one for each surface: whether it is that of an edge of a Zeno tail */
+  hs_real *turn;    /* 2 width: where a tail's edges take a state in turn */
+  hs_real **k;          /* stages, then the flow at the end */
+  hs_real *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
+  int expanded;        /* whether it has written them, in this mode */
+  hs_radau radau;
+  hs_real *values, *ahead, *magnitudes, *noise; /* one for each surface */
+  hs_real *begun; /* magnitudes at the start of the located step, where `weighed` */
+  int weighed;
+  int *active_surfaces, *beyond, *emerging;
+  hs_real *source;      /* the flow that led to a transition, or between two states */
+  int *tied;           /* one for each edge */
+  hs_real *gradient;    /* width + 1 */
+  hs_real *both;        /* 2 width: states and sizes */
+  hs_crossing *crossings; /* one for each edge */
+  hs_polynomial cubic;
+  hs_crossing chosen;
+  int *alternatives, alternatives_count;
+  hs_time landed_at;    /* the end of a step into a strip */
+  int64_t row, jump;   /* counted from the start of the run */
+  int interrupted, full;
+  long steps_to_poll, poll_steps;
+#if !defined(HS_NO_CLOCK)
+  clock_t polled;
+#endif
+  /* of the located scheme */
+  hs_span span, before;
+  hs_time since, short_time; /* short_steps of a flight since then; a millionth of the run */
+  int short_steps;
+  int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
+  hs_real ratio;                     /* of the last error estimate */
+  hs_curves curves;
+  hs_cut *cuts;
+  const hs_real *bernstein_of;       /* the polynomial that `bernstein` has the coefficients of, 0 for none */
+  hs_real *bernstein, *binomials, *left, *rows;
+  hs_real *q, *ends, *starts, *middle, *other_end, **other_k;
+  int has_middle;
+  hs_real *began;                   /* where a motion along a guard began */
+  int still;                         /* whether it ended there */
+  int full_queue; /* a queue of the mode in which more wait than may, or -1 */
+  int *unsettled, noted_crowded;     /* unsettled: for each mode and surface */
+  hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
+  int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */
+  hs_made made[FREE];
+  hs_time pause; /* see pause.c: when to pause, and whether to do so behind a transition */
+  int after_jump;
+  int64_t jumps_before;
+} hs_run;
+
+/* All that a paused run needs to go on: plain data. `data` has the numbers that routines were bound to; there are
+   HS_PAUSE_NUMBERS and HS_PAUSE_INTEGERS of the others (workspace.h). `ended` says that it does not go on: see the
+   task's stop. Its time is behind the pause where it waits in a strip. */
+typedef struct {
+  int ended, mode, dimension, standing, emerging, noted_crowded, cascade_mode;
+  long cascade_length, cascade_room;
+  int64_t placed, jump, row;
+  hs_time time;
+  hs_control control;
+  hs_made made[FREE];
+  hs_real *numbers, *data;
+  int32_t *integers;
+} hs_pause;
+
+/* Enter the task's mode at an instant and pause; then go on until an instant or, `after_jump`, the next transition. Where
+   inputs or parameters have `changed` since, the mode is entered anew. */
+HS_EXPORT void hs_begin(hs_task *task, hs_pause *pause, hs_time start);
+HS_EXPORT void hs_go_on(hs_task *task, hs_pause *pause, hs_time until, int changed, int after_jump);
+
+/* The earlier of two instants, the first where they are one. */
+static inline hs_time earlier(hs_time a, hs_time b) { return b < a ? b : a; }
+
+static inline hs_real tie(hs_time t) { return HS_TIE * fabs(t); }
+
+static inline int all_finite(const hs_real *v, int n) {
+  for (int i = 0; i < n; i++)
+    if (!hs_finite(v[i])) return 0;
+  return 1;
+}
+
+/* Four sums at a time need not wait for each other; it tells whether all are finite. */
+static inline hs_real sum(const hs_real *v, int n) {
+  hs_real a = 0.0, b = 0.0, c = 0.0, d = 0.0;
+  int i = 0;
+  for (; i + 3 < n; i += 4) a += v[i], b += v[i + 1], c += v[i + 2], d += v[i + 3];
+  for (; i < n; i++) a += v[i];
+  return (a + b) + (c + d);
+}
+
+static inline void swap(hs_real **a, hs_real **b) {
+  hs_real *const kept = *a;
+  *a = *b;
+  *b = kept;
+}
+
+static inline void copy(hs_real *to, const hs_real *from, int n) {
+  for (int i = 0; i < n; i++) to[i] = from[i];
+}
+
+/* What is left of the caller's memory. Counted without memory first, then given out. */
+typedef struct {
+  double *numbers;
+  int64_t used;
+} hs_store;
+
+#endif

@@ -1,0 +1,223 @@
+"""C text to a loaded library: compiled at first use, kept by content in the user's cache folder.
+
+A wheel for one platform has the hand-written loop compiled already, in ``shipped``; another loop than that of the
+wheel's own C is not taken from there.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import cache, partial
+from pathlib import Path
+
+from hsdsl.base import limits
+from hsdsl.base.cache import can_keep, find, is_made, keep, key_of, making
+from hsdsl.base.names import shown
+from hsdsl.engine.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
+
+RUNTIME = Path(__file__).parent / "c"
+BACKENDS = Path(__file__).parents[1] / "backends"
+SHIPPED = Path(__file__).parent / "shipped"
+KIND = "compiled"
+GIVEN_UP = "given-up"  # entries for models that took too long to compile: the seconds that the compiler had
+
+
+LOOP = '#include "library.c"\n', "hs_simulate"  # its text and symbol
+EFFORT: Effort = "-O1"  # of models and exports: -O2 compiles 1.5 times as long, for code that is a hundredth faster
+OF_LOOP: Effort = "-O2"  # which is compiled when the package is installed: its runs are 5 to 7 % faster
+_OPTIONS = " ".join((EFFORT, OF_LOOP, *FLAGS))
+
+
+def loop_object(folder: Path) -> Path:
+    """The loop as an object in a folder, to be linked into another library: compiled at first use, and kept.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    compiler, made = find_compiler(), folder / "hs.o"
+    key = _key("object", compiler)
+    with making(KIND, key):
+        if kept := find(KIND, key):
+            _copy(kept, made)
+            return made
+        flags = ("-c", *(flag for flag in FLAGS if flag != "-shared"))
+        compiler.build([RUNTIME / "hs.c"], [RUNTIME], made, EFFORT, flags)
+        _keep(key, made)
+    return made
+
+
+def ship(folder: Path) -> Path:
+    """Compile the loop into a folder, for a wheel.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    text, symbol = LOOP
+    library = folder / _shipped(text).name
+    _compile(find_compiler(), [text], library, OF_LOOP)
+    _tried(find_compiler(), library, symbol)
+    return library
+
+
+def loop() -> ctypes.CDLL:
+    """Load the loop: that of this package, or what is compiled at first use.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    text, symbol = LOOP
+    return load(text, symbol, lambda: [text])
+
+
+def _shipped(content: str) -> Path:
+    """Where a library would be that came with this package."""
+    return SHIPPED / f"{key_of(content, _our_text(), _OPTIONS, _processor())}.so"
+
+
+def load(content: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctypes.CDLL:
+    """Load the library that ``source`` compiles to and that has ``symbol``.
+
+    ``content`` is the source's name in the cache; the source, one text or several that are compiled at the same time,
+    is written only where it must be compiled.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    shipped = _shipped(content)
+    loaded = _loaded(shipped) if shipped.exists() else None
+    if loaded is not None:
+        return loaded
+    compiler = find_compiler()
+    key = _key(content, compiler)
+    loaded = _kept(key)
+    if loaded is not None:
+        return loaded
+    with making(KIND, key):
+        return _kept(key) or _made(compiler, key, symbol, source)
+
+
+def _kept(key: str) -> ctypes.CDLL | None:
+    path = find(KIND, key)
+    return None if path is None else _loaded(path)
+
+
+def _loaded(path: Path) -> ctypes.CDLL | None:
+    try:
+        return ctypes.CDLL(str(path))
+    except OSError:
+        return None  # made for something else than what runs now: it is made again
+
+
+def is_missing(content: str) -> bool:
+    """Whether the library of ``content`` is not there, and no process makes it.
+
+    Raises NoCompiler: there is no compiler.
+    """
+    key = _key(content, find_compiler())
+    return not _shipped(content).exists() and find(KIND, key) is None and not is_made(KIND, key)
+
+
+def can_be_kept(content: str) -> bool:
+    """Whether the library of ``content`` will be there for other processes.
+
+    Raises NoCompiler: there is no compiler.
+    """
+    return can_keep(KIND, _key(content, find_compiler()))
+
+
+def made_elsewhere(content: str) -> Callable[[], bool]:
+    """A function that says whether another process compiles ``content`` at the moment.
+
+    Raises NoCompiler: there is no compiler.
+    """
+    return partial(is_made, KIND, _key(content, find_compiler()))
+
+
+def _key(content: str, compiler: Compiler) -> str:
+    return key_of(content, _our_text(), compiler.identity, _OPTIONS, _processor())
+
+
+@cache
+def _our_text() -> bytes:
+    """The hand-written C and what writes the rest: closer than a version to what a library was made by."""
+    printers = (BACKENDS / "printer.py", *sorted((BACKENDS / "c").glob("*.py")))
+    paths = (*sorted(RUNTIME.glob("*.[ch]")), *printers)
+    return b"".join(path.read_bytes() for path in paths)
+
+
+def _processor() -> str:
+    return f"{sys.platform} {platform.machine()} {sys.maxsize}"
+
+
+def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctypes.CDLL:
+    """Compile a library, try it, and keep it where anything can be kept."""
+    from hsdsl.engine.runtime.process import workshop
+
+    allowed, is_loop = limits.current().compile, symbol == LOOP[1]
+    if not is_loop and (seconds := _given_up(key)) >= allowed:
+        again = f"--limit compile={10 * seconds:g} allows more, hsdsl doctor --forget has it tried again"
+        raise TooSlow(f"{compiler} took more than {seconds:g} s before; {again}")
+    texts = source()
+    try:
+        with workshop() as folder:
+            library = folder / "model.so"
+            try:
+                _compile(compiler, texts, library, OF_LOOP if is_loop else EFFORT)
+            except TooSlow:
+                if not is_loop:  # which is compiled in seconds, unless much else runs
+                    _give_up(key, allowed)
+                raise
+            loaded = _tried(compiler, library, symbol)
+            _keep(key, library)
+            return loaded
+    except OSError as error:
+        raise NoCompiler(f"there is no room to compile: {error.strerror or error}") from None
+
+
+def _given_up(key: str) -> float:
+    path = find(GIVEN_UP, key)
+    return 0.0 if path is None else float(path.read_text())
+
+
+def _give_up(key: str, seconds: float) -> None:
+    with suppress(OSError):
+        keep(GIVEN_UP, key, ".txt", lambda path: _write(path, f"{seconds!r}"))
+
+
+def _write(path: Path, text: str) -> None:
+    path.write_text(text)
+
+
+def _compile(compiler: Compiler, texts: Sequence[str], library: Path, effort: Effort) -> None:
+    sources = [library.with_name(f"model{number or ''}.c") for number in range(len(texts))]
+    for source, text in zip(sources, texts, strict=True):
+        source.write_text(text)
+    compiler.build(sources, [RUNTIME], library, effort, FLAGS)
+
+
+def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:
+    try:
+        loaded = ctypes.CDLL(str(library))
+    except OSError as error:
+        complaint = str(error).replace(f"{library.parent}{os.sep}", "")
+        raise NoCompiler(f"what {compiler} made cannot be loaded: {shown(complaint, 200)}") from None
+    if not hasattr(loaded, symbol):
+        raise NoCompiler(f"what {compiler} made has no {symbol}")
+    return loaded
+
+
+def _keep(key: str, library: Path) -> None:
+    try:
+        keep(KIND, key, library.suffix, lambda target: _copy(library, target))
+    except OSError as refusal:
+        _say_unkept(str(refusal))
+
+
+def _copy(library: Path, target: Path) -> None:
+    target.write_bytes(library.read_bytes())
+
+
+@cache
+def _say_unkept(refusal: str) -> None:
+    print(f"hsdsl: compiled code is not kept: {refusal}", file=sys.stderr)

@@ -1,0 +1,158 @@
+"""Commands run to their end: in process groups and a folder of their own, for a limited time."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Thread
+from time import monotonic
+from typing import IO
+
+from hsdsl.base import interrupts
+
+PATIENCE = 5.0  # seconds without a question
+LOOK = 0.5  # seconds in which a command that runs has the processor at least once
+MOST_TIMES_LONGER = 20
+TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100  # of a second of processor time
+MOST_PRINTED = 1 << 16  # bytes that are kept of what a command prints
+_running: dict[subprocess.Popen[bytes], Path] = {}
+
+
+@dataclass(frozen=True)
+class Done:
+    """The end of a command: its exit code, None where it was ended after its time, and what it printed on stderr."""
+
+    code: int | None
+    printed: str
+
+
+@contextmanager
+def workshop() -> Generator[Path]:
+    """Make a folder that vanishes with all that was made in it."""
+    with tempfile.TemporaryDirectory(prefix="hsdsl-", ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
+
+
+def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, responds: Callable[[], bool]) -> list[Done]:
+    """Run commands at the same time, whose temporary files go to ``folder``; they read nothing.
+
+    After :data:`PATIENCE` they go on only if ``responds``. On Linux seconds in which other programs had the processor
+    do not count. All that they started is ended with them where they are ended.
+
+    Raises OSError: one cannot be started.
+    """
+    began = monotonic()
+    begun: list[_Begun] = []
+    try:
+        for command in commands:
+            begun.append(_begin(command, folder))
+        codes = [_wait(each, _patiences(each.process.pid, began, seconds, responds)) for each in begun]
+    finally:
+        for each in begun:
+            _end(each.process)
+            del _running[each.process]
+    for each in begun:
+        each.listener.join(1.0)  # what it left running may hold the stream open
+    printed = [b"".join(each.printed).decode(errors="replace") for each in begun]
+    return list(map(Done, codes, printed))
+
+
+@dataclass(frozen=True)
+class _Begun:
+    """A command that is under way, and who keeps what it says."""
+
+    process: subprocess.Popen[bytes]
+    listener: Thread
+    printed: list[bytes]
+
+
+def _begin(command: Sequence[str], folder: Path) -> _Begun:
+    process = subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "TMPDIR": str(folder), "LC_ALL": "C"},  # what they say is read: `error` in English
+        process_group=0,
+    )
+    _running[process] = folder
+    printed: list[bytes] = []
+    listener = Thread(target=_listen, args=(process.stderr, printed), daemon=True)
+    listener.start()
+    return _Begun(process, listener, printed)
+
+
+def _wait(begun: _Begun, patiences: Iterator[float]) -> int | None:
+    """Wait for the end of what a command says, which comes at its own end and needs no looking again and again."""
+    for patience in patiences:
+        end = monotonic() + patience
+        begun.listener.join(patience)
+        with suppress(subprocess.TimeoutExpired):
+            return begun.process.wait(max(0.0, end - monotonic()))
+    return None
+
+
+def _patiences(group: int, began: float, seconds: float, responds: Callable[[], bool]) -> Iterator[float]:
+    """Give how long to wait for a command each time; where its time is over, as long as it still runs for less."""
+    yield max(0.0, began + min(seconds, PATIENCE) - monotonic())
+    if seconds > PATIENCE and not responds():
+        return
+    yield max(0.0, began + seconds - monotonic())
+    used = processor_time(group)
+    for _ in range(MOST_TIMES_LONGER):
+        if used >= seconds:
+            return
+        yield LOOK
+        before, used = used, processor_time(group)
+        if used <= before:  # it waits for something else, or nobody knows
+            return
+        yield max(0.0, seconds - used)
+
+
+def processor_time(group: int) -> float:
+    """Processor seconds of the processes of a group, and of their children that have ended; 0 where not on Linux."""
+    used = 0
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):  # it has ended
+            _, _, its_group, *others = path.read_bytes().rpartition(b")")[2].split()
+            used += sum(map(int, others[8:12])) if int(its_group) == group else 0
+    return used / TICKS
+
+
+def _listen(stream: IO[bytes], printed: list[bytes]) -> None:
+    """Keep the beginning of a stream, and take the rest, so that nobody waits to write it."""
+    with suppress(OSError, ValueError), stream:
+        printed.append(stream.read(MOST_PRINTED))
+        while stream.read(MOST_PRINTED):
+            pass
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End a command that has not ended, with its process group: its number cannot be another's as long as it runs."""
+    if process.poll() is None:
+        with suppress(OSError):
+            if hasattr(os, "killpg"):
+                os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
+        process.wait()
+
+
+@atexit.register
+def end_all() -> None:
+    """End what other threads have running when this process ends."""
+    for process, folder in list(_running.items()):
+        with suppress(OSError):
+            _end(process)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+interrupts.before_leaving.append(end_all)

@@ -1,0 +1,144 @@
+"""The columns that a compiled run has written, and where they are in memory."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hsdsl.engine.execution import Array
+from hsdsl.engine.runtime import structures
+
+RECORDS = {"arc": structures.ARC, "transition": structures.TRANSITION, "note": structures.NOTE}
+ARC_NUMBERS, TRANSITION_NUMBERS, NOTE_NUMBERS = (
+    record.itemsize // 8 for record in RECORDS.values()
+)  # as long as so many
+HEAD = ctypes.sizeof(structures.Record) // 8
+ORDER = (  # in which pack.c puts them
+    "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
+    "alternatives",
+)  # fmt: skip
+BY_TRANSITION = ("transition", "before", "after", "alternatives")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Sizes of a model's rows: states of the largest mode, outputs, the pieces' degree, edges and contacts of modes."""
+
+    width: int
+    outputs: int
+    degree: int
+    edges: int
+    contacts: int
+
+    @property
+    def row_bytes(self) -> int:
+        """About how much memory a row takes."""
+        return 8 * (3 + self.width * (2 + self.degree) + self.outputs)
+
+
+class Counts(NamedTuple):
+    """How much a run has written."""
+
+    rows: int
+    arcs: int
+    transitions: int
+    notes: int
+    alternatives: int
+
+
+class Gathered:
+    """Columns of a long run, as arrays; rows have as many states as the largest mode has that the run was in."""
+
+    def __init__(self, arrays: dict[str, Array], width: int) -> None:
+        if width < arrays["values"].shape[1]:
+            for name in ("values", "coefficients"):
+                arrays[name] = np.ascontiguousarray(arrays[name][..., :width])
+        self._arrays = arrays
+
+    def __getitem__(self, name: str) -> Array:
+        return self._arrays[name]
+
+    @property
+    def notes(self) -> int:
+        """How many notes there are."""
+        return len(self._arrays["note"])
+
+    @cached_property
+    def _record(self) -> Any:
+        of, names = self._arrays, ("times", "values", "outputs", "coefficients", "arc", *BY_TRANSITION)
+        rows, degree, width = of["coefficients"].shape
+        sizes = rows, len(of["arc"]), len(of["transition"]), width, degree, of["outputs"].shape[1]
+        return structures.Record(*sizes, *(of[name].ctypes.data for name in names))
+
+    @property
+    def record(self) -> int:
+        """Where the ``hs_record`` is that says where they are."""
+        return ctypes.addressof(self._record)
+
+
+class Packed:
+    """Columns of a short run in one stretch of memory, as ``pack.c`` puts them behind their record; arrays are made on
+    first use.
+
+    A dozen arrays take longer to make than many a run.
+
+    Parameters
+    ----------
+    pack : callable
+        Copies the columns to an address, and returns how many states a row has there.
+    counts : Counts
+    shape : Shape
+        With the states of the model's largest mode, of which the run may not have been in one.
+    """
+
+    def __init__(self, pack: Callable[[int], int], counts: Counts, shape: Shape) -> None:
+        rows, arcs, transitions, notes, alternatives = counts
+        by_row = 2 + shape.outputs + shape.width * (1 + shape.degree)
+        self._counts, self._shape = counts, shape
+        self._memory = np.empty(
+            HEAD
+            + rows * by_row
+            + transitions * 2 * shape.width
+            + ARC_NUMBERS * arcs
+            + TRANSITION_NUMBERS * transitions
+            + NOTE_NUMBERS * notes
+            + (alternatives + 1) // 2
+        )
+        self.record = structures.start_of(self._memory)  # where the ``hs_record`` is
+        self._width = pack(self.record)
+
+    @cached_property
+    def _sizes(self) -> tuple[int, ...]:
+        """How many numbers each column takes, in the order of `ORDER`."""
+        (n, arcs, k, notes, alternatives), w, there = self._counts, self._width, self._shape.width
+        by_row = n, n * w, n * self._shape.outputs, n, n * self._shape.degree * w
+        records = ARC_NUMBERS * arcs, TRANSITION_NUMBERS * k, k * there, k * there, NOTE_NUMBERS * notes
+        return (*by_row, *records, (alternatives + 1) // 2)
+
+    def __getitem__(self, name: str) -> Array:
+        place = ORDER.index(name)
+        start = HEAD + sum(self._sizes[:place])
+        raw: Array = self._memory[start : start + self._sizes[place]]
+        if name in RECORDS:
+            return raw.view(RECORDS[name])
+        if name == "alternatives":
+            return raw.view(np.int32)[: self._counts.alternatives]
+        n, k, shape = self._counts.rows, self._counts.transitions, self._shape
+        if name in ("values", "outputs"):
+            return raw.reshape(n, self._width if name == "values" else shape.outputs)
+        if name in ("before", "after"):
+            return raw.reshape(k, shape.width)
+        return raw.reshape(n, shape.degree, self._width) if name == "coefficients" else raw
+
+    @property
+    def notes(self) -> int:
+        """How many notes there are."""
+        return self._counts.notes
+
+
+Columns = Gathered | Packed

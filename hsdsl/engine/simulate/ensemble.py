@@ -1,0 +1,218 @@
+"""Many instances of one model by the compiled loop: slices of them, each by whichever thread is free."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from hsdsl.engine.execution import REASONS, Array
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.simulate.compiled import CompiledPlan, task_settings
+from hsdsl.engine.simulate.input_segments import Timeline
+from hsdsl.engine.simulate.remarks import codes_of
+from hsdsl.engine.simulate.settings import Settings
+from hsdsl.engine.simulate.state_layouts import StateLayouts
+
+TIMELINE = np.dtype([("segments", "i8"), ("start", "u8"), ("end", "u8"), ("jump", "u8"), ("data", "u8")])
+LONGEST = f"U{max(map(len, REASONS))}"
+NOTICED = {"in contact": "held", "replaced": "replaced", "unsettled": "rough", "crowded": "crowded"}
+SLID = 16  # the bit of `HS_SLID`
+KINDS_OF_NOTICES = [(SLID, "sliding"), *((structures.NOTICES.index(word), kind) for word, kind in NOTICED.items())]
+LOG_ROOM = 4096  # transitions that a thread keeps before it hands them over
+Logged = tuple[Array, Array, Array]  # transitions as `hs_transition`, and the states before and after each
+
+
+@dataclass(frozen=True, eq=False)
+class Instances:
+    """What differs between instances.
+
+    ``start`` has shape (instances, states), ``time`` (the samples, never decreasing) shape (instances, samples).
+    """
+
+    settings: Sequence[Settings]
+    timelines: Sequence[Timeline]
+    start: Array
+    time: Array
+
+
+class Kept:
+    """What is kept of each instance, to be filled in place; ``columns`` states and all outputs are sampled."""
+
+    def __init__(
+        self, instances: int, width: int, outputs: int, columns: int, samples: int, crossings: int, logs: bool = False
+    ) -> None:
+        nan = float("nan")
+        self.width, self.logs = width, logs
+        self.log: dict[int, Logged] = {}  # every transition, by the first instance of those that made them
+        self.stop = np.full(instances, "interrupted", LONGEST)  # until it is run to its end
+        self.reason = np.full(instances, -1, np.int32)  # as the compiled loop says it; -1 where it was not run
+        self.mode = np.full(instances, -1, np.int32)
+        self.kind = np.zeros(instances, np.int32)  # of the last arc's states
+        self.notices = np.zeros(instances, np.int32)  # kinds of them, as the compiled loop says it: a bit each
+        self.noted = np.full(instances, "", object)  # their codes
+        self.transitions = np.zeros(instances, np.int64)
+        self.ended = np.full(instances, nan)
+        self.final = np.full((instances, width), nan)
+        self.outputs = np.full((instances, outputs), nan)
+        self.crossed = np.full((instances, crossings), nan)
+        self.states = np.full((instances, columns, samples), nan)
+        self.results = np.full((instances, samples, outputs), nan)
+
+    def logged(self) -> Logged:
+        """Every transition, in the order of the instances."""
+        empty = np.empty(0, structures.TRANSITION), np.empty((0, self.width)), np.empty((0, self.width))
+        columns = zip(empty, *(self.log[first] for first in sorted(self.log)), strict=True)
+        first, second, third = (np.concatenate(column) for column in columns)
+        return first, second, third
+
+
+BY_INSTANCE = (
+    "reason",
+    "mode",
+    "kind",
+    "notices",
+    "transitions",
+    "ended",
+    "final",
+    "outputs",
+    "crossed",
+    "states",
+    "results",
+)
+
+
+class CompiledEnsemble:
+    """Instances of one plan's model and method, and the arrays that are filled."""
+
+    def __init__(self, plan: CompiledPlan, instances: Instances, kept: Kept, names: tuple[str, ...]) -> None:
+        self._plan, self._kept = plan, kept
+        self._start = np.ascontiguousarray(instances.start, np.float64)
+        self._time = np.ascontiguousarray(instances.time, np.float64)
+        self._settings = (structures.Settings * len(instances.settings))(
+            *(task_settings(settings, plan.problem.program.all_states) for settings in instances.settings)
+        )
+        self._timelines, self._numbers = _timelines(instances.timelines)
+        self._names, self._layouts = names, plan.layouts
+        modes = plan.problem.program.modes
+        self._slides = np.array([bool(mode.slides) for mode in modes] * any(mode.slides for mode in modes), np.int32)
+        self._stop = np.zeros(1, np.int32)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether :meth:`stop` was called."""
+        return bool(self._stop[0])
+
+    def stop(self) -> None:
+        """Let every thread end as soon as it can."""
+        self._stop[0] = 1
+
+    def work(self, first: int, last: int, place: ThreadWorkspace) -> None:
+        """Run the instances from ``first`` up to ``last``."""
+        table, kept = place.table, self._kept
+        table.done, table.instances = 0, last - first
+        table.samples, table.most_transitions = self._time.shape[1], kept.crossed.shape[1]
+        table.timeline, table.start, table.time = (
+            _row(self._timelines, first),
+            _row(self._start, first),
+            _row(self._time, first),
+        )
+        table.settings = ctypes.addressof(self._settings) + first * ctypes.sizeof(structures.Settings)
+        table.stop, table.slides = self._stop.ctypes.data, self._slides.ctypes.data if len(self._slides) else None
+        for name in BY_INSTANCE:
+            setattr(table, name, _row(getattr(kept, name), first))
+        place.workspace.run_ensemble(table)
+        if place.workspace.failed:
+            raise place.workspace.failed[0]
+        known = np.array([*structures.STOPPED, "interrupted"], LONGEST)
+        kept.stop[first:last] = known[kept.reason[first:last]]
+        kept.noted[first:last] = [_codes(notices) for notices in kept.notices[first:last].tolist()]
+        if kept.logs:
+            kept.log[first] = place.logged(int(kept.transitions[first:last].sum()))
+
+    def place(self) -> ThreadWorkspace:
+        """Make a place to work at."""
+        room = LOG_ROOM if self._kept.logs else 0
+        return ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1], room)
+
+
+class ThreadWorkspace:
+    """One thread's memory."""
+
+    def __init__(
+        self, plan: CompiledPlan, names: tuple[str, ...], layouts: StateLayouts, samples: int, log_room: int
+    ) -> None:
+        self.table = structures.Ensemble()
+        self.workspace = plan.workspaces.new(self.table.task)
+        plan.lay(self.workspace)
+        model, chunk, room = plan.compiled.table, self.table.task.chunk, samples
+        self._memory = np.zeros(room * (1 + len(names)) + 2 * model.width)
+        self._arcs = np.zeros(chunk.arc_room, np.int32)
+        sampling, start = self.table.sampling, self._memory.ctypes.data
+        ctypes.memmove(ctypes.byref(sampling), ctypes.byref(plan.sampled.table), ctypes.sizeof(sampling))
+        sampling.width, sampling.degree = model.width, self.workspace.degree
+        sampling.columns, sampling.outputs = len(names), model.outputs
+        sampling.dimension, sampling.column = plan.sampled.columns(layouts.kinds, names)
+        sampling.time, sampling.states = start, start + 8 * room
+        sampling.scratch = start + 8 * room * (1 + len(names))
+        self.table.layouts = self._arcs.ctypes.data
+        self.table.layout_of = None if layouts.one else layouts.of_mode.ctypes.data
+        self._log: Logged = (
+            np.empty(log_room, structures.TRANSITION),
+            np.empty((log_room, model.width)),
+            np.empty((log_room, model.width)),
+        )
+        self._full: list[Logged] = []
+        self._lay_log(log_room)
+
+    def _lay_log(self, room: int) -> None:
+        table = self.table
+        table.log_room = room
+        table.log, table.before, table.after = (column.ctypes.data for column in self._log)
+        self._drain = type(table.drain)(self._take)
+        table.drain = self._drain
+
+    def _take(self, _: int | None = None) -> int:
+        """Take the transitions out of the log."""
+        first, second, third = (column[: self.table.logged].copy() for column in self._log)
+        self._full.append((first, second, third))
+        self.table.logged = 0
+        return 0
+
+    def logged(self, count: int) -> Logged:
+        """Take away so many transitions of the instances that have been run; behind them are those of one cut short."""
+        self._take()
+        first, second, third = (np.concatenate(column)[:count] for column in zip(*self._full, strict=True))
+        self._full.clear()
+        return first, second, third
+
+
+@cache
+def _codes(notices: int) -> str:
+    """The codes of notices, a bit each."""
+    return codes_of(kind for bit, kind in KINDS_OF_NOTICES if notices >> bit & 1)
+
+
+def _row(array: Any, row: int) -> int:
+    return array.ctypes.data + row * array.strides[0] if len(array) else array.ctypes.data
+
+
+def _timelines(timelines: Sequence[Timeline]) -> tuple[Array, tuple[Array, ...]]:
+    """All timelines as ``hs_timeline``, and the columns they point into."""
+    counts = np.array([len(timeline.segments) for timeline in timelines])
+    segments = [segment for timeline in timelines for segment in timeline.segments]
+    columns = (
+        np.array([s.start for s in segments]),
+        np.array([s.end for s in segments]),
+        np.array([s.jump for s in segments], np.int32),
+        np.array([s.data for s in segments], np.float64).reshape(len(segments), -1),
+    )
+    table, first = np.empty(len(timelines), TIMELINE), np.cumsum(counts) - counts
+    table["segments"] = counts
+    for name, column in zip(("start", "end", "jump", "data"), columns, strict=True):
+        table[name] = column.ctypes.data + first * column.strides[0]
+    return table, columns

@@ -1,0 +1,337 @@
+"""The located scheme: the execution itself, its transitions at the crossings (Burden et al. 2013, Fig. 8, Sec. IV-A).
+
+A step is as long as its error allows. Every crossing of every surface inside it is isolated on the surface's own
+polynomial; the earliest goes, at its own instant, and flow goes on from its reset. A cascade at one instant costs no
+time, unless more than `FREE` transitions fall within the relaxation: then each of the others waits in a strip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.engine.execution import Stop
+from hsdsl.engine.integrators.stepper import State
+from hsdsl.engine.simulate.contact import behind_end, contact_at, holds_next, in_touch, keeps
+from hsdsl.engine.simulate.dense_steps import Span, Stepping, stepping
+from hsdsl.engine.simulate.diagnostics import FREE, slides
+from hsdsl.engine.simulate.entry import enter
+from hsdsl.engine.simulate.relaxed import Event, go_on, sizes, standing_on
+from hsdsl.engine.simulate.root_isolation import stays_below
+from hsdsl.engine.simulate.run import ModeState, Run, choose, reset
+from hsdsl.engine.simulate.stall_detection import pace
+from hsdsl.engine.simulate.standstill import standstill
+from hsdsl.engine.simulate.stops import LEFT, left_domain, reached, reached_in_strip
+from hsdsl.engine.simulate.surface_polynomials import Rise, deflated, rises_along
+from hsdsl.engine.simulate.surfaces import NONE, Arrival, Crossing, StepFailure, close_bracket, joined
+from hsdsl.engine.simulate.touching import touched
+from hsdsl.engine.simulate.zeno import close_tail, contraction, flown, held_exactly, of_contacts, unresolved
+
+MOST_CORRECTIONS = 8
+
+
+def located(run: Run, here: ModeState | Stop) -> Stop:
+    """Follow the execution from ``here`` until it stops."""
+    while not isinstance(here, Stop):
+        outcome = flow(run, here) if here.t < here.segment.end else here
+        if isinstance(outcome, Event):
+            here = make_transition(run, here, outcome)
+        elif isinstance(outcome, ModeState) and not outcome.t < outcome.segment.end:
+            here = at_boundary(run, outcome)
+        else:
+            here = outcome
+    return here
+
+
+def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
+    """Flow until a surface is crossed or to the segment's end; along a guard that holds the state until it lets go."""
+    held = contact_at(run, here)
+    if isinstance(held, Stop):
+        return held
+    if held is here:
+        return follow(run, here, stepping(run, here), here.segment.end)
+    outcome = along_guards(run, here, held)
+    still = here.arc.values[-1] == here.x
+    for k in in_touch(here, held):
+        run.diagnostics.in_contact(here.mode.edges[k].name, here.t, here.arc.times[-1], still)
+    return outcome
+
+
+def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeState | Stop:
+    """Flow along guards until one lets go of the state."""
+    while True:
+        outcome = follow(run, held, stepping(run, held), here.segment.end)
+        if isinstance(outcome, ModeState):
+            return held_exactly(run, here, held, outcome.t, outcome.x)
+        if isinstance(outcome, Stop):
+            return outcome
+        crossing, edges = outcome.crossing, here.mode.edges
+        if not held.surfaces.releases(crossing.edge):
+            ends = {held.mode.edges[k].name for k in range(len(held.mode.edges)) if held.surfaces.releases(k)}
+            x = held_exactly(run, here, held, crossing.time, crossing.state, [crossing.edge]).x
+            others = tuple(name for name in outcome.alternatives if name not in ends)
+            held_by = tuple(in_touch(here, held))
+            return replace(outcome, crossing=replace(crossing, state=x), alternatives=others, held=held_by)
+        t, x, ends = crossing.time, crossing.state, True
+        if not crossing.edge < len(edges):
+            t, x, ends = behind_end(run, here, held, crossing.edge, t, x)
+        if t > crossing.time:
+            here.arc.append(t, x, (tuple(b - a for a, b in zip(crossing.state, x, strict=True)),))
+        held.surfaces.leave(t, x)
+        if ends:
+            after = held_exactly(run, here, held, t, x)
+            if t == here.t and crossing.edge < len(edges):  # to round-off it neither holds the state nor lets go
+                after.surfaces.active.discard(crossing.edge)
+            return run.place(here.index, here.mode.states, t, after.x, outcome.scale, active=after.surfaces.active)
+        held = held.moved(t, x)
+
+
+def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event | ModeState | Stop:
+    """Step until a surface is crossed, or to a time in the segment."""
+    t, x, arc = here.t, here.x, here.arc
+    before: Span | None = None
+    steady = pace(run, t)
+    while t < limit and not steady.is_slow(t):
+        span = steps.next(t, x, limit)
+        if isinstance(span, StepFailure):
+            return stuck(run, here.moved(t, x), span)
+        try:
+            if event := first_event(run, here, before, span):
+                return event
+        except DOMAIN_ERRORS:
+            return standstill(run, here.moved(t, x)).not_finite([(t, x), (span.t1, span.z)])
+        if here.surfaces.active:
+            here.surfaces.leave(span.t1, span.z)
+        t, x, before = span.t1, span.z, span
+        x = run.moved_along(here, t, x, span.h)
+        arc.append(t, x, span.piece)
+    return stuck(run, here.moved(t, x), StepFailure("slow")) if t < limit else here.moved(t, x)
+
+
+def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> Event | Stop | None:
+    """Say what happens first along a step: a guard, a wall with no guard on it, or nothing."""
+    edges = len(here.mode.edges)
+    found = [c for k in range(len(span.curves)) if (c := first_crossing(run, here, span, k))]
+    guards, walls = [c for c in found if c.edge < edges], [c for c in found if c.edge >= edges]
+    wall = min(walls, key=lambda c: c.time, default=None)
+    if wall and not any(c.time <= wall.time + run.tie(wall.time) for c in guards):
+        standing = here.surfaces.standing(wall.time, wall.state, run.tie(wall.time))
+        if not standing:
+            write(here, span, wall)
+            return left_domain(here.mode, wall.edge, wall.time, LEFT)
+        guards = [Crossing(k, wall.theta, wall.time, wall.state, wall.depth) for k in standing]
+    if not guards:
+        return None
+    guards = with_unseen(run, here, span, guards)
+    chosen, alternatives = choose(here, guards, run)
+    write(here, span, chosen)
+    return Event(chosen, alternatives, chosen.time, largest(here, before, span, chosen))
+
+
+def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing) -> State:
+    """The sizes of the numbers behind a crossing's state: the terms of its step and of the one before."""
+    stays = stands(here, crossing)  # off that surface by as much as the state was that it came from
+    found = tuple(map(joined, sizes(span.x, crossing.state, here, stays), span.sizes(crossing.theta)))
+    if before is not None:
+        found = tuple(map(joined, found, before.sizes(before.h * 0 + 1)))
+    if here.surfaces.touched:  # it is off the guards that hold it by as much as it has ever been computed from
+        found = tuple(map(max, found, here.arc.scales))
+    return found
+
+
+def stands(here: ModeState, crossing: Crossing) -> bool:
+    """Whether a crossing's state is on a surface that the state was on that it came from, or one holds it."""
+    t, q, surfaces = crossing.time, crossing.state, here.surfaces
+    if surfaces.touched or not surfaces.active:
+        return bool(surfaces.touched)
+    r = here.kernel.surfaces(t, *q)
+    return any(k == crossing.edge or abs(r[k]) <= surfaces.roundoff_bound(k, t, q) for k in surfaces.active)
+
+
+def write(here: ModeState, span: Span, crossing: Crossing) -> None:
+    """Record the part of a step that leads to a crossing."""
+    if crossing.theta > 0:
+        here.arc.append(crossing.time, crossing.state, span.cut(crossing.theta))
+
+
+def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | None:
+    """Find the first point of a step where surface k is crossed and its condition holds."""
+    zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
+    pieces = deflated(span.curves[k]) if k in surfaces.active else span.curves[k]
+    if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
+        return touched(run, here, span, k, pieces)
+    first, last = surfaces.roundoff_bound(k, span.t, span.x), surfaces.roundoff_bound(k, span.t1, span.z)
+    beyond = pieces[0].coefficients[0] > first
+    for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
+        theta, time, q = settled(here, span, k, rise)
+        holds = k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]
+        if holds or (k in surfaces.active and holds_next(run, here, k, time, q)):
+            if not rise.certain:
+                run.diagnostics.unsettled(here.mode.name, k, time)
+            return Crossing(k, theta, time, q, zero)
+    return touched(run, here, span, k, pieces)
+
+
+def with_unseen(run: Run, here: ModeState, span: Span, guards: list[Crossing]) -> list[Crossing]:
+    """Crossings, with those before the first one that rise by less than a step's polynomials are off by.
+
+    A surface may be beyond its guard so and be crossed again behind the first one.
+    """
+    t, x, first, found = span.t, span.x, min(guards, key=lambda c: c.time), {c.edge: c for c in guards}
+    start, end = here.kernel.surfaces(t, *x), here.kernel.surfaces(first.time, *first.state)
+    tied = {c.edge for c in guards if c.time - first.time <= run.tie(first.time)}
+    for k in range(len(here.mode.edges)):
+        if k in tied or here.surfaces.releases(k) or not first.theta > 0:
+            continue
+        bound = here.surfaces.roundoff_bound
+        if not end[k] > 0 or not end[k] > bound(k, first.time, first.state) or start[k] > bound(k, t, x):
+            continue
+
+        def residual(s: Number, k: int = k) -> Number:
+            time, q = span.point(s)
+            return here.kernel.surfaces(time, *q)[k]
+
+        s = first.theta * 0
+        if not start[k] > 0:
+            s = close_bracket(residual, (s, start[k]), (first.theta, end[k]), s, run.arithmetic.unit * first.theta)
+        time, q = span.point(s)
+        if here.kernel.conditions[k](time, *q)[0] or (k in here.surfaces.active and holds_next(run, here, k, time, q)):
+            found[k] = Crossing(k, s, time, q, run.arithmetic.zero)
+    return list(found.values())
+
+
+def settled(here: ModeState, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:
+    """Correct a crossing on the surface itself to round-off: by Newton's method, else in a bracket."""
+    stands, s, best = k in here.surfaces.active, rise.share, None
+
+    def residual(s: Number) -> Number:
+        time, q = span.point(s)
+        return here.kernel.surfaces(time, *q)[k]
+
+    for _ in range(MOST_CORRECTIONS):
+        time, q = span.point(s)
+        r = here.kernel.surfaces(time, *q)[k]
+        if best is not None and not abs(r) < best[0]:
+            break
+        best = (abs(r), s)
+        if rise.slope == 0 or abs(r) <= here.surfaces.roundoff_bound(k, time, q, entry=stands):
+            return s, time, q
+        s = min(s * 0 + 1, max(s * 0, s - r / rise.slope))
+    assert best is not None
+    s = bracketed(residual, best[1], here)
+    return s, *span.point(s)
+
+
+def bracketed(residual: Callable[[Number], Number], s: Number, here: ModeState) -> Number:
+    """Close in on a rise near s where Newton's method fails (a root of higher order), if one is bracketed there."""
+    unit = here.surfaces.arithmetic.unit
+    width, one = 8 * unit * max(s, unit), s * 0 + 1
+    while width < 1:
+        low, high = max(s * 0, s - width), min(one, s + width)
+        below, above = residual(low), residual(high)
+        if below < 0 and above == 0:
+            return high
+        if below <= 0 < above:
+            return close_bracket(residual, (low, below), (high, above), s * 0, unit * s)
+        width = width * 16
+    return s
+
+
+def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
+    """Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail."""
+    crossing, until = run.moved_crossing(here, event.crossing), run.settings.until
+    t, q, edge = crossing.time, crossing.state, here.mode.edges[crossing.edge]
+    if stop := run.limit_reached(t):
+        return stop
+    outcome, resumed = reset(here, crossing, event.scale, run), t
+    if crowded(run, here, crossing):
+        run.diagnostics.crowded(t)
+        resumed = t + run.settings.relaxation
+        if resumed > until + run.tie(until):
+            run.wait(here, [(t, run.arithmetic.zero), (until, until - t)], q)
+            run.record(here, crossing, None, None, event.alternatives)
+            return reached_in_strip(until, edge.name)
+        resumed = min(resumed, until)
+    if isinstance(outcome, Stop):
+        return outcome
+    if resumed > t:
+        run.wait(here, [(t, run.arithmetic.zero), (resumed, run.settings.relaxation)], q)
+    after, scale = outcome
+    since = run.tie(t) if event.alternatives or same_instant(run, t) else run.arithmetic.zero
+    flowed = run.has_flowed(t)
+    after = run.record(here, crossing, resumed, after, event.alternatives)
+    stood = still_on(here, event) if edge.target == here.index else NONE
+    arrival = Arrival(since, reset_at=t if resumed > t else None, stood=stood)
+    target = edge.target, edge.target_states
+    entered = enter(run, *target, resumed, after, scale, here, arrival)
+    if isinstance(entered, Stop):
+        return entered
+    if run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
+        return slides(edge.name, here.mode, entered.mode, entered.t)
+    closed = close_tail(run, entered, crossing.edge)
+    if isinstance(closed, Stop) or entered.mode is not here.mode:
+        return closed
+    return unresolved(run, closed, crossing.edge) or closed
+
+
+def still_on(here: ModeState, event: Event) -> Mapping[int, Number]:
+    """How far off surfaces a transition's state is, of those that hold it or that it was on with no flow since."""
+    crossing = event.crossing
+    on = here.surfaces.active if crossing.theta == 0 else event.held
+    try:
+        return here.surfaces.off(crossing.time, crossing.state, on)
+    except DOMAIN_ERRORS:
+        return NONE
+
+
+def same_instant(run: Run, t: Number) -> bool:
+    """Whether the transition before this one was made at the same instant."""
+    made = run.recorder.transitions
+    return bool(made) and made[-1].resumed is not None and t - made[-1].resumed <= run.tie(t)
+
+
+def crowded(run: Run, here: ModeState, crossing: Crossing) -> bool:
+    """Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
+
+    Those of one instant count only where the edge is one of theirs. Those of contacts that move the state run to one.
+    """
+    t, edge = crossing.time, here.mode.edges[crossing.edge]
+    last = run.recorder.transitions[-FREE:]
+    if len(last) < FREE or contraction(last) is not None or flown(last, t) > run.settings.relaxation:
+        return False
+    again = any(made.edge == edge.name and made.source == here.mode.name for made in last)
+    if not again and t - last[0].time <= run.tie(t):
+        return False
+    return not (of_contacts(run, here, last) and edge.contact is not None and moves(run, here, crossing))
+
+
+def moves(run: Run, here: ModeState, crossing: Crossing) -> bool:
+    """Whether a transition moves the state, beyond round-off."""
+    try:
+        return not keeps(run, here.moved(crossing.time, crossing.state), crossing.edge)
+    except DOMAIN_ERRORS:
+        return False
+
+
+def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
+    """Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires."""
+    if run.timeline.goes_on(here.segment):
+        return go_on(run, here)
+    held = contact_at(run, here)
+    if isinstance(held, Stop) or not (standing := standing_on(run, held)):
+        return reached(here.t)
+    chosen, alternatives = choose(held, standing, run)
+    return make_transition(run, here, Event(chosen, alternatives, here.t, sizes(here.x, here.x, here)))
+
+
+def stuck(run: Run, here: ModeState, failure: StepFailure) -> Event | Stop:
+    """No step is short enough: take a guard that the state is on, or stop with the reason."""
+    if failure.kind in ("not finite", "unsolved") and (standing := standing_on(run, here)):
+        chosen, alternatives = choose(here, standing, run)
+        return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here))
+    try:
+        slope = here.kernel.flow(here.t, *here.x)
+    except DOMAIN_ERRORS:
+        return standstill(run, here).not_finite([(here.t, here.x)])
+    return standstill(run, here).stuck(failure, slope)

@@ -1,0 +1,193 @@
+"""A run as far as its arguments decide it; to run it again costs little more than the loop."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from hsdsl.engine.execution import Array, Execution, Stop
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.runtime.kernel import CompiledModel
+from hsdsl.engine.simulate.compiled import CompiledPlan, CompiledRun
+from hsdsl.engine.simulate.control import make_control
+from hsdsl.engine.simulate.output_buffers import Sink
+from hsdsl.engine.simulate.problem import Problem
+from hsdsl.engine.simulate.queues import Tails
+from hsdsl.engine.simulate.recorder import OutOfRoom, Overtaken, Progress, Recorder, Room
+from hsdsl.engine.simulate.refinement import finer_settings
+from hsdsl.engine.simulate.result import about, from_recorder, written
+from hsdsl.engine.simulate.review import Judge, Review
+from hsdsl.engine.simulate.run import ModeState, Run
+from hsdsl.engine.simulate.settings import Settings
+from hsdsl.engine.simulate.stops import interrupted, memory
+
+
+def _relaxed(run: Run, here: ModeState | Stop) -> Stop:
+    """The loop, imported on first use: the compiled one needs nothing of it."""
+    from hsdsl.engine.simulate.relaxed import relaxed
+
+    return relaxed(run, here)
+
+
+def _located(run: Run, here: ModeState | Stop) -> Stop:
+    from hsdsl.engine.simulate.located import located
+
+    return located(run, here)
+
+
+def _paoli_schatzman(run: Run, here: ModeState | Stop) -> Stop:
+    from hsdsl.engine.simulate.paoli_schatzman import paoli_schatzman
+
+    return paoli_schatzman(run, here)
+
+
+SCHEMES: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
+    "relaxed": _relaxed,
+    "located": _located,
+    "paoli-schatzman": _paoli_schatzman,
+}
+Watch = Callable[[Progress], None]
+
+
+@dataclass
+class Pending:
+    """Compiled code that other processes make; when they do no more, it is taken, and there may be none."""
+
+    under_way: Callable[[], bool]
+    take: Callable[[], CompiledModel | None]
+    compiled: CompiledModel | None = None
+    taken: bool = False
+
+    def overtakes(self) -> bool:
+        """Whether the code is there."""
+        if not self.taken and not self.under_way():
+            self.compiled, self.taken = self.take(), True
+        return self.compiled is not None
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared(Problem):
+    """A problem ready to run any number of times.
+
+    ``plan`` is given where the compiled loop runs it, ``pending`` where the Python loop does until that can.
+    """
+
+    plan: CompiledPlan | None
+    pending: Pending | None = None
+    judges: list[Judge] = field(default_factory=list[Judge])  # of the method, until a run has passed
+    finer: dict[int, Prepared] = field(default_factory=dict[int, "Prepared"])  # by the rows of the run
+
+    def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] | None = None) -> Execution:
+        """Run to the end.
+
+        ``watch`` is given something to look at before the run starts, so that another thread can show how far it is.
+        An interrupt (Ctrl-C) ends the run with what was computed. ``seconds`` is what was spent before.
+
+        Raises BecomesStiff: by the judge.
+        """
+        spent, began = dict(seconds or {}), time.perf_counter()
+        try:
+            if self.plan is not None:
+                execution = self._by_compiled_loop(self.plan, watch, spent)
+            else:
+                execution = self._by_python_loop(self._fresh(), watch, spent)
+        except Overtaken:
+            faster = self.prepared_with(self.settings)
+            faster.judges.extend(self.judges)
+            spent["compile"] = spent.get("compile", 0.0) + time.perf_counter() - began
+            return faster.simulate(watch, spent)
+        self.judges.clear()
+        return execution
+
+    def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Stop, CompiledRun, dict[str, Array]]:
+        """Run the compiled loop to the end and hand over what it writes, chunk by chunk.
+
+        Returns why it stopped, the run with what it has noted, and the last chunk. Raises BecomesStiff: by the judge.
+        """
+        assert self.plan is not None
+        under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), self._review())
+        if watch is not None:
+            watch(under_way)
+        stop, rest = under_way.stream(sink)
+        return stop, under_way, rest
+
+    def again(self, execution: Execution) -> Execution:
+        """Make the same run finer."""
+        rows = len(execution.times)  # fewer where a run was interrupted
+        if rows not in self.finer:
+            settings = finer_settings(self.settings, execution, self.arithmetic)
+            self.finer[rows] = prepare(self.moved_with(settings), self._code)
+        return self.finer[rows].simulate()
+
+    def prepared_with(self, settings: Settings) -> Prepared:
+        """Prepare the same problem with other settings."""
+        return prepare(self.with_settings(settings), self._code)
+
+    @property
+    def _code(self) -> CompiledModel | Pending | None:
+        return self.pending if self.plan is None else self.plan.compiled
+
+    @cached_property
+    def _about(self) -> dict[str, Any]:
+        assert self.plan is not None
+        return about(self.plan.problem, "c")
+
+    def _review(self) -> Review | None:
+        return Review(self.judges[0]) if self.judges else None
+
+    def _fresh(self) -> Run:
+        """A run that nothing is recorded of yet."""
+        settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
+        degree = settings.method.degree if settings.method else 0
+        outputs, width = len(program.outputs), max(len(mode.states) for mode in program.modes)
+        room = Room.of(settings.memory, width, degree, outputs, arithmetic.digits)
+        modes = tuple(mode.name for mode in program.modes)
+        recorder = Recorder(
+            arithmetic, settings.until, degree, outputs, room,
+            scales=dict(settings.scale), modes=modes, review=self._review(),
+            overtaken=self.pending and self.pending.overtakes,
+        )  # fmt: skip
+        problem = vars(self.with_settings(settings))
+        tails = Tails(self.waits)
+        return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder, tails=tails)
+
+    def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
+        from hsdsl.engine.simulate.entry import enter
+        from hsdsl.engine.simulate.scales import start_sizes
+
+        if watch is not None:
+            watch(run.recorder)
+        zero = run.arithmetic.zero
+        began = time.perf_counter()
+        try:
+            here = enter(run, self.mode, self.states, zero, self.x, start_sizes(run, self.mode, self.x))
+            stop = SCHEMES[self.settings.scheme](run, here)
+        except KeyboardInterrupt:
+            if not run.recorder.arcs:
+                raise
+            stop = interrupted(run.recorder.now)
+        except OutOfRoom:
+            stop = memory(self.settings.memory, run.recorder.now)
+        spent["simulate"] = time.perf_counter() - began
+        return from_recorder(run, stop, spent, self.again)
+
+    def _by_compiled_loop(self, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]) -> Execution:
+        under_way = CompiledRun(plan, plan.workspaces.take(), self._review())
+        if watch is not None:
+            watch(under_way)
+        began = time.perf_counter()
+        stop, whole = under_way.follow()
+        spent["simulate"] = time.perf_counter() - began
+        if watch is None:  # else someone may look at the workspace for longer than the run lasts
+            plan.workspaces.leave(under_way.workspace)
+        return written(self._about, under_way, whole, stop, spent, self.again)
+
+
+def prepare(problem: Problem, code: CompiledModel | Pending | None = None) -> Prepared:
+    """Prepare a run by compiled code; by the Python loop where there is none, or until it is there."""
+    pending = code if isinstance(code, Pending) and not code.overtakes() else None
+    compiled = code.compiled if isinstance(code, Pending) else code
+    return Prepared(**vars(problem), plan=compiled and CompiledPlan(problem, compiled), pending=pending)

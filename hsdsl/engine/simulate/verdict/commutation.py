@@ -1,0 +1,114 @@
+"""Do transitions that are reached together commute?
+
+Each of them is taken first in turn, then all that fire at the same instant; where all orders lead to the same point
+the choice does not matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.engine.execution import Transition
+from hsdsl.engine.integrators.stepper import State
+from hsdsl.engine.simulate.queues import Tails
+from hsdsl.engine.simulate.stops import show
+from hsdsl.engine.simulate.surfaces import Arrival
+from hsdsl.engine.simulate.verdict.finding import Finding
+from hsdsl.engine.simulate.verdict.place import Place
+from hsdsl.engine.simulate.verdict.run_view import RunView
+
+SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
+LONGEST = 64  # transitions at one instant
+
+Landed = tuple[str, State]
+
+
+def choices(run: RunView) -> tuple[list[Finding], list[str]]:
+    """Findings about every transition that others were passed over for, and the ties that commute."""
+    if run.screen is not None and not run.undecided("choice"):
+        return [], together(run.screen.commuting)
+    found: list[Finding] = []
+    commuting: list[Number] = []
+    for made in run.reliable_transitions:
+        if not made.alternatives:
+            continue
+        place, k = run.before(made)
+        rivals = {name: run.edge_at(place, name) for name in made.alternatives}
+        rivals = {name: other for name, other in rivals.items() if not outranked(run, place, k, other, made)}
+        if not rivals:
+            continue
+        if commute(run, place, [k, *rivals.values()], run.tails_before(made)):
+            commuting.append(made.time)
+            continue
+        others = " or ".join(rivals)
+        found.append(
+            Finding(
+                "choice",
+                "left",
+                f"at t = {show(made.time)} the choice of {made.edge} rather than {others} matters: "
+                "they lead to different points",
+            )
+        )
+    return found, together(commuting)
+
+
+def together(commuting: Sequence[Number]) -> list[str]:
+    """Say when transitions are reached together that commute."""
+    instants = list(dict.fromkeys(map(show, commuting)))
+    if not instants:
+        return []
+    listed = ", ".join(instants[:3]) + (f" and {len(instants) - 3} more" if len(instants) > 3 else "")
+    return [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
+
+
+def outranked(run: RunView, place: Place, k: int, other: int, made: Transition) -> bool:
+    """Whether an edge has the surface of the one that was taken, and a lower priority: no error changes their order."""
+    error = tuple(abs(x) for x in place.x) if run.errors is None else run.safe_error(place, run.row_before(made))
+    return place.outranks(k, other, error)
+
+
+def commute(run: RunView, place: Place, tied: Sequence[int], tails: Tails, since: Number = 0) -> bool:
+    """Whether each of the tied edges of a place, taken first, leads to the same point.
+
+    Surfaces that are reached within the time ``since`` count as reached together. ``tails`` are what waits there.
+    """
+    since = max(since, 2 * run.tie(place.t))  # what is tied may be that far apart, and off a surface by the rest
+    try:
+        landed = [settle(run, place, k, since, tails.copy()) for k in tied]
+    except DOMAIN_ERRORS:
+        return False
+    return None not in landed and all(_same(run, landed[0], other) for other in landed[1:])
+
+
+def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
+    if one is None or other is None or one[0] != other[0] or len(one[1]) != len(other[1]):
+        return False
+    names = run.problem.program.modes[run.index(one[0])].states
+    sizes = [run.sizes.get(name, 0.0) for name in names] or [0.0] * len(one[1])
+    pairs = zip(one[1], other[1], sizes, strict=True)
+    return all(abs(a - b) <= SAME * max(abs(a), abs(b), size) for a, b, size in pairs)
+
+
+def settle(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> Landed | None:
+    """Take edge k, then what fires at the same instant; None where that has no end."""
+    for _ in range(LONGEST):
+        target, x = place.mode.edges[k].target, place.kernel.resets[k](place.t, *place.x)
+        x = tails.advance(place.mode, place.x, run.problem.program.modes[target], x)
+        place = run.place(target, place.t, x)
+        if place.mode.final:
+            return place.mode.name, place.x
+        following = _next(place, since)
+        if following is None:
+            return place.mode.name, place.x
+        k = following
+    return None
+
+
+def _next(place: Place, since: Number) -> int | None:
+    """The edge that goes at once from a state."""
+    surfaces, edges = place.surfaces, place.mode.edges
+    beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), Arrival(since))
+    ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]
+    ready = ready or surfaces.standing(place.t, place.x, since)
+    return min(ready, key=lambda k: (-edges[k].priority, k), default=None)

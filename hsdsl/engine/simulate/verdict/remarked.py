@@ -1,0 +1,66 @@
+"""What a run reports first, for any verdict: remarks of the loop, of the look along its steps, and of its end.
+
+Surfaces passed while an `if` was false and walls that do not hold are remarked by the look along the steps where the
+verdict takes one, else by `passings`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS
+from hsdsl.engine.execution import Execution, RunWarning
+from hsdsl.engine.simulate.diagnostics import Diagnostics
+from hsdsl.engine.simulate.remarks import Remark, loop_remarks, may_be_passed, wall_of, warnings_of
+from hsdsl.engine.simulate.verdict.accumulation import sliding_spans
+from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.mathematics.program import Program
+
+BEYOND = 4  # times its round-off: a wall that does not hold
+
+
+def remarked(run: RunView, diagnostics: Diagnostics) -> tuple[RunWarning, ...]:
+    """The warnings of a run."""
+    program = run.problem.program
+    found = [*loop_remarks(program, diagnostics, run.stop), *_slidings(run)]
+    looked, walls = run.remarks is not None, any(mode.walls for mode in program.modes)
+    found += run.remarks or ()
+    if (walls and (not looked or run.problem.settings.scheme == "relaxed")) or (
+        not looked and any(may_be_passed(program, edge) for edge in program.edges)
+    ):
+        from hsdsl.engine.simulate.verdict.passings import passings  # most runs need none
+
+        known = {remark.of for remark in found if remark.kind == "beyond"}
+        found += (one for one in passings(run, walls_alone=looked) if one.kind != "beyond" or one.of not in known)
+    return warnings_of([*found, *_final(run)], program)
+
+
+def ends_beyond(run: RecordedRun) -> tuple[RunWarning, ...]:
+    """The warnings of a run of which only the end is to be looked at."""
+    return warnings_of(_final(run), run.problem.program)
+
+
+def may_end_beyond(execution: Execution, program: Program) -> bool:
+    """Whether a run ended in a mode whose walls nothing checks."""
+    return execution.stop.reason == "final" and any(mode.final and mode.walls for mode in program.modes)
+
+
+def _slidings(run: RunView) -> Iterator[Remark]:
+    return (Remark("sliding", " and ".join(modes), start, end) for modes, start, end in sliding_spans(run))
+
+
+def _final(run: RecordedRun) -> Iterator[Remark]:
+    """Walls of the final mode that a run ended in: nothing flows there, so nothing has checked them."""
+    if not may_end_beyond(run.execution, run.problem.program):
+        return
+    final = run.execution.final
+    mode = run.problem.program.modes[run.index(final.mode)]
+    if tuple(final.state) != mode.states:
+        return  # it has no flow, and the states of the mode before
+    place = run.place(final.mode, final.time, tuple(final.state.values()))
+    for k in range(len(mode.edges), len(mode.surfaces)):
+        with suppress(*DOMAIN_ERRORS):
+            if place.value(k) > BEYOND * place.roundoff_bound(k):
+                yield Remark("beyond", wall_of(mode, k), final.time)

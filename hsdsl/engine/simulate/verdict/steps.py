@@ -1,0 +1,215 @@
+"""Steps of a run, many at once, as polynomials over [0, 1] in Bernstein form, and parts of them cut in halves.
+
+A polynomial lies between the least and the largest of its Bernstein coefficients, so a part of a step lies in a box.
+Routines over interval arithmetic then enclose what a surface or the flow is anywhere on that part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsdsl.base.numbers.bernstein import Array, around_middle, from_powers, halving
+from hsdsl.base.numbers.enclosures import Range, as_range
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.kernel import ModeKernel
+from hsdsl.engine.simulate.verdict.expansions import Expansion, line, polynomial
+from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.engine.simulate.verdict.run_view import RunView
+
+MOST_PARTS = 1 << 15  # enclosed together
+COLUMNS = ("row", "start", "width", "time", "length", "bernstein", "error")  # one entry for each part
+CUTTING = 2.0**-48  # of the largest coefficient: what cutting and changing the basis may add
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """Parts of steps in one mode.
+
+    Attributes
+    ----------
+    mode : int
+    row : array of int, shape (N,)
+        The row each step begins at.
+    start, width : array, shape (N,)
+        Which share of the step each part is.
+    time, length : array, shape (N,)
+        When the step begins and how long it takes.
+    bernstein : array, shape (N, n, degree + 1)
+        The states along the part.
+    error : array, shape (N, n)
+        How wrong the states may be, as often as a margin must be.
+    data : array, shape (N or 1, numbers)
+        Parameters and input segments; one row where they are the same for all.
+    """
+
+    mode: int
+    row: NDArray[np.int64]
+    start: Array
+    width: Array
+    time: Array
+    length: Array
+    bernstein: Array
+    error: Array
+    data: Array
+
+    def __len__(self) -> int:
+        return len(self.row)
+
+    def take(self, which: Any) -> Parts:
+        """Some of them."""
+        data = self.data if len(self.data) == 1 else self.data[which]
+        return Parts(self.mode, **{name: getattr(self, name)[which] for name in COLUMNS}, data=data)
+
+    def halves(self) -> Parts:
+        """Both halves of each, the first ones before the second ones."""
+        left, right = (self.bernstein @ half for half in halving(self.bernstein.shape[2] - 1))
+        both = replace(self, bernstein=left, width=self.width / 2)
+        return joined([both, replace(both, bernstein=right, start=self.start + both.width)])
+
+    @property
+    def times(self) -> Range:
+        """The times of each part."""
+        low, high = self.time + self.start * self.length, self.time + (self.start + self.width) * self.length
+        return Range(np.nextafter(low, -np.inf), np.nextafter(high, np.inf))
+
+    def states(self, wider: float = 0.0) -> list[Range]:
+        """The states along each part, ``wider`` times the error either way."""
+        low, high = self.bernstein.min(axis=2), self.bernstein.max(axis=2)
+        more = wider * self.error + CUTTING * np.maximum(np.abs(low), np.abs(high))
+        return [Range(low[:, i] - more[:, i], high[:, i] + more[:, i]) for i in range(low.shape[1])]
+
+    def ends(self) -> tuple[list[Range], list[Range]]:
+        """Time and states at the first and at the last point of each part."""
+        first, last = self.time + self.start * self.length, self.time + (self.start + self.width) * self.length
+        states = self.bernstein[:, :, 0], self.bernstein[:, :, -1]
+        both = ((first, states[0]), (last, states[1]))
+        one, other = ([Range(t, t), *(Range(column, column) for column in x.T)] for t, x in both)
+        return one, other
+
+    def moved(self, states: Sequence[Range]) -> list[Range]:
+        """States and all that are no further away than the error."""
+        return [Range(x.low - e, x.high + e) for x, e in zip(states, self.error.T, strict=True)]
+
+    def expanded(self) -> tuple[list[Expansion], list[Expansion]]:
+        """Time and states along each part, and the derivatives of these."""
+        degree = self.bernstein.shape[2] - 1
+        powers: Array = self.bernstein @ around_middle(degree)
+        half = self.width * self.length / 2
+        slopes = powers[..., 1:] * np.arange(1.0, degree + 1) / half[:, None, None]
+        times = line(self.time + (self.start + self.width / 2) * self.length, half)
+        states = [polynomial(powers[:, i], error) for i, error in enumerate(self.error.T)]
+        return [times, *states], [polynomial(slope, np.zeros(len(self))) for slope in slopes.swapaxes(0, 1)]
+
+    @property
+    def bound_data(self) -> list[Range]:
+        """The data as a kernel over intervals takes them."""
+        return [Range(column, column) for column in self.data.T]
+
+    def bound(self, run: RunView) -> ModeKernel:
+        """The mode's routines over intervals, with the data of these parts."""
+        return run.problem.kernel.enclosing.bind(self.mode, self.bound_data)
+
+
+def steps_of(run: RunView, places: int | None = None, marked: str = "") -> Iterator[Parts]:
+    """Give the steps of all arcs of flow, or about ``places`` of a mode; those of a mode together, as memory allows.
+
+    With ``marked``, a column of the screen's marks, only those that it leaves undecided are given.
+    """
+    marks = run.screen.marked(marked) if marked and run.screen else None
+    if marks is not None and not marks.any():
+        return
+    times = np.asarray(run.execution.times, dtype=float)
+    for mode, states, rows in rows_by_mode(run):
+        rows = rows[times[rows] <= run.reliable_until]
+        rows = rows if marks is None else rows[marks[rows] != 0]
+        rows = rows[:: max(1, len(rows) // places)] if places else rows
+        for first in range(0, len(rows), MOST_PARTS):
+            yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
+
+
+def rows_by_mode(run: RecordedRun) -> Iterator[tuple[int, tuple[str, ...], NDArray[np.int64]]]:
+    """Give modes and states of all arcs of flow, with the rows at which their steps begin."""
+    times = np.asarray(run.execution.times, dtype=float)
+    ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
+    for (mode, states), arcs in groupby(ordered, key=lambda arc: (run.index(arc.mode), arc.states)):
+        if states == run.problem.program.modes[mode].states:  # a final mode flows as the one before it
+            rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
+            yield mode, states, rows[times[rows + 1] > times[rows]]
+
+
+def _steps(run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int64]) -> Parts:
+    execution, n, errors = run.execution, len(states), run.errors
+    times = np.asarray(execution.times, dtype=float)
+    values, powers = pieces_at(execution, rows, n)
+    whole = np.concatenate([values[:, None, :], powers], axis=1).transpose(0, 2, 1)
+    error = np.zeros((len(rows), n))
+    if errors is not None:
+        error = errors.by_row[rows + 1][:, [errors.columns[name] for name in states]]
+    one = np.ones(len(rows))
+    data = data_at(run, times[rows])
+    length = times[rows + 1] - times[rows]
+    return Parts(mode, rows, 0 * one, one, times[rows], length, whole @ from_powers(whole.shape[2] - 1), error, data)
+
+
+def pieces_at(execution: Execution, rows: NDArray[np.int64], n: int) -> tuple[Array, Array]:
+    """The states at rows, and the coefficients of the pieces that leave them, straight ones where there are none."""
+    values = np.asarray(execution.values[rows, :n], dtype=float)
+    powers = np.asarray(execution.coefficients[rows, :, :n], dtype=float)
+    if powers.shape[1] == 0:
+        powers = (np.asarray(execution.values[rows + 1, :n], dtype=float) - values)[:, None, :]
+    return values, np.nan_to_num(powers)
+
+
+def data_at(run: RecordedRun, times: Array) -> Array:
+    """Parameters and input segments at times, one row where they are the same for all."""
+    segments = run.problem.timeline.segments
+    if len(segments) == 1:
+        return np.array([segments[0].data], dtype=float)
+    starts = np.array([float(s.start) for s in segments])
+    which = np.maximum(np.searchsorted(starts, times, "right") - 1, 0)
+    return np.array([s.data for s in segments], dtype=float)[which]
+
+
+def joined(parts: Sequence[Parts]) -> Parts:
+    """Parts in one mode together."""
+    joined = {name: np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS}
+    data = parts[0].data
+    if any(len(part.data) > 1 or not np.array_equal(part.data, data) for part in parts):
+        data = np.concatenate([np.broadcast_to(part.data, (len(part), data.shape[1])) for part in parts])
+    return Parts(mode=parts[0].mode, **joined, data=data)
+
+
+def undecided(
+    parts: Parts, decides: Callable[[Parts], NDArray[np.bool_]], halvings: int
+) -> tuple[Parts, NDArray[np.bool_]]:
+    """Cut parts in halves until a test decides them, or so many times; return what is left, and what is open there.
+
+    ``decides`` gives for each part which of its questions are still open, shape (N, questions); once decided for a
+    part, a question is decided for its halves.
+    """
+    open_ = decides(parts)
+    for _ in range(halvings):
+        left = open_.any(axis=1)
+        if not left.any() or left.sum() > MOST_PARTS // 2:
+            break
+        parts = parts.take(left).halves()
+        open_before = np.concatenate([open_[left]] * 2)
+        open_ = open_before & decides(parts)
+    left = open_.any(axis=1)
+    return parts.take(left), open_[left]
+
+
+def high(value: Any, count: int) -> Array:
+    """The upper end of a range, for so many parts."""
+    return np.broadcast_to(as_range(value).high, (count,))
+
+
+def low(value: Any, count: int) -> Array:
+    """The lower end of a range, for so many parts."""
+    return np.broadcast_to(as_range(value).low, (count,))

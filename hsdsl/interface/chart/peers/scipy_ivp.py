@@ -1,0 +1,55 @@
+# pyright: basic, reportMissingImports=false, reportAttributeAccessIssue=false, reportCallIssue=false, reportArgumentType=false
+"""SciPy: ``solve_ivp`` with terminal events that rise through zero, restarted after each; DOP853."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from hsdsl.interface.chart.by_arcs import ToolArc, by_arcs
+from hsdsl.interface.chart.result import Array, Refused, Result
+from hsdsl.interface.chart.scene import Scene
+from hsdsl.interface.chart.translation import as_function, translate
+
+
+def prepare(scene: Scene) -> Callable[[float], Result]:
+    """See `hsdsl.interface.chart.peers`."""
+    model = translate(scene)
+    flows = [_of_vector(as_function(mode, mode.flow)) for mode in model.modes]
+    events = [[_event(as_function(mode, (edge.guard,))) for edge in mode.edges] for mode in model.modes]
+
+    def integrate(tolerance: float, k: int, t: float, x: Sequence[float], times: Array, until: float) -> ToolArc:
+        solution: Any = solve_ivp(
+            flows[k],
+            (t, until),
+            x,
+            method="DOP853",
+            t_eval=np.append(times, until) if not len(times) or times[-1] < until else times,
+            rtol=tolerance,
+            atol=tolerance,
+            events=events[k],
+        )
+        if solution.status < 0:
+            raise Refused(solution.message)
+        if solution.status == 0:
+            return ToolArc(until, solution.y[:, -1], None, solution.y.T[: len(times)])
+        fired = next(i for i, found in enumerate(solution.t_events) if len(found))
+        end, z = solution.t_events[fired][-1], solution.y_events[fired][-1]
+        return ToolArc(end, z, fired, solution.y.T if len(solution.t) else np.empty((0, len(x))))
+
+    return by_arcs(scene, model, integrate)
+
+
+def _of_vector(function: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda t, x: function(t, *x)
+
+
+def _event(function: Callable[..., Any]) -> Callable[..., Any]:
+    def event(t: float, x: Sequence[float]) -> float:
+        return function(t, *x)[0]
+
+    event.terminal, event.direction = True, 1.0
+    return event

@@ -1,0 +1,164 @@
+"""The outcome of one run of a stability map, against a reference at the same numbers.
+
+Tools are ours, without a name, or peers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf, isfinite, nan
+from typing import Any
+
+import numpy as np
+
+from hsdsl.analysis.exact import reference
+from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Execution
+from hsdsl.engine.preparation.options import NUMERICAL
+from hsdsl.interface.chart.outcome import WITHIN, outcome, spans
+from hsdsl.interface.chart.peers import prepare
+from hsdsl.interface.chart.result import NotFinite, Refused, Result, Tool
+from hsdsl.interface.chart.scene import Scene
+from hsdsl.interface.model import Model
+from hsdsl.interface.model.distances import distance_of_runs
+
+CONVERGED, INACCURATE, OTHER = "converged", "inaccurate", "wrong transitions"
+BLOWN_UP, STUCK, REFUSED, UNKNOWN = "blown up", "stuck", "refused", "no reference"
+WORDS = (CONVERGED, INACCURATE, OTHER, BLOWN_UP, STUCK, REFUSED, UNKNOWN)
+LARGE = 10.0  # spans of a state: a run that goes farther has blown up
+PRECISE = 1e-12  # the tolerance of a reference run
+SAMPLES = 400
+SECONDS, MOST_ROWS = 5.0, 25_000  # for rho, which longer runs do not get
+LOOSE = 0.5  # of rho's upper bound: bounds farther apart than that say little
+PEER_TOLERANCE = 1e-6
+RAN_AWAY = ("not_finite", "left_domain")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """What came of a run: a word of :data:`WORDS`, ``rho`` (at most) or NaN, the error of samples, and why.
+
+    Of converged runs samples near jumps of the reference do not count; of others times that are near are compared.
+    """
+
+    word: str
+    rho: float = nan
+    error: float = nan
+    transitions: int | None = None
+    why: str = ""
+
+
+@dataclass
+class Bench:
+    """Runs of a model; references are kept by the numbers of a run.
+
+    A model's exact execution is the reference where nothing but settings differs from the file; else it is a located
+    run at a tolerance of 1e-12.
+    """
+
+    model: Model
+    with_rho: bool
+    scenes: dict[tuple[Any, ...], Scene | str] = field(default_factory=dict[tuple[Any, ...], "Scene | str"])
+
+    @cached_property
+    def exact(self) -> Execution | None:
+        """The model's exact execution."""
+        try:
+            return reference(self.model)
+        except UsageError:
+            return None
+
+    def run(self, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
+        """Run a tool with the arguments of `Model.simulate`."""
+        scene = self.scene(arguments)
+        if isinstance(scene, str):
+            return Cell(UNKNOWN, why=scene)
+        try:
+            return self._peer(scene, tool, arguments) if tool.name else self._own(scene, tool, arguments)
+        except UsageError as error:
+            return Cell(REFUSED, why=str(error))
+        except NotFinite as end:
+            return Cell(BLOWN_UP, why=str(end))
+        except Refused as refusal:
+            return Cell(REFUSED, why=str(refusal))
+
+    def scene(self, arguments: Mapping[str, Any]) -> Scene | str:
+        """The reference at these numbers; a reason where there is none."""
+        groups = ("parameters", "initial", "settings")
+        given = {group: dict[str, Any](arguments.get(group) or {}) for group in groups}
+        key = tuple((group, *sorted(numbers.items())) for group, numbers in given.items())
+        if key not in self.scenes:
+            self.scenes[key] = self._scene(given.pop("settings"), given)
+        return self.scenes[key]
+
+    def _scene(self, settings: dict[str, Any], numbers: dict[str, dict[str, Any]]) -> Scene | str:
+        exact = self.exact if not any(numbers.values()) and not settings else None
+        if exact is None:
+            settings = {key: value for key, value in settings.items() if key not in NUMERICAL}
+            try:
+                given: dict[str, Any] = {"tolerance": PRECISE, "settings": settings, **numbers}
+                exact = self.model.simulate(scheme="located", method="auto", **given)
+            except UsageError as error:
+                return str(error)
+            if not exact.stop.complete:
+                return f"the reference stops: {exact.stop.message}"
+        end = float(exact.stop.time)
+        made = Scene.of(self.model, exact=exact, samples=SAMPLES, clearance=1e-4 * end)
+        count = len(exact.transitions)
+        certain = sum(float(t.time) < end * (1 - 1e-9) for t in exact.transitions)
+        countable = made.countable if exact.verdict.theorem == "left" else (certain, count)
+        return replace(made, countable=countable, **numbers)
+
+    def _own(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
+        given: dict[str, Any] = {**arguments, "parameters": scene.parameters, "initial": scene.initial}
+        run = self.model.simulate(scheme=tool.scheme or None, method=tool.method or None, **given)
+        cell = _cell(scene, scene.result(run), run.stop.reason)
+        if cell.word in (CONVERGED, INACCURATE) and not _same_transitions(scene, run):
+            cell = replace(cell, word=OTHER, why="other transitions")
+        if self.with_rho and cell.word in (CONVERGED, INACCURATE) and len(run.times) <= MOST_ROWS:
+            cell = replace(cell, rho=self._rho(scene, run))
+        return cell
+
+    def _rho(self, scene: Scene, run: Execution) -> float:
+        options: dict[str, Any] = {"model": self.model, "parameters": scene.parameters, "seconds": SECONDS}
+        try:
+            rho = distance_of_runs(run, scene.exact, **options).interval
+        except UsageError:  # the model's space has none
+            return nan
+        return rho.upper if isfinite(rho.upper) and rho.upper - rho.lower <= LOOSE * rho.upper else nan
+
+    def _peer(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
+        return _cell(scene, prepare(tool.name, scene)(arguments.get("tolerance", PEER_TOLERANCE)), "stopped")
+
+
+def _cell(scene: Scene, result: Result, reason: str) -> Cell:
+    """The outcome of a run in a word."""
+    found = outcome(scene, result, WITHIN)
+    if found.word == "stops":
+        word = BLOWN_UP if reason in RAN_AWAY or found.error > LARGE else STUCK
+    elif found.word == "right":
+        return Cell(CONVERGED, nan, _error_between_jumps(scene, result), found.transitions, found.why)
+    elif found.error > LARGE:
+        word = BLOWN_UP
+    else:
+        others = ("transitions",) if found.transitions is not None else ("transitions", "modes")
+        word = OTHER if found.other in others else INACCURATE
+    return Cell(word, nan, found.error, found.transitions, found.why)
+
+
+def _error_between_jumps(scene: Scene, result: Result) -> float:
+    """The largest difference of a sample, as a share of the state's span; NaN where jumps are near all of them."""
+    jumps = np.array([float(t.time) for t in scene.exact.transitions])
+    near = np.abs(scene.grid[:, None] - jumps).min(axis=1, initial=inf) <= WITHIN.time * scene.grid[-1]
+    apart = (np.abs(scene.exact_values - result.values) / spans(scene))[~near]
+    return float(np.fmax.reduce(apart, axis=None, initial=nan))
+
+
+def _same_transitions(scene: Scene, run: Execution) -> bool:
+    """Whether the transitions are the reference's, up to those at the end; any are where it has no certain ones."""
+    if scene.exact.verdict.theorem == "left":
+        return True
+    both = zip(run.transitions, scene.exact.transitions, strict=False)
+    return all(one.edge == other.edge or one.edge in other.alternatives for one, other in both)

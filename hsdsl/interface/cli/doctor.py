@@ -1,0 +1,97 @@
+"""``hsdsl doctor``: packages, compiler and cache of this installation."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from importlib.metadata import PackageNotFoundError, version
+from typing import Annotated, Any
+
+from typer import Exit, Option
+
+from hsdsl.interface.cli.console import print_json
+from hsdsl.interface.cli.options import Json
+
+NEEDED = "pyyaml pydantic sympy mpmath numpy typer matplotlib scipy clarabel pint threadpoolctl"  # of pyproject.toml
+Forget = Annotated[bool, Option("--forget", help="Try again to compile models that took too long.")]
+OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[table])"}
+
+
+def doctor(json: Json = False, forget: Forget = False) -> None:
+    """Check this installation: its packages, its compiler and its cache."""
+    from hsdsl.base import cache
+    from hsdsl.engine.runtime.library import GIVEN_UP
+
+    if forget:
+        cache.forget(GIVEN_UP)
+    installation = _installation()
+    if json:
+        print_json(installation)
+    else:
+        print(_text(installation))
+    if any(value is None for value in installation["packages"].values()):
+        raise Exit(1)
+
+
+def _installation() -> dict[str, Any]:
+    from hsdsl import __version__
+    from hsdsl.engine.integrators import METHODS
+    from hsdsl.engine.simulate import SCHEMES
+
+    return {
+        "hsdsl": __version__,
+        "python": platform.python_version(),
+        "executable": sys.executable,
+        "platform": platform.platform(),
+        "packages": {name: _version(name) for name in NEEDED.split()},
+        "optional": {name: _version(name) for name in OPTIONAL},
+        **_engines(),
+        "schemes": list(SCHEMES),
+        "methods": list(METHODS),
+    }
+
+
+def _engines() -> dict[str, Any]:
+    """Try the parts of a compiled run: a compiler that compiles, and a private cache folder."""
+    from hsdsl.base import cache
+    from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
+    from hsdsl.engine.runtime.kernel import runtime
+    from hsdsl.engine.runtime.library import GIVEN_UP
+
+    compiler = failure = None
+    try:
+        compiler = " ".join(find_compiler().command)
+        runtime()
+    except NoCompiler as error:
+        compiler, failure = None, str(error)
+    return {
+        "engines": ["c", "python"] if compiler else ["python"],
+        "compiler": compiler,
+        "compiler_failure": failure,
+        "cache": str(cache.folder()),
+        "cache_refused": cache.private(cache.folder()),
+        "given_up": cache.entries(GIVEN_UP),
+    }
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None
+
+
+def _text(installation: dict[str, Any]) -> str:
+    absent = "not installed, needed for {}: pip install 'hsdsl[table]'"
+    lines = [
+        f"hsdsl {installation['hsdsl']}, Python {installation['python']} on {installation['platform']}",
+        *(f"  {name} {value or 'MISSING'}" for name, value in installation["packages"].items()),
+        *(f"  {name}: {value or absent.format(OPTIONAL[name])}" for name, value in installation["optional"].items()),
+        f"engines: {', '.join(installation['engines'])}",
+        f"compiler: {installation['compiler'] or installation['compiler_failure']}",
+        f"compiled code: {installation['cache_refused'] or installation['cache']}",
+        f"models that took too long to compile, and are not tried again: {installation['given_up']}",
+        f"schemes: {', '.join(installation['schemes'])}",
+        f"methods: {', '.join(installation['methods'])}",
+    ]
+    return "\n".join(lines)

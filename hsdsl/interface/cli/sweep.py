@@ -1,0 +1,143 @@
+"""``hsdsl sweep``: runs over many values into a dataset of Parquet files, and pictures of it."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+from typer import Argument, Exit
+
+from hsdsl.base.errors import UsageError
+from hsdsl.base.interrupts import INTERRUPTED
+from hsdsl.interface.cli.completion import model_files
+from hsdsl.interface.cli.console import progress, say
+from hsdsl.interface.cli.options import Answer, EngineName, Experiment, option
+from hsdsl.interface.cli.texts import check_target, names_of
+
+Model = Annotated[
+    Path | None, Argument(metavar="[MODEL]", help="The model file; none with --show.", autocompletion=model_files)
+]
+VARY = (
+    "What varies, a parameter or initial.NAME: c=FROM:TO:COUNT, with :log in logarithms, c=A,B,C, or a draw as"
+    " 'c~normal(0.9, 0.02)'. May be repeated: the product is run."
+)
+RECORD = "What is kept of a run: final, transitions, outputs:every=TIME, outputs:count=N, verdict."
+OF = "What --plot draws: a column, such as final.x or transitions; before.v and sample.x give a bifurcation diagram."
+OVER = "Draw samples, such as --of sample.x, over time: a curve for each row, in colours of what varies."
+CHUNK = "Rows of a file; left out, it follows from a few runs that are timed."
+TAIL = "The share of each run, at its end, whose transitions and samples are in the bifurcation diagram."
+
+
+def sweep(
+    model: Model = None,
+    *,
+    vary: Annotated[list[str] | None, option("NAME=VALUES", VARY)] = None,
+    out: Annotated[Path | None, option("DIR", "The folder of the dataset; the same command goes on with it.")] = None,
+    random: Annotated[int | None, option("N", "Rows at each point, where something is drawn.")] = None,
+    seed: Annotated[int, option("S", "Of the draws.")] = 0,
+    record: Annotated[str, option("A,B", RECORD)] = "final",
+    outputs: Annotated[str | None, option("A,B", "Only these states and outputs.")] = None,
+    experiment: Experiment,
+    engine: EngineName = "auto",
+    cluster: Annotated[str | None, option("ADDRESS", "The scheduler of a Dask cluster.")] = None,
+    processes: Annotated[int | None, option("N", "How many here; else as many as there are cores.")] = None,
+    chunk: Annotated[int | None, option("ROWS", CHUNK)] = None,
+    show: Annotated[Path | None, option("DIR", "Summarise and draw a dataset, without running anything.")] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw it: .png or .svg; --show draws to DIR/_picture.png.")] = None,
+    of: Annotated[str | None, option("COLUMN", OF)] = None,
+    over: Annotated[str | None, option("time", OVER)] = None,
+    tail: Annotated[float, option("SHARE", TAIL)] = 0.5,
+    answer: Answer,
+) -> None:
+    """Run a model over many values, into a dataset of Parquet files."""
+    with answer.reporting():
+        check_target(plot, "--plot")
+        _check(model, vary, out, show)
+        if show is not None:
+            from hsdsl.analysis.sweep import load
+
+            found = load(show)
+        else:
+            settings = experiment.settings(
+                engine=engine, random=random, seed=seed, record=record, cluster=cluster, processes=processes,
+                chunk=chunk, outputs=names_of(outputs) or None,
+            )  # fmt: skip
+            assert model is not None and vary is not None and out is not None
+            found = _run(model, vary, out, settings, answer.hidden)
+        target = plot or (show and show / "_picture.png")
+        if target is not None:
+            _draw(found, target, of, {"tail": tail, "over": over}, any(x is not None for x in (plot, of, over)))
+        answer.give(found.as_json, lambda: found.summary)
+
+
+def _check(model: Path | None, vary: list[str] | None, out: Path | None, show: Path | None) -> None:
+    if show is not None and (model, vary, out) != (None, None, None):
+        raise UsageError("--show shows a dataset that is there, and takes neither MODEL nor --vary nor --out")
+    if show is None and model is None:
+        raise UsageError("expected a model, or --show DIR", "hsdsl sweep MODEL --vary c=0.5:0.9:101 --out DIR")
+    if show is None and not vary:
+        raise UsageError("expected --vary", "for example --vary c=0.5:0.9:101, or --vary initial.v=10:40:200")
+    if show is None and out is None:
+        raise UsageError("expected --out DIR, the folder of the dataset", "for example --out sweep")
+
+
+def _run(model: Path, vary: list[str], out: Path, settings: dict[str, Any], quiet: bool) -> Any:
+    from hsdsl.interface.model import load
+
+    pace = Pace()
+    with progress(quiet) as shown:
+
+        def watch(done: int, rows: int) -> None:
+            pace.note(done, rows)
+            if shown is not None:
+                shown(pace.text)
+
+        try:
+            return load(model).sweep(vary, out, progress=watch, **settings)
+        except KeyboardInterrupt:
+            rows = f"{pace.done:,} of {pace.rows:,} rows are in {out}" if pace.rows else "nothing was run"
+    say(f"interrupted: {rows}; the same command goes on")
+    raise Exit(INTERRUPTED)
+
+
+class Pace:
+    """How far a sweep is, how fast, and how long it will take."""
+
+    def __init__(self) -> None:
+        self.began = self.latest = time.monotonic()
+        self.first = self.done = self.rows = 0
+
+    def note(self, done: int, rows: int) -> None:
+        """Take down how many rows there are."""
+        self.latest = time.monotonic()
+        if not self.rows:
+            self.began, self.first = self.latest, done
+        self.done, self.rows = done, rows
+
+    def text(self, width: int = 30) -> str:
+        """Write it for a person."""
+        share = self.done / self.rows if self.rows else 1.0
+        bar = f"[{'=' * round(width * share):{width}}] {self.done:,} of {self.rows:,} rows"
+        made, spent = self.done - self.first, self.latest - self.began
+        if not made or not spent:
+            return bar
+        left = (self.rows - self.done) * spent / made - (time.monotonic() - self.latest)
+        return f"{bar}, {made / spent:,.0f} rows/s, {duration(max(0.0, left))} left"
+
+
+def duration(seconds: float) -> str:
+    """Write a time for a person."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
+
+
+def _draw(found: Any, plot: Path, of: str | None, options: dict[str, Any], needed: bool) -> None:
+    try:
+        found.plot(plot, of, **options)
+        say(f"wrote {plot}")
+    except UsageError as error:
+        if needed:
+            raise
+        say(f"no picture: {error}")

@@ -1,0 +1,286 @@
+"""Models of SBML, Levels 2 and 3: their lists as data, each with its element in the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from hsdsl.base.errors import ModelError
+from hsdsl.interface.imports.sbml.mathml import Lambda, Node, NotExpressible, formula, function
+from hsdsl.language.source.xml import Element
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A compartment, a parameter, a species or a reference to one: what has a value, not-a-number where none is given.
+
+    ``math`` is what a reference of Level 2 has in place of a number.
+    """
+
+    name: str
+    kind: str  # compartment, parameter, species or reference
+    value: float
+    constant: bool
+    element: Element
+    unit: str = ""
+    math: Node | None = None
+
+
+@dataclass(frozen=True)
+class Species(Quantity):
+    """A species; ``value`` is the initial concentration where ``by_concentration``, else the initial amount."""
+
+    by_concentration: bool = False
+    compartment: str = ""
+    in_amounts: bool = False  # its name means its amount
+    boundary: bool = False
+    factor: str = ""
+
+
+@dataclass(frozen=True)
+class Reference(Quantity):
+    """How much of a species a reaction takes or makes."""
+
+    species: str = ""
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """A reaction: its references, and its rate."""
+
+    name: str
+    reactants: tuple[Reference, ...]
+    products: tuple[Reference, ...]
+    law: Node | None
+    element: Element
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event: its formulas, and how it is made."""
+
+    name: str
+    trigger: Node
+    initially: bool
+    persistent: bool
+    delay: Node | None
+    priority: Node | None
+    at_trigger: bool
+    changes: tuple[tuple[str, Node], ...]
+    element: Element
+
+
+@dataclass
+class SbmlModel:
+    """A model; rules, starts and functions by the name they define."""
+
+    element: Element
+    name: str
+    level: int
+    factor: str = ""
+    quantities: dict[str, Quantity] = field(default_factory=dict[str, Quantity])
+    dimensions: dict[str, float] = field(default_factory=dict[str, float])  # of compartments
+    functions: dict[str, Lambda] = field(default_factory=dict[str, Lambda])
+    starts: dict[str, Node] = field(default_factory=dict[str, Node])
+    assigned: dict[str, Node] = field(default_factory=dict[str, Node])
+    rates: dict[str, Node] = field(default_factory=dict[str, Node])
+    equations: list[Node] = field(default_factory=list[Node])
+    reactions: dict[str, Reaction] = field(default_factory=dict[str, Reaction])
+    events: list[Event] = field(default_factory=list[Event])
+    constraints: list[Element] = field(default_factory=list[Element])
+    units: dict[str, Element] = field(default_factory=dict[str, Element])
+
+
+def is_sbml(root: Element) -> bool:
+    """Whether a file is one of SBML."""
+    return root.tag.rpartition(":")[2] == "sbml"
+
+
+def model_of(root: Element) -> SbmlModel:
+    """The model in a file.
+
+    Raises ModelError: it is of Level 1, or has no model.
+    Raises NotExpressible: a package or a part of SBML that a model cannot keep.
+    """
+    _without_prefixes(root)
+    level = root.attributes.get("level", "")
+    if level not in ("2", "3"):
+        hint = "save it as Level 3, with COPASI or libSBML"
+        raise ModelError([root.fault("HS331", f"SBML of Level {level or '1'} is not read", hint)])
+    for name, value in root.attributes.items():
+        if name.endswith(":required") and value == "true":
+            raise NotExpressible(f"the package '{name.partition(':')[0]}'", root)
+    found = root.all("model")
+    if not found:
+        raise ModelError([root.fault("HS331", "the file has no <model>")])
+    return _Reader(found[0], int(level)).model
+
+
+def _without_prefixes(root: Element) -> None:
+    """Leave out of tags what a file calls the spaces of names; elements of packages keep theirs."""
+    prefix = root.tag.rpartition(":")[0]
+    math = {key.partition(":")[2] for key, value in root.attributes.items() if value.endswith("Math/MathML")}
+    open_ = [root]
+    while open_:
+        element = open_.pop()
+        before, _, tag = element.tag.rpartition(":")
+        math |= {key.partition(":")[2] for key, value in element.attributes.items() if value.endswith("Math/MathML")}
+        if before in (prefix, *math):
+            element.tag = tag
+        open_ += element.children
+
+
+class _Reader:
+    """Reads the lists of a model; defaults are those of its level."""
+
+    def __init__(self, element: Element, level: int) -> None:
+        self.level = level
+        name = element.attributes.get("name") or element.attributes.get("id") or "SBML model"
+        self.model = SbmlModel(element, name, level, element.attributes.get("conversionFactor", ""))
+        for one in self.listed(element, "UnitDefinitions"):
+            self.model.units[one.attribute("id")] = one
+        for one in self.listed(element, "FunctionDefinitions"):
+            known = function(one)
+            if known is not None:
+                self.model.functions[one.attribute("id")] = known
+        self.quantities(element)
+        for one in self.listed(element, "Reactions"):
+            reaction = self.reaction(one)
+            self.model.reactions[reaction.name] = reaction
+        self.rules(element)
+        self.model.constraints = self.listed(element, "Constraints")
+        events = enumerate(self.listed(element, "Events"))
+        self.model.events = [event for i, one in events if (event := self.event(i, one)) is not None]
+
+    def listed(self, element: Element, name: str) -> list[Element]:
+        return [one for list_ in element.all(f"listOf{name}") for one in list_.children if not _is_note(one)]
+
+    def number(self, element: Element, key: str) -> float:
+        text = element.attributes.get(key, "")
+        words = {"INF": math.inf, "-INF": -math.inf, "": math.nan, "NaN": math.nan}
+        try:
+            return words[text.strip()] if text.strip() in words else float(text)
+        except ValueError:
+            raise ModelError([element.fault("HS331", f"'{key}' is no number here")]) from None
+
+    def flag(self, element: Element, key: str, default: bool = False) -> bool:
+        text = element.attributes.get(key)
+        return default if text is None else text.strip() in ("true", "1")
+
+    def quantities(self, element: Element) -> None:
+        """Compartments, parameters and species, in the order in which others may use them."""
+        quantities, old = self.model.quantities, self.level < 3
+        for one in self.listed(element, "Compartments"):
+            name = one.attribute("id")
+            self.model.dimensions[name] = (
+                self.number(one, "spatialDimensions") if "spatialDimensions" in one.attributes else 3.0
+            )
+            constant, unit = self.flag(one, "constant", old), one.attributes.get("units", "")
+            quantities[name] = Quantity(name, "compartment", self.number(one, "size"), constant, one, unit)
+        for one in self.listed(element, "Parameters"):
+            name, constant = one.attribute("id"), self.flag(one, "constant", old)
+            quantities[name] = Quantity(
+                name, "parameter", self.number(one, "value"), constant, one, one.attributes.get("units", "")
+            )
+        for one in self.listed(element, "Species"):
+            amount, concentration = self.number(one, "initialAmount"), self.number(one, "initialConcentration")
+            name, by_concentration = one.attribute("id"), math.isnan(amount)
+            quantities[name] = Species(
+                name,
+                "species",
+                concentration if by_concentration else amount,
+                self.flag(one, "constant"),
+                one,
+                one.attributes.get("substanceUnits", ""),
+                by_concentration=by_concentration,
+                compartment=one.attribute("compartment"),
+                in_amounts=self.flag(one, "hasOnlySubstanceUnits"),
+                boundary=self.flag(one, "boundaryCondition"),
+                factor=one.attributes.get("conversionFactor", ""),
+            )
+
+    def reaction(self, element: Element) -> Reaction:
+        """A reaction; its local parameters become parameters of the model."""
+        if self.flag(element, "fast"):
+            raise NotExpressible("fast reactions", element)
+        name = element.attribute("id")
+        laws = element.all("kineticLaw")
+        law = formula(laws[0]) if laws else None
+        if laws and law is not None:
+            own = [*self.listed(laws[0], "Parameters"), *self.listed(laws[0], "LocalParameters")]
+            law = _renamed(law, {one.attribute("id"): self.local(name, one) for one in own})
+        return Reaction(name, self.references(element, "Reactants"), self.references(element, "Products"), law, element)
+
+    def local(self, reaction: str, element: Element) -> str:
+        name = f"{reaction}_{element.attribute('id')}"
+        while name in self.model.quantities:
+            name += "_"
+        value, unit = self.number(element, "value"), element.attributes.get("units", "")
+        self.model.quantities[name] = Quantity(name, "parameter", value, True, element, unit)
+        return name
+
+    def references(self, element: Element, kind: str) -> tuple[Reference, ...]:
+        found: list[Reference] = []
+        for one in self.listed(element, kind):
+            written = one.all("stoichiometryMath")
+            given = formula(written[0]) if written else None
+            value = self.number(one, "stoichiometry")
+            if math.isnan(value) and self.level < 3 and given is None:
+                value = 1.0
+            constant = self.flag(one, "constant", self.level < 3)
+            name = one.attributes.get("id", "")
+            reference = Reference(name, "reference", value, constant, one, "", given, one.attribute("species"))
+            if name:
+                self.model.quantities[name] = reference
+            found.append(reference)
+        return tuple(found)
+
+    def rules(self, element: Element) -> None:
+        """Rules and initial assignments."""
+        for one in self.listed(element, "InitialAssignments"):
+            node = formula(one)
+            if node is not None:
+                self.model.starts[one.attribute("symbol")] = node
+        tables = {"assignmentRule": self.model.assigned, "rateRule": self.model.rates}
+        for one in self.listed(element, "Rules"):
+            node = formula(one)
+            if node is None:
+                continue
+            if one.tag == "algebraicRule":
+                self.model.equations.append(node)
+            elif one.tag in tables:
+                tables[one.tag][one.attribute("variable")] = node
+
+    def event(self, index: int, element: Element) -> Event | None:
+        """An event; None where nothing triggers it."""
+        triggers = element.all("trigger")
+        condition = formula(triggers[0]) if triggers else None
+        if condition is None:
+            return None
+        delay, priority = (next(iter(element.all(tag)), None) for tag in ("delay", "priority"))
+        changes = [(one.attribute("variable"), formula(one)) for one in self.listed(element, "EventAssignments")]
+        return Event(
+            element.attributes.get("id") or f"event_{index + 1}",
+            condition,
+            self.flag(triggers[0], "initialValue", True),
+            self.flag(triggers[0], "persistent", True),
+            None if delay is None else formula(delay),
+            None if priority is None else formula(priority),
+            self.flag(element, "useValuesFromTriggerTime", True),
+            tuple((name, node) for name, node in changes if node is not None),
+            element,
+        )
+
+
+def _renamed(node: Node, names: Mapping[str, str]) -> Node:
+    def change(part: Node) -> Node:
+        if part.kind != "name" or part.name not in names:
+            return part
+        return Node("name", part.element, name=names[part.name])
+
+    return node.mapped(change)
+
+
+def _is_note(element: Element) -> bool:
+    return element.tag in ("notes", "annotation")

@@ -1,0 +1,110 @@
+"""Models of SpaceEx as models of this language: networks flattened, transitions made where invariants end.
+
+What cannot be kept is refused with its place: nondeterminism, free inputs, sets of initial states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from hsdsl.base.errors import Findings, ModelError, UsageError
+from hsdsl.base.names import did_you_mean, shown
+from hsdsl.interface.imports.spaceex.configuration import Configuration, configuration
+from hsdsl.interface.imports.spaceex.document import Component, components
+from hsdsl.interface.imports.spaceex.drafts import ModeDraft, TransitionDraft
+from hsdsl.interface.imports.spaceex.modes import mode_drafts
+from hsdsl.interface.imports.spaceex.network import flattened
+from hsdsl.interface.imports.spaceex.product import Automaton, Key, automaton
+from hsdsl.interface.imports.spaceex.start import first_locations, refuse_outside, start
+from hsdsl.interface.imports.spaceex.urgency import Judge
+from hsdsl.interface.imports.spaceex.writing import written
+from hsdsl.language.expression.plain import value
+from hsdsl.language.expression.syntax import ExpressionError
+from hsdsl.language.files.model import read_bytes
+
+__all__ = ["imported"]
+
+
+def imported(path: Path, cfg: Path | None = None, until: str | None = None, urgent: bool = False) -> str:
+    """The text of a model for a SpaceEx model.
+
+    Parameters
+    ----------
+    path : path
+        The model, XML.
+    cfg : path, optional
+        The configuration; left out, the file of the same name that ends in ``.cfg``, where there is one.
+    until : str, optional
+        The end of the run; left out, the configuration's ``time-horizon``.
+    urgent : bool
+        Whether a transition whose guard holds off the end of the invariant is made as soon as it does, not refused.
+
+    Raises ModelError: a file that is none of SpaceEx, or what a model cannot keep.
+    Raises UsageError: a file that cannot be read, or no end of the run.
+    """
+    cfg = cfg or (path.with_suffix(".cfg") if path.with_suffix(".cfg").is_file() else None)
+    known = components(str(path), read_bytes(path))
+    configured = configuration(str(cfg), read_bytes(cfg)) if cfg else Configuration()
+    system = _system(known, configured)
+    network = flattened(known, system)
+    first = first_locations(network, configured, system.name)
+    begin = start(network, configured, system.name)
+    found = automaton(network, first)
+    constants = {s: v for s, v in begin.numbers.items() if s.name in network.constants}
+    drafts = mode_drafts(network, found, constants)
+    refuse_outside(drafts[first], begin, configured, system.element)
+    transitions = _transitions(str(path), found, drafts, urgent)
+    end = _until(until, configured)
+    names = ", ".join(filter(None, (path.name, f"component {system.name}", cfg and f"with {cfg.name}")))
+    notes = [*_note(system), *(f"{key} = {text}" for key, text in configured.others.items() if key == "forbidden")]
+    return written(f"SpaceEx model {names}", system.name, notes, drafts, transitions, begin, first, end)
+
+
+def _transitions(
+    path: str, found: Automaton, drafts: Mapping[Key, ModeDraft], urgent: bool
+) -> dict[Key, list[TransitionDraft]]:
+    findings = Findings(path)
+    judge = Judge(findings, urgent)
+    transitions: dict[Key, list[TransitionDraft]] = {key: [] for key in drafts}
+    for arrow in found.arrows:
+        draft = judge.transition(arrow, drafts[arrow.source], drafts[arrow.target])
+        if draft is not None:
+            transitions[arrow.source].append(draft)
+    for key, leaving in transitions.items():
+        judge.choices(leaving, drafts[key])
+    findings.raise_if_any()
+    return transitions
+
+
+def _system(known: Mapping[str, Component], configured: Configuration) -> Component:
+    """The component that the configuration names, or the only one that is in no other."""
+    if configured.system is not None:
+        name = configured.system.text.strip()
+        if name in known:
+            return known[name]
+        message = f"the model has no component '{shown(name)}'"
+        raise ModelError([configured.system.fault("HS333", message, did_you_mean(name, known))])
+    inner = {bind.component for component in known.values() for bind in component.binds}
+    outer = [component for name, component in known.items() if name not in inner]
+    if len(outer) == 1:
+        return outer[0]
+    element = next(iter(known.values())).element
+    hint = "name it in the configuration: system = " + (outer[0].name if outer else element.attributes["id"])
+    raise ModelError([element.fault("HS333", "which component is the system is not given", hint)])
+
+
+def _note(system: Component) -> list[str]:
+    return [system.note] if system.note else []
+
+
+def _until(given: str | None, configured: Configuration) -> str:
+    text = given or (configured.horizon and configured.horizon.text.strip())
+    if not text:
+        raise UsageError("the end of the run is not given", "give --until, or time-horizon in the configuration")
+    try:
+        if not bool(value(text) >= 0):
+            raise UsageError(f"the end of the run must not be negative, got {shown(text, 40)}")
+    except (ExpressionError, TypeError) as error:
+        raise UsageError(f"the end of the run: expected a number, got '{shown(text, 40)}'") from error
+    return text

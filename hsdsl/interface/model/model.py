@@ -1,0 +1,757 @@
+"""``Model``: a checked model with its operations; `hsdsl.engine.preparation.pipeline` has its stages."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hsdsl.base.calls import checks_arguments, checks_methods
+from hsdsl.base.errors import UsageError
+from hsdsl.base.limits import Limits
+from hsdsl.base.names import NO_FILE, called, did_you_mean, visible
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.base.progress import counted, counted_runs, in_notebook, running
+from hsdsl.base.written import written_modes
+from hsdsl.engine.execution import Ensemble, Execution
+from hsdsl.engine.preparation import automatic
+from hsdsl.engine.preparation.options import ARGUMENTS, Options, arguments_of, overrides_of
+from hsdsl.engine.preparation.pipeline import Pipeline, pipeline_of
+from hsdsl.engine.preparation.values import with_parameters
+from hsdsl.engine.preparation.visible import visible_run, with_output_function
+from hsdsl.engine.simulate import Prepared
+from hsdsl.engine.simulate.recorder import Progress
+from hsdsl.engine.simulate.review import BecomesStiff
+from hsdsl.interface.model.call_cache import CallCache, call_key
+from hsdsl.mathematics.program import Program
+
+if TYPE_CHECKING:
+    from hsdsl.analysis.fitting.fit import Fit
+    from hsdsl.analysis.metrics.points import PointDistance, SpacePoint
+    from hsdsl.analysis.orbits.branch import Branch
+    from hsdsl.analysis.orbits.orbit import Orbit
+    from hsdsl.analysis.orbits.sampling import OrbitalStability
+    from hsdsl.analysis.sensitivity.result import Sensitivity
+    from hsdsl.analysis.sweep import Sweep
+    from hsdsl.interface.model.differentiate import Differentiator
+    from hsdsl.interface.model.estimate import Estimate
+    from hsdsl.interface.model.stream import Streamed
+    from hsdsl.language.system import HybridSystem
+
+MOST_PREPARED = 16
+
+
+@checks_arguments
+def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: bytes | None = None) -> Model:
+    """Read a model file; `-` is standard input.
+
+    ``text`` is the file's content if it does not come from ``path``; ``limits`` replace the default caps on the file
+    and the folders of its data.
+
+    Raises ModelError: the model has errors; all of them are carried.
+    Raises UsageError: the file cannot be read.
+    """
+    return Model(pipeline_of(path, limits, text))
+
+
+@checks_arguments
+def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limits | None = None) -> Model:
+    """Read a model from its text; data files are in ``folder``, by default the current one.
+
+    ``limits`` are as for :func:`load`.
+
+    Raises ModelError: the model has errors; all of them are carried.
+    """
+    return Model(pipeline_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
+
+
+ELSEWHERE = {
+    "parameters": "their names are model.program.parameters",
+    "states": "their names are model.program.all_states, with outputs model.columns",
+    "outputs": "their names are model.program.outputs",
+    "inputs": "write their numbers as parameters in the file, and give these to model.simulate(parameters=...)",
+    "run": "model.simulate() runs it",
+}
+
+
+def _elsewhere(model: Model, name: str) -> str | None:
+    """Say where to give a name that is no argument of a method."""
+    if name in model.program.parameters:
+        return f"it is a parameter: parameters={{'{name}': ...}}"
+    if name in model.program.all_states:
+        return f"it is a state: initial={{'{name}': ...}}"
+    return ELSEWHERE.get(name)
+
+
+@partial(checks_methods, elsewhere=_elsewhere)
+class Model:
+    """A checked model: ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` both.
+
+    It does not change if its file changes later, and it can be pickled.
+    """
+
+    def __init__(self, of: HybridSystem | Pipeline) -> None:
+        self.pipeline = of if isinstance(of, Pipeline) else Pipeline(of)
+        self._smaller: dict[tuple[str, ...], Model] = {}
+        self._prepared: CallCache[Prepared] = CallCache(MOST_PREPARED)
+        self._slides: CallCache[bool] = CallCache(MOST_PREPARED)  # whether runs of a call slide
+
+    @cached_property
+    def _differentiator(self) -> Differentiator:
+        from hsdsl.interface.model.differentiate import Differentiator
+
+        return Differentiator(self.pipeline)
+
+    def __reduce__(self) -> tuple[type[Model], tuple[Pipeline]]:
+        return type(self), (self.pipeline,)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            try:
+                return object.__getattribute__(self, name)
+            except AttributeError as error:
+                raise AttributeError(f"{error}{'; ' * (name in ELSEWHERE)}{ELSEWHERE.get(name, '')}") from None
+
+    def __repr__(self) -> str:
+        name = visible(called(None, Path(self.program.path).name).removeprefix("a model "))
+        if parts := self.program.parts:
+            return f"<hsdsl model {name}: a system of {len(parts)} parts>"
+        names = [mode.name for mode in written_modes(self.program.modes)]
+        modes = ", ".join([*names[:8], *["..."] * (len(names) > 8)])
+        return f"<hsdsl model {name}: modes {modes}>"
+
+    def _repr_html_(self) -> str:
+        """Show modes, equations and the graph of modes in notebooks."""
+        from hsdsl.analysis.report.model import model_html
+
+        return model_html(self.system, self.program)
+
+    @property
+    def system(self) -> HybridSystem:
+        """The mathematics; a cached model elaborates it at the first use."""
+        return self.pipeline.system
+
+    @property
+    def program(self) -> Program:
+        """The model lowered to routines, free of SymPy."""
+        return self.pipeline.program
+
+    @property
+    def columns(self) -> list[str]:
+        """Names of all states and outputs."""
+        return self.pipeline.columns
+
+    def resolve(self, settings: Mapping[str, Any] | None = None, call: Mapping[str, Any] | None = None) -> Options:
+        """Resolve the options of the file, of ``settings`` and of a call (see `hsdsl.engine.preparation.options`)."""
+        return self.pipeline.resolve(settings, call)
+
+    def simulate(
+        self,
+        until: Any = None,
+        *,
+        scheme: str | None = None,
+        method: str | None = None,
+        step: Any = None,
+        tolerance: Any = None,
+        relaxation: Any = None,
+        scale: Mapping[str, Any] | None = None,
+        samples: Any = None,
+        max_transitions: Any = None,
+        completion: str | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        settings: Mapping[str, Any] | None = None,
+        engine: str = "auto",
+        precision: int | None = None,
+        outputs: Sequence[str] | None = None,
+        watch: Callable[[Progress], None] | None = None,
+    ) -> Execution:
+        """Run the model from t = 0.
+
+        A number may be given as an expression of the model's parameters, such as ``"40*pi"``.
+
+        Parameters
+        ----------
+        until : number or str, optional
+            End of the run.
+        scheme, method : str, optional
+            A name in :data:`hsdsl.engine.simulate.SCHEMES`; a name in :data:`hsdsl.engine.integrators.METHODS`, or ``auto``.
+        step, tolerance : number or str, optional
+            Fixed step, or bound on the local error relative to the largest size each state has had; they exclude each
+            other.
+        relaxation : number or str, optional
+            The paper's epsilon: a depth in the model's own units, and a time.
+        scale : mapping, optional
+            Typical sizes of states by name: the scale of a state is this size until the state becomes larger.
+        samples : int, str or sequence, optional
+            The number of equally spaced samples, their times, or ``every=TIME`` for its multiples; files have rows at
+            these times.
+        max_transitions : int or str, optional
+            The largest number of transitions; the run stops before it makes another one.
+        completion : {"contact", "auto", "none"}, optional
+            The motion that follows accumulating transitions.
+        parameters, initial : mapping, optional
+            Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed again.
+        settings : mapping, optional
+            Settings as of ``--set experiment.NAME``: the arguments above override them, and they override the file's.
+        engine : {"auto", "c", "python"}
+            Compiled code, or the Python loop. ``auto`` is ``c`` if there is a compiler, except that the Python loop may
+            finish while another process compiles the model.
+        precision : int, optional
+            Decimal digits (mpmath numbers) instead of float64.
+        outputs : sequence of str, optional
+            States and outputs of the result; states on which none of them depends are not integrated (see
+            :meth:`only`).
+        watch : callable, optional
+            Called with the recorder before the run starts.
+
+        Raises UsageError: a name, value or combination is not valid.
+        """
+        arguments = (
+            until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions, completion,
+            parameters, initial, settings, engine, precision,
+        )  # fmt: skip
+        if outputs is not None:
+            return self._reduced_run(outputs, dict(zip(ARGUMENTS, arguments, strict=True)), watch)
+        key = call_key(*arguments)
+        ready = self._prepared.find(key)
+        if ready is None:
+            call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
+            ready = self._kept(key, automatic.judged(self.pipeline.prepare(call, wait=False)))
+        with in_notebook() as show:
+            watch = watch or (show and partial(running, show))
+            try:
+                run = ready.simulate(watch, self.pipeline.seconds)
+            except BecomesStiff as found:
+                ready = self._kept(key, automatic.instead(ready, found))
+                run = ready.simulate(watch, self.pipeline.seconds)
+        run = visible_run(run, ready)
+        run.__dict__["differentiation"] = partial(self._differentiate, arguments)
+        run.__dict__["look"] = partial(self.look, parameters)
+        return run
+
+    def _kept(self, key: Hashable | None, ready: Prepared) -> Prepared:
+        """Return a prepared run, which is kept for the same call; it is prepared again if its code is still being
+        compiled.
+        """
+        if ready.pending is None:
+            self._prepared.keep(key, ready)
+        return ready
+
+    def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
+        call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
+        return self._sliding_for(call)._differentiator.of_run(call, wrt)
+
+    def _flat(self, what: str) -> None:
+        """Refuse operations that systems of parts do not support yet."""
+        if self.program.parts:
+            raise UsageError(f"{what} cannot be had of a system of parts", "write the modes of a small one out")
+
+    def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:
+        """Return the model of a run with these arguments: with modes of sliding if its completion is `auto`."""
+        settings, completion = arguments.get("settings"), arguments.get("completion")
+        key = call_key(settings, completion)
+        slides = self._slides.find(key)
+        if slides is None:
+            slides = self.resolve(settings, {"completion": completion}).values["completion"].value == "auto"
+            self._slides.keep(key, slides)
+        return self.sliding if slides else self
+
+    def _reduced_run(
+        self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
+    ) -> Execution:
+        """Run the model reduced to some outputs; initial values and scales of removed states are ignored."""
+        smaller = self.only(outputs)
+        gone = set(self.columns) - {"mode", *smaller.columns}
+        for group in ("initial", "scale"):
+            arguments[group] = {
+                name: value for name, value in overrides_of(arguments, group, self.program).items() if name not in gone
+            }
+        return smaller.simulate(**arguments, watch=watch)
+
+    def sensitivity(self, wrt: str | Sequence[str], **arguments: Any) -> Sensitivity:
+        """Differentiate a run's end, transition times, states and outputs, through its jumps.
+
+        The derivatives are those of the located execution. They follow from its variational equations and saltation
+        matrices.
+
+        Parameters
+        ----------
+        wrt : str or sequence of str
+            Parameters by name and initial states as ``initial.NAME``; a text may have several, with commas.
+        **arguments
+            Arguments of :meth:`simulate`, except ``step`` and ``outputs``. The scheme is ``located``.
+
+        Raises UsageError: an unknown name, or an argument that is not valid.
+        """
+        return self._sliding_for(arguments)._differentiator.sensitivity(wrt, arguments)
+
+    def orbit(
+        self,
+        section: str,
+        *,
+        laps: int = 1,
+        period: Any = None,
+        progress: Callable[[int, float | None], None] | None = None,
+        **arguments: Any,
+    ) -> Orbit:
+        """Find a periodic orbit by shooting on a section, with its Floquet multipliers.
+
+        The initial guess is the passage of the section in the model's own run to which the run returns most closely.
+
+        Parameters
+        ----------
+        section : str
+            The name of a transition.
+        laps : int
+            Number of transitions of the section after which the orbit closes.
+        period : number or str, optional
+            The period of the forcing; by default that of the sines and cosines of time in the model.
+        progress : callable, optional
+            Called before every run with its number, and the value of the continuation parameter, if any.
+        **arguments
+            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
+
+        Raises UsageError: no such transition, an unknown argument, or no orbit near the run.
+        """
+        from hsdsl.interface.model.orbits import Orbits
+
+        with in_notebook() as show:
+            progress = progress or counted_runs(show)
+            return Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments).find()
+
+    def continuation(
+        self,
+        section: str,
+        parameter: str,
+        start: Any,
+        end: Any,
+        *,
+        laps: int = 1,
+        period: Any = None,
+        progress: Callable[[int, float | None], None] | None = None,
+        **arguments: Any,
+    ) -> Branch:
+        """Follow a periodic orbit in a parameter, around folds, and locate its bifurcations.
+
+        The branch begins at the parameter's own value if that is in the range, or else at ``start``, and goes in both
+        directions.
+
+        Parameters
+        ----------
+        section, laps, period, progress, **arguments
+            As for :meth:`orbit`.
+        parameter : str
+        start, end : number or str
+            The range of the parameter.
+
+        Raises UsageError: as :meth:`orbit`; or no such parameter.
+        """
+        from hsdsl.interface.model.orbits import Orbits
+
+        with in_notebook() as show:
+            progress = progress or counted_runs(show, parameter)
+            orbits = Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments)
+            return orbits.continued(parameter, start, end)
+
+    def orbital_stability(
+        self,
+        wrt: str | Sequence[str] | None = None,
+        *,
+        radii: Sequence[float] = (1e-3, 1e-5, 1e-7),
+        samples: int = 8,
+        seed: int = 0,
+        progress: Callable[[int, int], None] | None = None,
+        **arguments: Any,
+    ) -> OrbitalStability:
+        """Test by nearby runs whether the model's execution is orbitally stable, in the quotient metric.
+
+        Parameters
+        ----------
+        wrt : str or sequence of str, optional
+            Names to vary: initial states as ``initial.NAME``, and parameters, such as those of inputs; by default all
+            initial states.
+        radii : sequence of float
+            Decreasing distances, relative to each value (or, if that is zero, to the state's largest size).
+        samples : int
+            Number of directions at each radius; at least both directions of every axis.
+        seed : int
+            Seed of the random directions.
+        progress : callable, optional
+            Called after each run with the number of finished runs and their total number.
+        **arguments
+            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
+
+        Raises UsageError: an unknown name, or radii that do not decrease.
+        """
+        from hsdsl.interface.model.nearby import orbital_stability
+
+        self._flat("orbital stability from runs nearby")
+        with in_notebook() as show:
+            progress = progress or counted(show, "runs")
+            return orbital_stability(self._sliding_for(arguments), wrt, radii, samples, seed, progress, arguments)
+
+    def fit(
+        self,
+        data: Any,
+        wrt: str | Sequence[str],
+        *,
+        sigma: Mapping[str, float] | float | None = None,
+        weights: Mapping[str, float] | float | None = None,
+        progress: Callable[[int, Mapping[str, float], float], None] | None = None,
+        **arguments: Any,
+    ) -> Fit:
+        """Fit parameters and initial states to measurements, by least squares with exact derivatives.
+
+        Parameters
+        ----------
+        data : path, mapping or DataFrame
+            A CSV file, or columns by name: ``t`` or ``time``, states, outputs. An empty or NaN cell was not measured.
+        wrt : str or sequence of str
+            Names to fit: parameters, within the bounds of the file, and initial states as ``initial.NAME``. The initial
+            guess is that of the file, or of ``parameters`` and ``initial``.
+        sigma : mapping or number, optional
+            The standard deviation of each column, or of a single column.
+        weights : mapping or number, optional
+            Weights of columns instead; by default one over the largest size of each.
+        progress : callable, optional
+            Called after every run with the number of runs, the values, and the weighted sum of squares.
+        **arguments
+            Arguments of :meth:`simulate`, except ``step``, ``scheme``, ``samples``, ``precision`` and ``until``.
+
+        Raises UsageError: an unknown name or column, or a run that does not reach the measurements.
+        """
+        from hsdsl.interface.model.fits import fit
+
+        with in_notebook() as show:
+            progress = progress or (show and (lambda runs, _, squares: show(lambda: f"{runs} runs, {squares:.6g}")))
+            return fit(self._sliding_for(arguments), data, wrt, sigma, weights, progress, arguments)
+
+    def stream(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        every: int = 1,
+        columns: Sequence[str] | None = None,
+        watch: Callable[[Progress], None] | None = None,
+        **arguments: Any,
+    ) -> Streamed:
+        """Run the model and write its rows to a CSV file during the run, in constant memory.
+
+        The file has the first row, every k-th, both rows of each jump and the last. It has complete lines at any time,
+        so the file of a killed run is readable. An existing file of this name is overwritten.
+
+        Parameters
+        ----------
+        path : path
+            A name ending in .csv.
+        every : int
+            k.
+        columns : names, optional
+            States and outputs in the file; by default all.
+        watch : callable, optional
+            As for :meth:`simulate`.
+        **arguments
+            Further arguments of :meth:`simulate`, except ``precision`` and ``samples``.
+
+        Raises UsageError: there is no compiled engine, the file cannot be written, or the disk is full.
+        """
+        from hsdsl.interface.model.stream import check, stream
+
+        self._flat("rows in a file while a run goes on")
+        target = check(path, every, columns, arguments, self)
+        prepared = automatic.judged(self.pipeline.prepare(arguments | {"engine": "c"}))
+        try:
+            return stream(prepared, target, every, columns, watch)
+        except BecomesStiff as found:
+            return stream(automatic.instead(prepared, found), target, every, columns, watch)
+
+    def ensemble(
+        self,
+        *,
+        parameters: Mapping[str, Any] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        samples: Any = None,
+        transition_times: int = 0,
+        every_transition: bool = False,
+        threads: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **arguments: Any,
+    ) -> Ensemble:
+        """Run many instances of the model, on all cores if there is a compiler.
+
+        Every instance equals the run of :meth:`simulate`, to the last bit. Ctrl-C keeps the finished instances.
+
+        Parameters
+        ----------
+        parameters, initial : mapping, optional
+            Overrides by name: numbers, expressions, or arrays of numbers. Arrays are broadcast to a common shape, as in
+            NumPy; each element is an instance.
+        samples : int, sequence of float or str, optional
+            Sample times of every run: their number, equally spaced from 0 to its ``until``, the times, or an expression
+            of parameters, such as ``"2*pi/w"``, for its multiples.
+        transition_times : int
+            Number of first transitions of each run whose times are kept.
+        every_transition : bool
+            Whether to keep every transition, with the states before and after it: `Ensemble.transition_table`.
+        threads : int, optional
+            How many; left out, as many as there are cores for this process.
+        progress : callable, optional
+            Called from time to time with the number of finished instances and their total number.
+        **arguments
+            Further arguments of :meth:`simulate` for every instance, except ``precision`` and ``outputs``.
+
+        Raises UsageError: an unknown name, arrays of different shapes, or no instance that can be run.
+        """
+        from hsdsl.interface.model.ensemble import run_ensemble
+
+        call = arguments | {"parameters": parameters or {}, "initial": initial or {}}
+        with in_notebook() as show:
+            progress = progress or counted(show, "runs")
+            return run_ensemble(self, call, samples, transition_times, threads, progress, every_transition)
+
+    def sweep(
+        self,
+        vary: Sequence[str] | Mapping[str, Any],
+        out: str | os.PathLike[str],
+        *,
+        random: int | None = None,
+        seed: int = 0,
+        record: str | Sequence[str] = "final",
+        outputs: Sequence[str] | None = None,
+        cluster: str | None = None,
+        processes: int | None = None,
+        chunk: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **arguments: Any,
+    ) -> Sweep:
+        """Run the model over many values into a dataset of Parquet files, on all cores or on a Dask cluster.
+
+        The same call resumes a dataset that is not complete. A run that fails is a row with its reason.
+
+        Parameters
+        ----------
+        vary : sequence of str or mapping
+            Texts such as ``"c=0.5:0.95:101"`` and ``"c~normal(0.9, 0.02)"`` (`hsdsl.analysis.sweep.variation`), or by name what
+            follows the name, or an array of values. Names are parameters, and initial states as ``initial.NAME``.
+        out : path
+            The folder of the dataset: a new one, or that of the same sweep.
+        random : int, optional
+            Rows for each point of the grid, if values are drawn.
+        seed : int
+            Seed of the draws. A row has the same values for any number of workers.
+        record : str or sequence of str
+            Records of each run besides its end (`hsdsl.analysis.sweep.recording`).
+        outputs : sequence of str, optional
+            States and outputs, as for :meth:`simulate`; the others have no columns.
+        cluster : str, optional
+            The address of a Dask scheduler, such as ``tcp://host:8786``.
+        processes : int, optional
+            Number of processes on this machine; by default the number of cores of this process.
+        chunk : int, optional
+            Rows of each file; by default it follows from a few timed runs.
+        progress : callable, optional
+            Called after each chunk with the number of finished rows and their total number.
+        **arguments
+            Further arguments of :meth:`simulate` for every run, except ``precision``, ``samples`` and ``watch``.
+
+        Raises UsageError: an unknown name, a folder of another sweep, or a cluster that does not answer.
+        """
+        from hsdsl.interface.model.sweeps import Request, sweep
+
+        with in_notebook() as show:
+            progress = progress or counted(show, "rows")
+            request = Request(vary, random, seed, record, outputs, chunk, arguments)
+            return sweep(self, request, Path(out), cluster, processes, progress)
+
+    @cached_property
+    def sliding(self) -> Model:
+        """The model with a sliding mode for each surface towards which two flows point; this model if there is none."""
+        return self if self.pipeline.sliding is self.pipeline else Model(self.pipeline.sliding)
+
+    def completed(self) -> str | None:
+        """Return the text of the model with modes for motion along guards and for sliding; None if there are none.
+
+        It is an ordinary model, for every engine and export. A transition enters the motion along its guard if the next
+        flight would last less than the parameter ``contact_time``.
+        """
+        self._flat("a completed text")
+        from hsdsl.language.elaborate import elaborate_files
+        from hsdsl.mathematics.completion.text import completed_text
+
+        files = self.pipeline.files
+        if files is None:
+            raise UsageError("expected a model that was read from text")
+        read = elaborate_files(files)
+        if read.system.unknowns:
+            message = "a model with `solve` cannot be written with its completions"
+            raise UsageError(message, "write its solutions under `let`")
+        text = completed_text(read.text, read.root, read.system)
+        declared = {name for mode in read.document.modes.values() for name in mode.flow or ()}
+        if text is not None and not declared >= {*read.system.states}:
+            hint = "write it as a state: its flow 1 in each mode, and since: 0 in each reset"
+            raise UsageError("a model that uses `since` or events cannot be written with its completions", hint)
+        return text
+
+    def only(self, outputs: Sequence[str]) -> Model:
+        """Return the model reduced to these states and outputs, and to all that they or any transition depend on.
+
+        It runs as a model without the other states: adaptive steps depend on the remaining states alone, and a state
+        that is left out can neither stop a run nor prevent a rest.
+        """
+        names = tuple(sorted(set(outputs)))
+        for name in names:
+            if name not in self.columns:
+                raise UsageError(f"the model has no state or output '{name}'", did_you_mean(name, self.columns))
+        if names not in self._smaller:
+            smaller = self.pipeline.only(names)
+            self._smaller[names] = self if smaller is self.pipeline else Model(smaller)
+        return self._smaller[names]
+
+    def estimate(self, execution: Execution) -> Estimate:
+        """Compare an execution of this model with a finer run (see `hsdsl.interface.model.estimate`)."""
+        from hsdsl.interface.model.estimate import estimate
+
+        return estimate(execution)
+
+    def plot(
+        self,
+        runs: Execution | Sequence[Execution],
+        path: str | os.PathLike[str],
+        parameters: Mapping[str, Any] | None = None,
+        **options: Any,
+    ) -> None:
+        """Draw executions of this model to a .png, .svg or .html file, with the levels of its guards.
+
+        Parameters
+        ----------
+        runs : Execution or sequence of Execution
+            One execution, or several for one picture.
+        parameters : mapping, optional
+            The overrides of the run, on which the levels depend.
+        **options
+            ``columns``, ``phases``, ``labels`` and ``title`` of `hsdsl.analysis.plot.View`.
+
+        Raises UsageError: an unknown name or suffix, or a file that cannot be written.
+        """
+        from hsdsl.analysis.plot import plot
+
+        plot(runs, path, **self.look(parameters), **options)
+
+    def animate(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        speed: float | None = None,
+        progress: Callable[[int, int], None] | None = None,
+        **arguments: Any,
+    ) -> Execution:
+        """Run the model and write its scene as a film: .gif, or .mp4 if ffmpeg is installed.
+
+        Parameters
+        ----------
+        speed : float, optional
+            Model time per second of the film; by default 1 if the film then lasts 4 to 20 s, or else a value for such a
+            length.
+        progress : callable, optional
+            Called after each frame with the number of finished frames and their total number.
+        **arguments
+            Arguments of :meth:`simulate`, except ``outputs``.
+
+        Returns
+        -------
+        Execution
+            The run, with the numbers of the scene as further outputs.
+
+        Raises UsageError: the model has no scene, or the file cannot be written.
+        """
+        from hsdsl.analysis.plot.animation import animate, check
+
+        check(path)
+        run = self._staged.simulate(**arguments)
+        with in_notebook() as show:
+            unit = self.program.units.get("t")
+            animate(run, self.system.scene, path, speed, unit, progress or counted(show, "frames"))
+        return run
+
+    def check_scene(self) -> None:
+        """Raise UsageError if the model has no scene."""
+        if not self.system.scene:
+            raise UsageError("the model has no scene to animate", "a scene has shapes: scene: [{point: [x, 0]}]")
+
+    @cached_property
+    def _staged(self) -> Model:
+        """Return the model with the numbers of its scene as further outputs."""
+        from hsdsl.language.elaborate.scene import scene_as_outputs
+
+        self.check_scene()
+        return Model(scene_as_outputs(self.system))
+
+    def with_outputs(self, run: Execution) -> Execution:
+        """Return a run that was read from a file, with outputs between rows computed by this model.
+
+        A file has the outputs only at rows.
+
+        Raises UsageError: the run is not one of this model in its present form.
+        """
+        if run.digest != self.program.digest:
+            hint = "run it again, or give the model as it was"
+            raise UsageError(f"{self.program.path} is not the model that the run is of, or was edited since", hint)
+        if "left_out" in run.settings or run.output_names != self.program.outputs:
+            return run
+        arguments = arguments_of(run.overrides) | {"precision": run.digits, "engine": "python"}
+        return with_output_function(run, self.pipeline.prepare(arguments))
+
+    def look(self, parameters: Mapping[str, Any] | None = None) -> dict[str, Any]:
+        """Return what a picture shows of the model: its units, levels of its guards, and the program of its mode
+        graph.
+        """
+        from hsdsl.interface.model.guards import guard_lines
+
+        values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
+        return {"guards": guard_lines(values), "units": self.program.units, "program": self.program}
+
+    def distance(
+        self,
+        p: str | SpacePoint,
+        q: str | SpacePoint,
+        *,
+        metric: str = "quotient",
+        relaxation: Any = None,
+        parameters: Mapping[str, Any] | None = None,
+        hops: int | None = None,
+        seconds: float = 60.0,
+        plot: str | os.PathLike[str] | None = None,
+    ) -> PointDistance:
+        """Return the distance of two points: the length of the shortest curve, which may pass through guards.
+
+        Parameters
+        ----------
+        p, q : str or SpacePoint
+            A mode and all its states, as ``"free x=13 v=5"``; values are expressions of parameters.
+        metric : {"quotient", "relaxed"}
+            The paper's d_M (Def. 12), or the metric of the relaxed space (Def. 19).
+        relaxation : number or str, optional
+            The paper's epsilon; by default that of a run of the file.
+        parameters : mapping, optional
+            Overrides by name.
+        hops : int, optional
+            The largest number of passages of a path; by default eight more than the fewest that connect the modes. The
+            lower end also holds for paths with more.
+        seconds : float
+            Time limit of the search. If it is reached, the interval is wider, and ``certified`` says so.
+        plot : path, optional
+            File for a picture of the shortest path found (.png or .svg), if its modes have two coordinates.
+
+        Raises UsageError: a point or a number does not fit the model, or a point is outside its mode's domain.
+        """
+        from hsdsl.interface.model.distances import budget_of
+        from hsdsl.interface.model.points import distance_of_points
+
+        self._flat("a distance of two points")
+
+        values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
+        return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)

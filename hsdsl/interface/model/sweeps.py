@@ -1,0 +1,174 @@
+"""``Model.sweep``: chunks of rows, each an ensemble, made here or at a cluster, and gathered in a dataset."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from hsdsl.analysis.sweep import Sweep, recording, variation
+from hsdsl.analysis.sweep import manifest as manifests
+from hsdsl.analysis.sweep.dataset import damaged, write_chunk
+from hsdsl.analysis.sweep.manifest import Manifest
+from hsdsl.analysis.sweep.rows import library
+from hsdsl.analysis.sweep.schedule import Run, run_here
+from hsdsl.base.errors import UsageError
+from hsdsl.base.limits import cores
+from hsdsl.base.names import INITIAL, without_memory
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.base.parts import meant, of_all
+from hsdsl.base.processes import can_fork
+from hsdsl.engine.preparation.options import KEYS, as_written, check_arguments, overrides_of
+from hsdsl.engine.preparation.values import with_parameters
+from hsdsl.interface.model.chunk_work import ChunkWork, chunk_size
+from hsdsl.interface.model.workers import Progress
+
+if TYPE_CHECKING:
+    from hsdsl.interface.model import Model
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a sweep is to compute; see `Model.sweep`."""
+
+    vary: Sequence[str] | Mapping[str, Any]
+    random: int | None
+    seed: int
+    record: str | Sequence[str]
+    outputs: Sequence[str] | None
+    chunk: int | None
+    arguments: dict[str, Any]
+
+
+def sweep(
+    model: Model, request: Request, folder: Path, cluster: str | None, processes: int | None, progress: Progress | None
+) -> Sweep:
+    """Run a sweep, or what is missing of it."""
+    library("pyarrow.parquet")
+    model = model if request.outputs is None else model.only(request.outputs)
+    planned = _planned(model, request)
+    with _place(cluster, processes or cores()) as run:
+        work, missing = _begun(model, planned, folder, request.chunk, processes or cores(), cluster is None)
+        _fill(work, folder, missing, run, progress)
+    return Sweep(folder, work.manifest)
+
+
+@contextmanager
+def _place(cluster: str | None, processes: int) -> Generator[Run]:
+    """What makes chunks: processes here, or a cluster."""
+    if cluster is None:
+        yield partial(run_here, processes=processes if can_fork() else 1)
+        return
+    from hsdsl.engine.execution.samples import optional
+
+    optional("distributed", "a sweep on a cluster", "cluster")
+    from hsdsl.analysis.sweep.cluster import connected
+
+    with connected(cluster) as run:
+        yield run
+
+
+def _fill(work: ChunkWork, folder: Path, missing: Sequence[int], run: Run, progress: Progress | None) -> None:
+    """Make the missing chunks."""
+    found = Sweep(folder, work.manifest)
+    done = found.rows - sum(last - first for first, last in map(work.manifest.rows_of, missing))
+
+    def write(number: int, content: bytes) -> None:
+        nonlocal done
+        write_chunk(folder, number, content)
+        first, last = work.manifest.rows_of(number)
+        done += last - first
+        if progress is not None:
+            progress(done, found.rows)
+
+    if progress is not None:
+        progress(done, found.rows)
+    if missing:
+        run(work, missing, write)
+
+
+def _planned(model: Model, request: Request) -> Manifest:
+    """The manifest of a sweep that is still to be measured."""
+    chunk, outputs = request.chunk, request.outputs
+    given = {
+        name: value
+        for name, value in request.arguments.items()
+        if value not in (None, {}) and (name, value) != ("engine", "auto")
+    }
+    check_arguments(given, "a sweep", without=("samples", "precision"))
+    fixed: dict[str, Mapping[str, Any]] = {group: given.get(group) or {} for group in ("parameters", "initial")}
+    shared = overrides_of(given, "parameters", model.program)
+    values = with_parameters(model.pipeline.values(FLOAT64), shared)
+    varied = variation.read(
+        request.vary, request.random, request.seed, lambda value, where: float(values.number(value, where))
+    )
+    _check_names(model, varied.names, fixed)
+    if chunk is not None and chunk < 1:
+        raise UsageError(f"--chunk: expected at least 1 row, got {chunk}")
+    program = model.program
+    states = without_memory(program.all_states)
+    kept = {name for name in (*states, *program.outputs) if outputs is None or name in outputs}
+    return manifests.new(
+        model=program.path,
+        digest=program.digest,
+        title=program.title,
+        units=program.units,
+        variation=varied,
+        recording=recording.read(request.record),
+        arguments={name: _plain(value) for name, value in given.items()},
+        states=tuple(name for name in states if name in kept),
+        outputs=tuple(name for name in program.outputs if name in kept),
+        chunk=chunk or 1,
+    )
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: as_written(item) for name, item in cast("Mapping[str, Any]", value).items()}
+    return as_written(value)
+
+
+def _check_names(model: Model, names: Sequence[str], fixed: Mapping[str, Mapping[str, Any]]) -> None:
+    """Refuse what cannot be varied, and what is given as well."""
+    program = model.program
+    known = [*program.parameters, *(f"{INITIAL}{state}" for state in program.all_states)]
+    for name in names:
+        if name not in known and name not in map(of_all, known):
+            settings = name.removeprefix("experiment.") in KEYS
+            hint = "until and relaxation may be expressions of a parameter that varies" if settings else None
+            message = f"--vary: the model has no parameter or initial value '{name}'"
+            raise UsageError(message, hint or meant(name, known))
+        group = "initial" if name.startswith(INITIAL) else "parameters"
+        if name.removeprefix(INITIAL) in fixed[group]:
+            raise UsageError(f"{name} is both set and varied", "leave one of them out")
+
+
+def _begun(
+    model: Model, planned: Manifest, folder: Path, chunk: int | None, processes: int, here: bool
+) -> tuple[ChunkWork, list[int]]:
+    """The work of a sweep that goes on in a folder, or begins there, and the chunks that are missing."""
+    threads = processes if here and not can_fork() else 1
+    if (folder / manifests.FILE).exists():
+        there = manifests.read(folder)
+        there.check_same(planned, folder)
+        if chunk not in (None, there.chunk):
+            raise UsageError(f"{folder} has chunks of {there.chunk} rows, not {chunk}", "leave --chunk out to go on")
+        found = Sweep(folder, there)
+        broken = set(damaged(found))
+        return ChunkWork(model, there, threads), [
+            k for k in range(there.chunks) if k in broken or k not in found.chunks
+        ]
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError(f"{folder} is not an empty folder", "choose another one")
+    work = ChunkWork(model, planned)
+    size = chunk_size(work, processes)
+    manifest = replace(planned, chunk=chunk or size)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UsageError(f"{folder} cannot be made: {error.strerror or error}") from None
+    manifest.write(folder)
+    return ChunkWork(model, manifest, threads), list(range(manifest.chunks))

@@ -1,0 +1,211 @@
+# pyright: basic
+"""Documents to mathematics: names resolved, everything substituted, every error reported.
+
+A document goes through these, in this order; `symbols` has what its names mean, `resolver` reads its expressions.
+
+================= ===========================================================================
+``definitions``   parameters and `let`; ``functions``, ``inputs`` and ``solve`` what else has a name
+``modes``         flow, walls and outputs of modes; ``edges`` their transitions
+``parts``         in the place of these: a system of parts as one mode
+``scene``         the shapes of the scene
+``experiment``    start and settings; ``reference`` what is known of runs
+``events``        transitions with a memory, then ``timers``: the time in a mode
+================= ===========================================================================
+
+Of the system that this gives, ``slicing`` makes a smaller one, and ``product`` a flat one of parts.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NoReturn
+
+from hsdsl.base import limits
+from hsdsl.base.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
+from hsdsl.base.names import SINCE
+from hsdsl.base.parts import Part
+from hsdsl.language.elaborate.definitions import (
+    define_lets,
+    define_parameters,
+    elaborate_units,
+    substituted_definitions,
+)
+from hsdsl.language.elaborate.events import with_events
+from hsdsl.language.elaborate.experiment import elaborate_experiment, elaborate_initial
+from hsdsl.language.elaborate.functions import define_functions, named_functions
+from hsdsl.language.elaborate.inputs import define_inputs, switch_name
+from hsdsl.language.elaborate.modes import elaborate_modes, elaborate_outputs
+from hsdsl.language.elaborate.parts import Parts
+from hsdsl.language.elaborate.parts.files import read_automata
+from hsdsl.language.elaborate.reference import elaborate_reference
+from hsdsl.language.elaborate.resolver import ExpressionResolver, resolved_expression
+from hsdsl.language.elaborate.scene import elaborate_scene, scene_of
+from hsdsl.language.elaborate.symbols import SymbolTable
+from hsdsl.language.elaborate.timers import with_timers
+from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
+from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.syntax import ExpressionError
+from hsdsl.language.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.language.files import ModelFiles
+from hsdsl.language.schema import AutomatonDocument, ModelDocument, SystemDocument, read
+from hsdsl.language.source import Node, Text, compose, decode
+from hsdsl.language.system import HybridSystem, switch_parameter
+
+__all__ = ["Elaboration", "drivable", "elaborate", "elaborate_files", "parameter_expression"]
+
+
+@dataclass(frozen=True)
+class Elaboration:
+    """A hybrid system and the document it was made from, where every part of it has its place.
+
+    The parts correspond by their order: ``system.modes[i].edges[k]`` is the k-th of the transitions of the i-th of
+    ``document.modes``, and likewise for walls, flows and outputs. ``root`` has the nodes of the file ``text``. A scope
+    has the meaning of names: ``scopes`` that of each mode, ``top`` that outside the modes.
+    """
+
+    system: HybridSystem
+    document: ModelDocument
+    root: Node
+    text: Text
+    scopes: dict[str, Scope]
+    top: Scope
+
+
+def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> HybridSystem:
+    """The hybrid system of a model file; ``text`` is its content, where it is not to be read.
+
+    Raises ModelError: the model has errors; all of them are carried, in source order.
+    Raises UsageError: the file cannot be read.
+    """
+    return elaborate_files(ModelFiles.read(path, text=text)).system
+
+
+def drivable(files: ModelFiles) -> HybridSystem:
+    """The system with each input u that is an expression of time as u_given * expression + u.
+
+    Where the parameter ``u given`` is 1 and the sampled input u is 0, which are their values, it is the same system;
+    where the parameter is 0, u can be driven from outside.
+
+    Raises ModelError: the model has errors; all of them are carried, in source order.
+    """
+    system = elaborate_files(files, drivable=True).system
+    switches = (switch_parameter(switch_name(i.name)) for i in system.inputs if i.given is not None)
+    return replace(system, parameters=(*system.parameters, *switches))
+
+
+def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration:
+    """The hybrid system of a model's bytes: (J, Gamma, D, U, F, G, R) of Burden et al. 2013, Definition 7.
+
+    Raises ModelError: the model has errors; all of them are carried, in source order.
+    """
+    with limits.applied(files.limits):
+        findings = Findings(files.path)
+        text = decode(files.path, files.text)
+        root = compose(text, findings)
+        data = read_automata(root, files, findings)
+        document = read(root, findings)
+        symbols = SymbolTable(document, ExpressionResolver(findings), files, data=data, drivable=drivable)
+        try:
+            with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
+                system = with_events(_system(symbols))
+                system = with_timers(system) if symbols.timed else system
+        except OutOfTime:
+            _report_timeout(symbols.resolver)
+        except ValueError as error:  # a check at birth that no diagnostic foresaw
+            raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
+        top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
+        return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
+
+
+def _report_timeout(resolver: ExpressionResolver) -> NoReturn:
+    message = "working this expression out takes too long"
+    hint = "make parts of it states, or allow more time with --limit seconds=600"
+    if resolver.at is not None:
+        resolver.report(resolver.at.place, TOO_LONG, message, hint)
+    resolver.findings.raise_if_any()
+    raise ModelError([Diagnostic(TOO_LONG, message, None, hint)])
+
+
+def _system(symbols: SymbolTable) -> HybridSystem:
+    """The system, its parts in the order in which they build upon each other."""
+    document = symbols.document
+    functions = define_functions(symbols)
+    parameters = define_parameters(symbols)
+    inputs = define_inputs(symbols)
+    parts: tuple[Part, ...] = ()
+    of_parts: dict[str, str] = {}
+    if isinstance(document, SystemDocument) and (document.system or document.automata):
+        whole = Parts(symbols, document)
+        parameters, parts = parameters + whole.parameters, whole.parts
+        modes, scene, initial, of_parts = whole.modes, whole.scene, whole.initial, whole.units
+    else:
+        define_lets(symbols)
+        outputs = elaborate_outputs(symbols)
+        modes = elaborate_modes(symbols, outputs)
+        scene, numbers = elaborate_scene(symbols)
+        modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
+        initial = elaborate_initial(symbols)
+    experiment = elaborate_experiment(symbols)
+    units = of_parts | elaborate_units(symbols)
+    reference = elaborate_reference(symbols, modes)
+    symbols.resolver.findings.raise_if_any()
+    return HybridSystem(
+        path=symbols.files.path,
+        digest=symbols.files.with_data(symbols.data).digest,
+        title=symbols.text(document.title),
+        source=symbols.text(document.source),
+        parameters=tuple(replace(parameter, unit=units.get(parameter.name)) for parameter in parameters),
+        inputs=inputs,
+        modes=modes,
+        outputs=symbols.all_outputs,
+        units=units,
+        initial=initial,
+        experiment=experiment,
+        reference=reference,
+        files=symbols.data,
+        scene=scene,
+        parts=parts,
+        definitions=tuple(substituted_definitions(document)),
+        functions=functions,
+        unknowns=_unknowns(document),
+        assumptions=tuple(filter(None, map(symbols.text, document.assumptions))),
+    )
+
+
+def _unknowns(document: ModelDocument) -> tuple[str, ...]:
+    kinds = document.automata.values() if isinstance(document, SystemDocument) else ()
+    tables = (document.modes, *(kind.modes for kind in kinds if isinstance(kind, AutomatonDocument)))
+    given = [document.solve, *(mode.solve for modes in tables for mode in modes.values())]
+    return tuple(str(name) for solve in given if solve is not None for name in solve.unknowns)
+
+
+def parameter_expression(system: HybridSystem, text: str, where: str, allowed: Sequence[str] | None = None) -> Any:
+    """An expression of a model's parameters that is not in its file: the VALUE of ``--set NAME=VALUE``.
+
+    ``where`` begins the sentence of an error, as ``"--set c"``; with ``allowed`` only those parameters can be used.
+
+    Raises UsageError: it is not an expression, or uses something else.
+    """
+    usable = {p.name for p in system.parameters} if allowed is None else set(allowed)
+    scope = Scope(_override_values(system, usable), place=where)
+    try:
+        with deep_stack(), timebox(limits.current().seconds / PARTS):
+            return resolved_expression(text, scope).expr
+    except ExpressionError as error:
+        raise UsageError(f"{where}: {error.message}", error.hint) from None
+    except OutOfTime:
+        raise UsageError(f"{where}: working this expression out takes too long") from None
+
+
+def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Meaning]:
+    others = {"t": "the time", SINCE: "the time since the mode was entered", **dict.fromkeys(system.states, "a state")}
+    others.update(dict.fromkeys((i.name for i in system.inputs), "an input"))
+    values: dict[str, Meaning] = {
+        name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
+    }
+    for name in (parameter.name for parameter in system.parameters):
+        late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
+        values[name] = Value(symbol(name)) if name in usable else late
+    return values | named_functions(system.functions, values)

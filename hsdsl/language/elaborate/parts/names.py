@@ -1,0 +1,434 @@
+# pyright: basic
+"""What names mean in a system of parts: those of an instance, then the file's, then `instance.name`.
+
+A name is worked out when it is first used, so definitions may use each other in any order; one that comes to itself is
+refused with the way it took.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Any
+
+from hsdsl.base.names import SINCE, counted, did_you_mean, shown
+from hsdsl.language.elaborate.parts.instances import Instance, Roster
+from hsdsl.language.elaborate.resolver import resolved_expression
+from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
+from hsdsl.language.elaborate.symbols import Meanings, SymbolTable
+from hsdsl.language.expression import ExpressionError, parse, selection, syntax
+from hsdsl.language.expression.plain import RANGES
+from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
+from hsdsl.language.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
+from hsdsl.language.schema import PartModeDocument
+from hsdsl.language.source import Key, Scalar
+
+MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
+IN_MODE = "="  # of an attribute: 1 in the mode of that name, else 0
+_SUMS = ("sum", "count")  # functions of ranges alone
+
+
+@dataclass
+class Board:
+    """The names of a system, with what has been worked out; ``parameters`` has those of instances by full name.
+
+    ``timed`` has the names of instances that use `since`, the time since they entered their mode.
+    """
+
+    symbols: SymbolTable
+    roster: Roster
+    lets: Mapping[str, Scalar]
+    parameters: dict[str, Meaning] = field(default_factory=dict)
+    timed: dict[str, None] = field(default_factory=dict)
+    _known: dict[tuple[Any, ...], Meaning] = field(default_factory=dict)
+    _solved: dict[tuple[str, str], Meanings] = field(default_factory=dict)
+    _solving: list[tuple[str, str]] = field(default_factory=list)
+    _active: list[tuple[str, str]] = field(default_factory=list)
+    _broken: set[tuple[str, Any, str]] = field(default_factory=set)
+    _read_beyond: set[tuple[str, str]] = field(default_factory=set)  # (name of several, attribute)
+
+    @property
+    def constants(self) -> frozenset[Any]:
+        """The symbols of all parameters."""
+        names = (*self.parameters, *(n for n, kind in self.symbols.names.items() if kind == "parameters"))
+        return frozenset(map(symbol, names))
+
+    def evaluated(
+        self, key: tuple[Any, ...], scalar: Scalar, names: Names, label: str, partial: bool = False
+    ) -> Meaning:
+        """The value of a definition, worked out once; a cycle is reported at the definition that closes it.
+
+        A ``partial`` one has no value in modes that lack one of its names.
+        """
+        if key in self._known:
+            return self._known[key]
+        way = [name for _, name in self._active]
+        if (str(key), label) in self._active:
+            first = way.index(label)
+            shown = " -> ".join((*way[first:], label))
+            message = f"'{label}' is defined by itself: {shown}"
+            self.symbols.report(scalar.place, "HS352", message, "make one of them a state")
+            self._known[key] = None
+            return None
+        self._active.append((str(key), label))
+        try:
+            lacks = partial and self.lacks(scalar, names)
+            value = _lacking(label, names) if lacks else self.value(scalar, names)
+        finally:
+            self._active.pop()
+        return self._known.setdefault(key, value)
+
+    def solution(self, one: Instance, mode: str, name: str) -> Meaning:
+        """What an unknown of the equations of a mode is."""
+        key, document = (one.name, mode), one.kind.modes[mode].solve  # pyright: ignore[reportArgumentType]
+        assert document is not None
+        if key in self._solving:
+            message = f"the equations for '{one.full(name)}' need its own value, by way of other parts"
+            self.report_once(document.equations[0], "HS352", message, "make one of them a state")
+            return None
+        if key not in self._solved:
+            self._solving.append(key)
+            try:
+                names, label = Names(self, one, mode, one.index, solving=True), f"{mode} of {one.name}"
+                found = solutions(self.symbols, document, names.scope, label)
+            finally:
+                self._solving.pop()
+            self._solved[key] = {} if found is None else with_solutions(placeholders(document, label), found)
+        return self._solved[key].get(name)
+
+    def forget(self) -> None:
+        """Work everything out anew."""
+        self._known.clear()
+        self._solved.clear()
+
+    def value(self, scalar: Scalar, names: Names) -> Value | None:
+        """The value of an expression; what another instance of the same automaton reports already is not repeated."""
+        if self.is_broken(scalar, names):
+            return None
+        value = self.symbols.resolver.number(scalar, names.scope)
+        self.note(scalar, names, value)
+        return value
+
+    def is_broken(self, scalar: Scalar, names: Names) -> bool:
+        """Whether an expression is reported already, in the same mode of another instance."""
+        return (scalar.place.text.path, scalar.place.start, names.mode or "") in self._broken
+
+    def note(self, scalar: Scalar, names: Names, value: object) -> None:
+        """Keep that an expression has no value."""
+        if value is None:
+            self._broken.add((scalar.place.text.path, scalar.place.start, names.mode or ""))
+
+    def report_once(self, at: Scalar | Key, code: str, message: str, hint: str | None) -> None:
+        """Report a fault that every instance of an automaton has."""
+        place = (at.place.text.path, at.place.start, code)
+        if place not in self._broken:
+            self._broken.add(place)
+            self.symbols.report(at.place, code, message, hint)
+
+    def member(self, name: str, names: Names) -> Meaning:
+        """What `instance.name` means; KeyError where there is no such instance."""
+        found = MEMBER.fullmatch(name)
+        if found is None:
+            raise KeyError(name)
+        base, index, attribute = found.groups()
+        one = self.instance(base, index, names)
+        if one is None or isinstance(one, Refusal):
+            return one
+        if isinstance(one, int):
+            return self._beyond(base, one, attribute)
+        return self.of(one, attribute, names.lenient)
+
+    def instance(self, base: str, index: str | None, names: Names) -> Instance | int | Refusal | None:
+        """The instance of a name; its number where that is beyond the ends. KeyError where there is none.
+
+        None where it is at fault, and reported.
+        """
+        roster = self.roster
+        if roster.is_broken(base):
+            return None
+        if index is None:
+            if base in roster.instances:
+                return roster.instances[base]
+            if base in roster.counted or base in roster.automata:
+                several = roster.counted.get(base) or roster.automata[base]
+                hint = f"write {several[0].name}.NAME, or sum({base}.NAME)" if several else None
+                return Refusal("HS111", f"'{base}' stands for several instances", hint)
+            raise KeyError(base)
+        if base not in roster.counted:
+            raise KeyError(base)
+        number = self._index(index, names)
+        if isinstance(number, Refusal) or not 1 <= number <= len(roster.counted[base]):
+            return number
+        return roster.counted[base][number - 1]
+
+    def _index(self, text: str, names: Names) -> int | Refusal:
+        """The whole number that an index is."""
+        known: dict[str, Meaning] = {} if names.index is None else {"index": whole_value(names.index)}
+        try:
+            value = resolved_expression(text, Scope(known))
+        except ExpressionError as error:
+            hint = "an index is a whole number, or an expression of `index` where the instance has a `count`"
+            return Refusal(error.code, error.message, hint)
+        if not value.expr.is_Integer:
+            return Refusal("HS111", f"the index `{text}` is not a whole number", None)
+        return int(value.expr)
+
+    def at_end(self, base: str, number: int, attribute: str) -> Scalar | Refusal:
+        """What a name is given as beyond the first and the last of several instances."""
+        several = self.roster.counted[base]
+        self._read_beyond.add((base, attribute))
+        given = {str(key): scalar for key, scalar in several[0].given.at_ends.items()}
+        if attribute in given:
+            return given[attribute]
+        message = f"there is no {base}[{number}]: '{base}' has {counted(len(several), 'instance')}"
+        return Refusal("HS111", message, f"give its value under `at_ends` of '{base}': {{{attribute}: ...}}")
+
+    def check_ends(self) -> None:
+        """Report names of `at_ends` that nothing reads; to know that, everything must have been worked out."""
+        for base, several in self.roster.counted.items():
+            read = sorted(attribute for of, attribute in self._read_beyond if of == base)
+            for key in several[0].given.at_ends:
+                if str(key) not in read:
+                    message = f"nothing reads '{shown(key)}' beyond the ends of '{base}'"
+                    hint = did_you_mean(key, read, f"remove it, or read {base}[index - 1].{shown(key)}")
+                    self.symbols.report(key.place, "HS351", message, hint)
+
+    def _beyond(self, base: str, number: int, attribute: str) -> Meaning:
+        given = self.at_end(base, number, attribute)
+        if isinstance(given, Refusal):
+            return given
+        key = ("at_ends", base, number, attribute)
+        return self.evaluated(key, given, Names(self, index=number), f"{base}[{number}].{attribute}")
+
+    def of(self, one: Instance, attribute: str, lenient: bool = False) -> Meaning:
+        """What a name of an instance is to the others: a choice among what it is in each mode."""
+        if attribute in one.kind.parameters:
+            return self.parameters.get(one.full(attribute))
+        if attribute.startswith(IN_MODE):
+            mode = attribute.removeprefix(IN_MODE)
+            return self.picked(one, [whole_value(int(name == mode)) for name, _ in one.modes])
+        key = ("of", one.name, attribute, lenient)
+        if key not in self._known:
+            self._known[key] = self._of(one, attribute, lenient)
+        return self._known[key]
+
+    def _of(self, one: Instance, attribute: str, lenient: bool) -> Meaning:
+        known = {*one.states, *map(str, one.kind.let), *map(str, one.kind.inputs)}
+        known |= {name for _, mode in one.modes for name in (*map(str, mode.let), *unknowns_of(mode))}
+        if attribute not in known:
+            message = f"the automaton '{one.automaton}' has no '{attribute}'"
+            return Refusal("HS111", message, did_you_mean(attribute, sorted(known)))
+        values: list[Value | None] = []
+        for mode, document in one.modes:
+            if document.flow is None and document.final:  # nothing flows there
+                values.append(None)
+                continue
+            inner = Names(self, one, mode)
+            value = inner[attribute]
+            if value is None:
+                return None
+            lacks = not isinstance(value, Value) or not value.uses <= inner.states
+            if lacks and not lenient:
+                message = f"'{attribute}' has no value in the mode '{mode}' of '{one.automaton}'"
+                return Refusal("HS354", message, f"define it there, too, under `let`: {{{attribute}: ...}}")
+            values.append(Value(selection.NO_VALUE) if lacks else value)  # pyright: ignore[reportArgumentType]
+        return self.picked(one, values)
+
+    def lacks(self, scalar: Scalar, names: Names) -> bool:
+        """Whether an expression has a name that a mode of the instance does not define."""
+        try:
+            tree = names.expanded(parse(scalar.value))
+        except ExpressionError:  # reported where it is worked out
+            return False
+        used = (names.get(node.name) for node in walk(tree) if isinstance(node, Name))
+        states = names.states
+        return any(
+            value.code == "HS354"
+            if isinstance(value, Refusal)
+            else isinstance(value, Value) and not value.uses <= states
+            for value in used
+        )
+
+    def picked(self, one: Instance, given: Sequence[Value | None]) -> Value:
+        """One value of several, by the mode of an instance; in modes without one it is that of another."""
+        known = [value for value in given if value is not None] or [whole_value(0)]
+        values = [value or known[0] for value in given]
+        expr = selection.pick(symbol(one.name), [value.expr for value in values], self.constants)
+        size, depth = sum(value.size for value in values), max(value.depth for value in values)
+        return Value(expr, size=size, depth=depth, bits=max(value.bits for value in values))
+
+
+def unknowns_of(mode: PartModeDocument) -> list[str]:
+    """The names that the equations of a mode solve for."""
+    return [] if mode.solve is None else list(map(str, mode.solve.unknowns))
+
+
+def _lacking(label: str, names: Names) -> Refusal:
+    message = f"'{label.rpartition('.')[2]}' has no value in the mode '{names.mode}': it uses a name that others define"
+    return Refusal("HS354", message, "define that name in this mode, too, under `let`")
+
+
+def whole_value(number: int) -> Value:
+    """The value of a whole number."""
+    return resolved_expression(str(number), Scope({}))
+
+
+@dataclass(frozen=True)
+class Names(Mapping[str, Meaning]):
+    """The names that can be used in one place: of an instance in a mode, of its connections, or of the file.
+
+    ``index`` is the number of an instance, or one beyond the ends. Where ``lenient`` a name that a mode does not define
+    has no value there. Where ``solving`` an unknown of the mode is a symbol of its own.
+    """
+
+    board: Board
+    instance: Instance | None = None
+    mode: str | None = None
+    index: int | None = None
+    lenient: bool = False
+    solving: bool = False
+
+    @property
+    def states(self) -> frozenset[str]:
+        """The states that may be used here, by their full names."""
+        every = frozenset(name for name, kind in self.board.symbols.names.items() if kind == "states")
+        one = self.instance
+        if one is None or self.mode is None:
+            return every
+        own = one.part.states[one.part.modes.index(self.mode)]
+        return every - {one.full(name) for name in one.states} | frozenset(own)
+
+    @property
+    def scope(self) -> Scope:
+        """The scope of an expression here."""
+        place = "here" if self.mode is None else f"the mode '{self.mode}'"
+        return Scope(self, self.states, place, expanded=self.expanded)
+
+    def __getitem__(self, name: str) -> Meaning:
+        if "." in name:
+            return self.board.member(name, self)
+        one = self.instance
+        if one is not None and self.mode is not None:
+            meaning = self._own(one, self.mode, name)
+            if meaning is not KeyError:
+                return meaning  # pyright: ignore[reportReturnType]
+        if name == "index" and self.index is not None:
+            return whole_value(self.index)
+        if name == SINCE and self.board.symbols.timed:
+            return Refusal("HS117", f"'{SINCE}' is the time since a part entered its mode", "use it in an automaton")
+        if name in self.board.lets:
+            return self.board.evaluated(("let", name, self.lenient), self.board.lets[name], self._outside, name)
+        return self.board.symbols.values[name]
+
+    @property
+    def _outside(self) -> Names:
+        return Names(self.board, lenient=self.lenient)
+
+    def _own(self, one: Instance, mode: str, name: str) -> Meaning | type[KeyError]:
+        """What a name means to an instance itself; the type KeyError where it means nothing."""
+        if name in unknowns_of(one.kind.modes[mode]):  # pyright: ignore[reportArgumentType]
+            if self.solving:
+                return placeholders(one.kind.modes[mode].solve, f"{mode} of {one.name}")[name]  # pyright: ignore[reportArgumentType]
+            return self.board.solution(one, mode, name)
+        lets = {str(key): scalar for key, scalar in one.kind.modes[mode].let.items()}  # pyright: ignore[reportArgumentType]
+        shared = {str(key): scalar for key, scalar in one.kind.let.items()}
+        if name in lets or name in shared:
+            scalar = lets.get(name) or shared[name]
+            key = (one.name, mode, name, self.solving)
+            return self.board.evaluated(key, scalar, self, one.full(name), name not in lets)
+        if name in one.states:
+            full = one.full(name)
+            return Value(symbol(full), uses=frozenset((full,)))
+        if name in one.kind.inputs:
+            given = {str(key): scalar for key, scalar in one.given.inputs.items()}
+            if name not in given:
+                return None  # reported with the instance
+            names = Names(self.board, index=one.index)
+            return self.board.evaluated((one.name, None, name), given[name], names, one.full(name))
+        if name in one.kind.parameters:
+            return self.board.parameters.get(one.full(name))
+        if any(name in other.let or name in unknowns_of(other) for _, other in one.modes):
+            hint = "give it to this mode too, or define it once in the `let` of the automaton"
+            return Refusal("HS354", f"'{name}' is a `let` name of other modes", hint)
+        if name == SINCE and self.board.symbols.timed:
+            self.board.timed[one.name] = None
+            return Value(symbol(one.full(SINCE)))
+        return whole_value(one.index) if name == "index" and one.index is not None else KeyError
+
+    def __iter__(self) -> Iterator[str]:
+        one = self.instance
+        if one is not None:
+            yield from (*one.states, *map(str, (*one.kind.let, *one.kind.inputs, *one.kind.parameters)))
+        yield from (*self.board.symbols.names, *self.board.symbols.values)
+        yield from (other.full(name) for other in self.board.roster.first_of_each() for name in other.states)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def items(self) -> Any:
+        """The names with their meanings, for hints: those that need working out count as states."""
+        return [(name, Value(symbol(name))) for name in dict.fromkeys(self)]
+
+    def expanded(self, tree: Tree) -> Tree:
+        """The same expression with sums over instances written out."""
+        if isinstance(tree, Call) and tree.function in RANGES and len(tree.arguments) == 1:
+            found = self._range(tree, tree.arguments[0])
+            if found is not None:
+                return found
+        return mapped(tree, self.expanded)
+
+    def _range(self, tree: Call, inner: Tree) -> Tree | None:
+        group = self.board.roster.group
+        named = [node.name.partition(".")[::2] for node in walk(inner) if isinstance(node, Name)]
+        bases = {base for base, _ in named if group(base) is not None}
+        bases = {base for base in bases if base not in self.board.roster.instances} or bases
+        if tree.function == "count" and isinstance(inner, Name) and bases:
+            return self._count(tree, inner)
+        if not bases or not all(dotted for base, dotted in named if base in bases):
+            return self._no_range(tree, inner) if tree.function in _SUMS else None
+        if len(bases) > 1:
+            message = f"`{tree.function}` ranges over the instances of one automaton, not of {', '.join(sorted(bases))}"
+            raise ExpressionError.at(tree, "HS113", message)
+        (base,) = bases
+        several = group(base) or []
+        terms = [_of_instance(inner, base, one.name) for one in several]
+        if tree.function == "sum":
+            return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
+        return replace(tree, arguments=tuple(terms)) if len(terms) > 1 else terms[0]
+
+    def _no_range(self, tree: Call, inner: Tree) -> Tree:
+        """A value that is not known where an instance is at fault, and reported; else say what the sum lacks."""
+        roster, given = self.board.roster, [node for node in walk(inner) if isinstance(node, Name)]
+        for node in given:
+            base = node.name.partition(".")[0].partition("[")[0]
+            if roster.is_broken(base):
+                return Name(f"{base}.{IN_MODE}", node.start, node.end)
+            if base in roster.automata and not roster.group(base):
+                message = f"no instance is of the automaton '{base}'"
+                raise ExpressionError.at(node, "HS111", message, "give one under `system`")
+            if "." in node.name and not roster.group(base):
+                message = f"there is no automaton or instance '{base}'"
+                raise ExpressionError.at(node, "HS111", message, did_you_mean(base, roster.names))
+        example = f"{tree.function}({next(iter(roster.names), 'leg')}.NAME)"
+        message = f"`{tree.function}` ranges over the instances of one automaton, each by its name and a point"
+        raise ExpressionError.at(tree, "HS113", message, f"write {example}")
+
+    def _count(self, tree: Call, inner: Name) -> Tree:
+        """How many instances there are, or are in a mode."""
+        base, _, mode = inner.name.partition(".")
+        several: list[Instance] = self.board.roster.group(base) or []
+        if not mode:
+            return Number(Fraction(len(several)), tree.start, tree.end)
+        if mode not in several[0].part.modes:
+            message = f"the automaton '{several[0].automaton}' has no mode '{mode}'"
+            raise ExpressionError.at(inner, "HS303", message, did_you_mean(mode, several[0].part.modes))
+        terms = [syntax.Name(f"{one.name}.{IN_MODE}{mode}", inner.start, inner.end) for one in several]
+        return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
+
+
+def _of_instance(tree: Tree, base: str, name: str) -> Tree:
+    if isinstance(tree, Name) and tree.name.partition(".")[0] == base:
+        return replace(tree, name=f"{name}.{tree.name.partition('.')[2]}")
+    return mapped(tree, lambda inner: _of_instance(inner, base, name))

@@ -1,0 +1,191 @@
+# pyright: basic
+"""The symbol table of a model under elaboration: its document, and the meaning of each of its names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from hsdsl.base.names import SINCE, closest
+from hsdsl.base.parts import Part
+from hsdsl.language.elaborate.resolver import ExpressionResolver, all_of
+from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, state
+from hsdsl.language.files import ModelFiles
+from hsdsl.language.schema import ModeDocument, ModelDocument
+from hsdsl.language.source import ABSENT, Key, Scalar, SourceRange
+from hsdsl.language.system import TIME
+
+KINDS = {
+    "functions": "a function", "parameters": "a parameter", "inputs": "an input", "states": "a state",
+    "let": "a `let` name", "unknowns": "an unknown of `solve`",
+}  # fmt: skip
+Meanings = dict[str, Meaning]
+
+
+@dataclass
+class SymbolTable:
+    """A document with its names.
+
+    ``names`` has the kind, of :data:`KINDS`, of every name that is not of one mode alone; ``values`` the meaning of
+    those that are defined so far, ``t`` from the start. ``states`` has the states of each mode in file order, none for
+    a final mode without a flow. ``undeclared`` names are in `initial` alone: states of its mode that lack a flow,
+    reported there. ``scopes`` has the scope of each mode that is elaborated, ``data`` the content of the data files
+    that were used. ``drivable`` says that inputs of time stay inputs. ``of_functions`` has the names that functions of
+    the file may use, with the parameters that are defined so far. ``parts`` are those of a system.
+    """
+
+    document: ModelDocument
+    resolver: ExpressionResolver
+    files: ModelFiles
+    names: dict[str, str] = field(default_factory=dict)
+    values: Meanings = field(default_factory=dict)
+    states: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    undeclared: frozenset[str] = frozenset()
+    scopes: dict[str, Scope] = field(default_factory=dict)
+    data: dict[str, bytes] = field(default_factory=dict)
+    drivable: bool = False
+    of_functions: Meanings = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
+
+    def __post_init__(self) -> None:
+        document = self.document
+        self.states = {name: tuple(map(str, mode.flow or ())) for name, mode in document.modes.items()}
+        keys = [(kind, getattr(document, kind)) for kind in ("functions", "parameters", "inputs")]
+        keys += [("states", mode.flow or ()) for mode in document.modes.values()] + [("let", document.let)]
+        keys += [("unknowns", document.solve.unknowns)] if document.solve is not None else []
+        for kind, names in keys:
+            for key in names:
+                taken = self.names.setdefault(key, kind)
+                if taken != kind:
+                    message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
+                    self.report(key.place, "HS301", message, "give one of them another name")
+        self.values["t"] = Value(TIME)
+        self.values |= {name: state(name) for name in self.all_states()}
+        if self.timed:
+            self.values[SINCE] = state(SINCE)
+        self.undeclared = frozenset(self._undeclared())
+        self.values.update(dict.fromkeys(self.undeclared))
+
+    def _undeclared(self) -> list[str]:
+        if not self.document.modes:
+            return []
+        start = self.document.initial
+        if start is None:  # reported with the system, which has no `modes`
+            return []
+        mode = self.document.modes.get(start.mode.value)  # pyright: ignore[reportArgumentType]
+        if mode is None or mode.flow is None:
+            return []
+        given = [str(key) for key in start.__pydantic_extra__ if key not in self.names and key != SINCE]
+        return [key for key in given if closest(key, map(str, mode.flow)) is None]
+
+    def scope(
+        self, usable: tuple[str, ...], sentence: str, values: Meanings | None = None, hint: str | None = None
+    ) -> Scope:
+        """A scope with names of some kinds; the others are refused with a sentence and a hint."""
+
+        def refusal(name: str, kind: str) -> Refusal:
+            return Refusal("HS117", f"'{name}' is {kind}; {sentence}", hint)
+
+        known: Meanings = {"t": self.values["t"] if "time" in usable else refusal("t", "the time")}
+        if self.timed:
+            since = "the time since the mode was entered"
+            known[SINCE] = self.values[SINCE] if "states" in usable else refusal(SINCE, since)
+        for name, kind in self.names.items():
+            if kind not in (*usable, "functions"):
+                known[name] = refusal(name, KINDS[kind])
+            elif name in self.values:
+                known[name] = self.values[name]
+        return Scope({**dict.fromkeys(self.undeclared), **known, **(values or {})})
+
+    def parameter_scope(self, sentence: str, hint: str | None = None) -> Scope:
+        """A scope with the parameters alone."""
+        return self.scope(("parameters",), sentence, hint=hint)
+
+    def number(self, scalar: Scalar, scope: Scope, finite_now: bool = False) -> Value | None:
+        """The value of an expression; see `ExpressionResolver.number`."""
+        return self.resolver.number(scalar, scope, finite_now)
+
+    def numbers(self, scalars: Iterable[Scalar], scope: Scope, finite_now: bool = False) -> list[Value] | None:
+        """The values of expressions; None where one of them is broken."""
+        return all_of([self.resolver.number(scalar, scope, finite_now) for scalar in scalars])
+
+    def report(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
+        """Report a fault at a place."""
+        self.resolver.report(place, code, message, hint)
+
+    def content(self, name: str) -> bytes:
+        """The content of a data file, which is read once; raises DataRefused."""
+        if name not in self.data:
+            self.data[name] = self.files.content(name)
+        return self.data[name]
+
+    def text(self, scalar: Scalar | None) -> str | None:
+        """The text of a scalar that may be missing."""
+        return None if scalar is None or scalar.value == ABSENT else scalar.value
+
+    def all_states(self) -> tuple[str, ...]:
+        """Every state of every mode, once."""
+        return tuple(name for name, kind in self.names.items() if kind == "states")
+
+    @cached_property
+    def timed(self) -> bool:
+        """Whether `since` is the time since the mode was entered: the file defines no such name."""
+        return SINCE not in self.names and SINCE not in self.inner_lets
+
+    def states_within(self, mode: str) -> frozenset[str]:
+        """The states that expressions of a mode may use: its own ones and, where it has a flow, `since`."""
+        timed = self.timed and not self.without_states(self.document.modes[mode])  # pyright: ignore[reportArgumentType]
+        return frozenset((*self.states[mode], SINCE) if timed else self.states[mode])
+
+    @cached_property
+    def all_outputs(self) -> tuple[str, ...]:
+        """Every output of the model, then every further one of a mode, once."""
+        inner = (key for mode in self.document.modes.values() for key in mode.outputs)
+        return tuple(dict.fromkeys(map(str, (*self.document.outputs, *inner))))
+
+    @cached_property
+    def inner_lets(self) -> frozenset[str]:
+        """Every `let` name that some mode defines for itself."""
+        return frozenset(str(key) for mode in self.document.modes.values() for key in mode.let)
+
+    @cached_property
+    def recorded(self) -> Meanings:
+        """Refusals of outputs, which no expression has."""
+        hint = "define it under `let`, and write outputs: {{{0}: {0}}}"
+        message = "'{}' is an output, and expressions have none"
+        own = (name for name in self.all_outputs if name not in self.names)
+        return {name: Refusal("HS117", message.format(name), hint.format(name)) for name in own}
+
+    @cached_property
+    def elsewhere(self) -> Meanings:
+        """Refusals of outputs, and of those names for modes that do not define them."""
+        hint = "give it to this mode too, or define it once in the `let` of the whole model"
+        return self.recorded | self._of_modes("'{}' is a `let` name of other modes", hint)
+
+    @cached_property
+    def above(self) -> Meanings:
+        """Refusals of outputs, and of those names for what all modes share."""
+        message = "'{}' is a `let` name of modes, and what all modes share cannot use it"
+        return self.recorded | self._of_modes(message, "write this in those modes")
+
+    def _of_modes(self, message: str, hint: str) -> Meanings:
+        return {name: Refusal("HS111", message.format(name), hint) for name in self.inner_lets}
+
+    def without_states(self, mode: ModeDocument) -> bool:
+        """Whether a mode has the states it is entered with, and none of its own."""
+        return mode.final and mode.flow is None
+
+
+def definition_order(keys: Iterable[Key], kind: str, refused: Meanings) -> Iterator[Key]:
+    """The names of definitions that may use earlier ones only.
+
+    ``refused`` holds, at a name's turn, refusals of it and of those below, and in the end nothing.
+    """
+    keys = list(keys)
+    for key in keys:
+        refused[key] = Refusal("HS302", f"'{key}' is defined below; {kind} use earlier ones only", "move it up")
+    for key in keys:
+        refused[key] = Refusal("HS302", f"'{key}' is defined by itself", "give one of the two another name")
+        yield key
+        del refused[key]

@@ -1,0 +1,253 @@
+# pyright: basic
+"""Scopes: the meaning of names in an expression."""
+
+from __future__ import annotations
+
+from collections import ChainMap
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+import sympy as sp
+
+from hsdsl.base.functions import CONSTANTS, FUNCTIONS
+from hsdsl.base.names import SINCE, WORDS, closest, did_you_mean, shown
+from hsdsl.language.expression.expression_hints import MISCOUNTED, NAMES, derivative_of, timed, unit
+from hsdsl.language.expression.syntax import Call, ExpressionError, Name, Number, Product, Tree, walk
+
+TIME = sp.Symbol("t", real=True)
+RESERVED = (TIME.name, *CONSTANTS, *FUNCTIONS, *WORDS)
+
+
+@dataclass(frozen=True)
+class Value:
+    """The meaning of an expression.
+
+    ``expr`` is over states, inputs, parameters and time. ``number`` is its value with the file's own parameters (an
+    mpmath number; NaN where it has none), None where a state, input or time is in it. ``constant`` says that not even a
+    parameter is in it, and ``uses`` has the states it was written with. ``size`` counts its nodes and ``depth`` the
+    nesting of its parentheses, written out in full; ``bits`` is the length of its exact numbers once products and
+    powers are multiplied out.
+    """
+
+    expr: Any
+    number: Any = None
+    constant: bool = False
+    uses: frozenset[str] = frozenset()
+    size: int = 1
+    depth: int = 0
+    bits: int = 0
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A name that exists and cannot be used here."""
+
+    code: str
+    message: str
+    hint: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Function:
+    """A function that a file defines, written out where it is called.
+
+    ``tree`` is its expression, written as ``text``, over its arguments and the names of ``others``; None where that is
+    broken. ``made`` has its values so far, by those of its arguments.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    tree: Tree | None
+    text: str
+    others: Mapping[str, Meaning]
+    made: dict[tuple[Value, ...], Value] = field(default_factory=dict)
+
+    def scope(self, given: Mapping[str, Value]) -> Scope:
+        """The names of its expression where its arguments have these values."""
+        return Scope(ChainMap(dict(given), self.others))  # pyright: ignore[reportArgumentType]
+
+    @property
+    def example(self) -> str:
+        """A call of it, with the names of its arguments."""
+        return f"{self.name}({', '.join(self.arguments)})"
+
+
+Meaning = Value | Refusal | Function | None
+
+
+@dataclass(frozen=True)
+class Scope:
+    """The names that can be used in an expression.
+
+    ``values`` has the meaning of each name: a value, a function, a refusal, or None where its own definition is broken.
+    ``states`` are those of the mode of the expression, None where every state may be used; ``place`` names the mode in
+    sentences. ``expanded`` writes sums over parts out; None where there are no parts, and names have no dots.
+    """
+
+    values: Mapping[str, Meaning]
+    states: frozenset[str] | None = None
+    place: str = "here"
+    expanded: Callable[[Tree], Tree] | None = None
+
+    def faults(self, tree: Tree) -> list[ExpressionError]:
+        """Every name of an expression that cannot be used, and every function that cannot be called so."""
+        faults: list[ExpressionError] = []
+        end, measured = 0, frozenset(_behind_numbers(tree))
+        for node in walk(tree):
+            if node.start < end:
+                continue
+            fault = None
+            if isinstance(node, Name):
+                fault = self._name(node, node.start in measured)
+            elif isinstance(node, Call):
+                fault = self._call(node)
+                end = node.end if fault and timed(node.function, None) else end  # its units mean nothing here
+            if fault and fault.message not in [other.message for other in faults]:
+                faults.append(fault)
+        return faults
+
+    def broken(self, tree: Tree) -> bool:
+        """Whether a name in it has a definition that is reported already."""
+        missing = object()
+        called = (self.values.get(name) for name in functions_called(tree))
+        return any(isinstance(n, Name) and self.values.get(n.name, missing) is None for n in walk(tree)) or any(
+            isinstance(function, Function) and function.tree is None for function in called
+        )
+
+    def _name(self, node: Name, measured: bool) -> ExpressionError | None:
+        if node.name in CONSTANTS:
+            return None
+        if node.name in FUNCTIONS or isinstance(self.values.get(node.name), Function):
+            message = f"`{node.name}` is a function and needs its arguments"
+            return ExpressionError.at(node, "HS112", message, f"write {node.name}(...)")
+        if self.expanded is None and "." in node.name:
+            return _dotted(node, node.name)
+        if node.name not in self.values:
+            message = f"nothing here is called '{shown(node.name)}'"
+            return ExpressionError.at(node, "HS111", message, self._hint(node.name, measured))
+        value = self.values[node.name]
+        if isinstance(value, Refusal):
+            return ExpressionError.at(node, value.code, value.message, value.hint)
+        if not isinstance(value, Value) or self._reachable(value):
+            return None
+        assert self.states is not None
+        lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
+        message = f"'{node.name}' needs the state {lacking}, which {self.place} does not have"
+        flow = ", ".join(f"{s}: 0" for s in sorted(value.uses - self.states))
+        hint = f"add {flow} to its flow, where it then keeps its value"
+        if value.uses == {node.name}:
+            message = f"{self.place} has no state '{node.name}'"
+            hint = did_you_mean(node.name, sorted(self.states - {SINCE}), hint)
+        return ExpressionError.at(node, "HS117", message, hint)
+
+    def _call(self, node: Call) -> ExpressionError | None:
+        if "." in node.function:
+            return _dotted(node, node.function)
+        known = self.values.get(node.function)
+        if isinstance(known, Function) and known.tree is None:
+            return None
+        if isinstance(known, Function):
+            return _miscounted(node, len(known.arguments), len(known.arguments), known.example)
+        if node.function not in FUNCTIONS:
+            end = node.start + len(node.function)
+            if node.function in self.values or node.function in CONSTANTS:
+                message, hint = f"'{shown(node.function)}' is not a function", _product_or_value(node)
+            else:
+                message = f"there is no function '{shown(node.function)}'"
+                own = [name for name, value in self.values.items() if isinstance(value, Function)]
+                first = node.arguments[0] if node.arguments else None
+                time = f"{float(first.value):g}" if isinstance(first, Number) else getattr(first, "name", None)
+                hint = (
+                    timed(node.function, time)
+                    or NAMES.get(node.function)
+                    or _nearest(node.function, own)
+                    or f"functions: {' '.join((*FUNCTIONS, *own))}, and those under `functions`"
+                )
+            return ExpressionError("HS112", message, node.start, end, hint)
+        _, fewest, most = FUNCTIONS[node.function]
+        arguments = "x" if most == fewest == 1 else "x, y"
+        return _miscounted(node, fewest, most, f"{node.function}({arguments})")
+
+    def _hint(self, name: str, measured: bool) -> str | None:
+        """What to write for an unknown name; one that is ``measured`` is the factor behind a number."""
+        known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
+        if measured and unit(name) and closest(name, known) is None:
+            return unit(name)
+        if name in NAMES:
+            return NAMES[name]
+        if owned := [n for n in known if n.rpartition(".")[2] == name and n != name]:
+            return f"write {' or '.join(owned[:2])}: names of parts have the part in front"
+        define = "define it, under `parameters`, `inputs` or `let`"
+        near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS], define) or ""
+        return near + "; a unit belongs under `units`" * bool(unit(name))
+
+    def _reachable(self, value: Value) -> bool:
+        return self.states is None or value.uses <= self.states
+
+
+def _behind_numbers(tree: Tree) -> Iterator[int]:
+    """Where each factor of a product begins that stands behind a number, as the unit of a quantity does."""
+    for product in walk(tree):
+        if isinstance(product, Product):
+            pairs = pairwise(factor for _, factor in product.factors)
+            yield from (factor.start for before, factor in pairs if isinstance(before, Number))
+
+
+def _dotted(node: Name | Call, name: str) -> ExpressionError:
+    at = node.start + name.index(".")
+    hint = "write the name or the function alone: sin(x)"
+    return ExpressionError("HS109", "names have no dots in an expression", at, at + 1, hint)
+
+
+def _product_or_value(node: Call) -> str:
+    match node.arguments:
+        case (Number(value),) if node.function == SINCE:
+            return f"write since >= {float(value):g}: it is the time since the mode was entered"
+        case _ if node.function == SINCE:
+            return "write since alone: it is the time since the mode that the run is in was entered"
+        case (Name("t"),):
+            return f"write {node.function}: every name has its value at the present time"
+        case (argument,) if any(isinstance(part, Name) and part.name == "t" for part in walk(argument)):
+            return "a name has its value at the present time: there are no delays"
+        case _:
+            return f"write {node.function}*(...)"
+
+
+def _miscounted(node: Call, fewest: int, most: int | None, example: str) -> ExpressionError | None:
+    """The error for a call with too few or too many arguments."""
+    given = len(node.arguments)
+    if given >= fewest and (most is None or given <= most):
+        return None
+    number = f"{fewest}" if most == fewest else f"at least {fewest}"
+    noun = "argument" if fewest == 1 else "arguments"
+    message = f"`{node.function}` takes {number} {noun}, not {given}"
+    return ExpressionError.at(node, "HS113", message, MISCOUNTED.get((node.function, given)) or f"write {example}")
+
+
+def functions_called(tree: Tree) -> Iterator[str]:
+    """The name of every function that an expression calls."""
+    return (node.function for node in walk(tree) if isinstance(node, Call))
+
+
+def _nearest(name: str, own: list[str]) -> str | None:
+    best = closest(name, (*own, *FUNCTIONS))
+    return f"did you mean '{best}'?" if best else None
+
+
+@lru_cache(maxsize=10_000)
+def symbol(name: str) -> sp.Symbol:
+    """The symbol of a state, parameter or sampled input: real, and never a thing of SymPy's own."""
+    return sp.Symbol(name, real=True)
+
+
+def slope_symbol(name: str) -> sp.Symbol:
+    """The symbol of how fast a sampled input changes, by no name that a file can have."""
+    return sp.Symbol(f"{name}'", real=True)
+
+
+def state(name: str) -> Value:
+    """A state's value."""
+    return Value(symbol(name), uses=frozenset((name,)))

@@ -1,0 +1,139 @@
+"""The bytes of a model file, of a pipe or of standard input: read once, as many as are allowed, none from a device."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import select
+import stat
+import sys
+import time
+from itertools import islice
+from pathlib import Path
+from typing import BinaryIO
+
+from hsdsl.base import limits
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import closest, shown
+
+STANDARD_INPUT = ("-", "/dev/stdin")
+READ = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
+_SILENCE = 10.0  # seconds for which a named pipe may have nobody who writes to it
+_MOST_ENTRIES = 1000  # of a folder, looked through for a hint
+
+
+def read_bytes(path: str | os.PathLike[str]) -> bytes:
+    """The bytes of a model, as many as it may have and one more; `-` is standard input.
+
+    Raises UsageError: when there is nothing to read, or something without an end.
+    """
+    most = limits.current().bytes + 1
+    try:
+        if os.fspath(path) in STANDARD_INPUT:
+            return _standard_input(most)
+        _refuse_device(os.stat(path).st_mode)  # to open some devices is to do something
+        with open(os.open(path, READ), "rb", buffering=0) as stream:
+            return _content(stream.fileno(), most, path)
+    except (OSError, ValueError) as error:
+        if _is_text(path):
+            message = f"this is the text of a model, not the path of its file: `{shown(os.fspath(path), 40)}`"
+            raise UsageError(message, "hsdsl.loads(text) reads a model from its text") from None
+        raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
+
+
+def _is_text(path: str | os.PathLike[str]) -> bool:
+    """Whether a path looks like the text of a model: it has several lines, or a key with its value."""
+    return isinstance(path, str) and ("\n" in path.strip() or "hsdsl: " in path)
+
+
+def open_regular(path: str | os.PathLike[str], flags: int = 0) -> BinaryIO:
+    """Open a regular file to read; anything else is refused before it could keep us waiting.
+
+    Raises OSError: it cannot be opened, or is none.
+    """
+    refusal = OSError(errno.EINVAL, "this is not a regular file")
+    mode = os.stat(path).st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):  # to open some devices is to do something
+        raise refusal
+    stream = open(os.open(path, READ | flags), "rb")  # noqa: SIM115 - the caller closes it
+    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        return stream
+    stream.close()  # exchanged meanwhile
+    raise refusal
+
+
+def is_piped(path: str | os.PathLike[str]) -> bool:
+    """Whether the content there can be read once only."""
+    return os.fspath(path) in STANDARD_INPUT or Path(path).is_fifo()
+
+
+def reason(error: OSError | ValueError) -> str:
+    """Why a file could not be read, for a person."""
+    if isinstance(error, FileNotFoundError):
+        return "there is no such file"
+    if isinstance(error, IsADirectoryError):
+        return "this is a folder, not a file"
+    if isinstance(error, PermissionError):
+        return "the file may not be read"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror.lower()
+    return "this cannot be the name of a file"
+
+
+def _standard_input(most: int) -> bytes:
+    if sys.stdin is None or sys.stdin.closed:
+        raise OSError(errno.EBADF, "there is no standard input")
+    stream = sys.stdin.buffer
+    try:
+        mode = os.fstat(stream.fileno()).st_mode
+    except io.UnsupportedOperation:  # something in memory replaces it
+        mode = 0
+    if not stream.isatty():
+        _refuse_device(mode)
+    return stream.read(most)
+
+
+def _refuse_device(mode: int) -> None:
+    if stat.S_ISBLK(mode) or stat.S_ISCHR(mode):
+        raise OSError(errno.ENODEV, "this is a device, not a file")
+
+
+def _content(descriptor: int, most: int, path: str | os.PathLike[str]) -> bytes:
+    """Read to the end, or ``most`` bytes. Of a named pipe nothing is the end only after something, or a while."""
+    mode = os.fstat(descriptor).st_mode
+    _refuse_device(mode)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError
+    named = stat.S_ISFIFO(mode) and os.path.exists(os.path.realpath(path))
+    data, patience = bytearray(), time.monotonic() + _SILENCE
+    while len(data) < most:
+        try:
+            chunk = os.read(descriptor, most - len(data))
+        except BlockingIOError:
+            if stat.S_ISREG(mode):
+                raise
+            select.select([descriptor], [], [])
+            continue
+        data += chunk
+        if not chunk and (data or not named):
+            break
+        if not chunk:
+            if time.monotonic() > patience:
+                raise OSError(errno.EPIPE, "nobody writes to this pipe")
+            time.sleep(0.01)
+    return bytes(data)
+
+
+def _models_nearby(path: Path) -> str | None:
+    """The hint for a file that is not there, or for a folder: a model that is."""
+    try:
+        folder = path if path.is_dir() else path.parent
+        models = [entry for entry in islice(folder.iterdir(), _MOST_ENTRIES) if entry.suffix in (".yaml", ".yml")]
+    except (OSError, ValueError):
+        return None
+    names = {entry.name: str(entry) for entry in sorted(models)}
+    if path.is_dir():
+        return f"name a model, such as {next(iter(names.values()))}" if names else "name a model file"
+    near = closest(path.name, names)
+    return f"did you mean '{names[near]}'?" if near else None

@@ -1,0 +1,282 @@
+"""The fields of a document: expressions, names, texts, and the shapes of mappings and lists.
+
+A field keeps its `Scalar`, and so its place. Every refusal is a `PydanticCustomError` whose type is our own code.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal, LiteralString, TypeVar, cast
+
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    PlainValidator,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
+from pydantic_core import PydanticCustomError
+
+from hsdsl.base.names import WORDS, did_you_mean, is_identifier, shown
+from hsdsl.language.expression.scope import RESERVED
+from hsdsl.language.schema.value_suggestions import as_list, as_mapping, as_name, assigned, in_brackets
+from hsdsl.language.source import ABSENT, Key, Scalar, is_empty
+
+T = TypeVar("T")
+
+
+def refuse(code: str, message: str, hint: str | None = None) -> PydanticCustomError:
+    """The error of a validator."""
+    return PydanticCustomError(cast(LiteralString, code), "{message}", {"message": message, "hint": hint})
+
+
+def _unexpected(expected: str, value: Any, hint: str | None = None, code: str = "HS203") -> PydanticCustomError:
+    return refuse(code, f"expected {expected}, got {described(value)}", hint)
+
+
+def described(value: Any) -> str:
+    """A value in a sentence."""
+    if isinstance(value, dict):
+        return "a mapping"
+    if isinstance(value, list):
+        return "a list"
+    return f"'{shown(value.value, 40)}'" if isinstance(value, Scalar) and not is_empty(value) else "nothing"
+
+
+def _single(value: Any, expected: str) -> Scalar:
+    if not isinstance(value, Scalar):
+        raise _unexpected(expected, value, in_brackets(value) if isinstance(value, list) else None)
+    return value
+
+
+def _expression(value: Any, kind: str = "a number or an expression") -> Scalar:
+    if isinstance(value, (dict, list)):
+        raise _unexpected("an expression", value, in_brackets(value) or "write every component as a name of its own")
+    if is_empty(value):
+        raise refuse("HS121", f"{kind} is missing here", kind)
+    return _single(value, "an expression")
+
+
+def _condition(value: Any) -> Scalar:
+    if isinstance(value, list):
+        parts = [part.value for part in value if isinstance(part, Scalar)]  # pyright: ignore[reportUnknownVariableType]
+        raise _unexpected("a condition", value, in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}")
+    return _expression(value, "a condition, such as v > 0")
+
+
+def _inequality(value: Any) -> Scalar:
+    if isinstance(value, list):
+        hint = "under `when`, put the rest under `if`; under `domain`, make each an item"
+        raise _unexpected("one inequality", value, in_brackets(value) or hint)
+    return _expression(value, "an inequality, such as x >= 1")
+
+
+def _equation(value: Any) -> Scalar:
+    return _expression(value, "an equation, such as m*a == force")
+
+
+def _text(value: Any) -> Scalar | None:
+    scalar = _single(value, "a text")
+    return None if is_empty(scalar) else scalar
+
+
+def _label(value: Any) -> Scalar:
+    scalar = _single(value, "a name")
+    if not scalar.value.strip():
+        raise refuse("HS205", "a name is missing here")
+    return scalar
+
+
+def _flag(value: Any) -> bool:
+    scalar = _single(value, "true or false")
+    if scalar.kind != "boolean":
+        words = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+        meant = words.get(scalar.value.lower())
+        raise _unexpected("true or false", scalar, f"write {meant}" if meant else None, "HS204")
+    return scalar.value.lower() == "true"
+
+
+def _whole(value: Any) -> int:
+    scalar = _single(value, "a whole number")
+    digits = scalar.value[1:] if scalar.value[:1] in "+-" else scalar.value
+    if scalar.kind == "number" and digits.isdigit() and len(digits) > 9:
+        raise _unexpected("a whole number of at most 9 digits", scalar, code="HS204")
+    if not (scalar.kind == "number" and digits.isdigit()):
+        raise _unexpected("a whole number", scalar, "such as 1 or -2", "HS204")
+    return int(scalar.value)
+
+
+def _priority(value: Any, info: ValidationInfo) -> int | Scalar:
+    """A whole number, or an expression where the transition is an event."""
+    if info.data.get("event") is None:
+        return _whole(value)
+    scalar = _expression(value)
+    return _whole(scalar) if scalar.kind == "number" and scalar.value.lstrip("+-").isdigit() else scalar
+
+
+def choice(*words: str) -> Callable[[Any], Scalar]:
+    """A validator for one of some words."""
+
+    def check(value: Any) -> Scalar:
+        scalar = _single(value, " or ".join(words))
+        if scalar.value not in words:
+            raise _unexpected(" or ".join(words), scalar, did_you_mean(scalar.value, words), "HS204")
+        return scalar
+
+    return check
+
+
+def _identifier(value: Any) -> Scalar:
+    scalar = _single(value, "a word")
+    if not is_identifier(scalar.value):
+        raise _unexpected("a word", scalar, code="HS204")
+    return scalar
+
+
+def _version(value: Any) -> Scalar:
+    scalar = _single(value, "the version of the language")
+    if scalar.value != "1":
+        raise refuse("HS206", f"{described(scalar)} is not a known version of the language", "write hsdsl: 1")
+    return scalar
+
+
+def _name(key: Any) -> Key:
+    if not is_identifier(key):
+        raise refuse("HS205", f"'{shown(key)}' cannot be a name", as_name(key))
+    if key in RESERVED:
+        kind = "a word of the language" if key in WORDS else "a function"
+        kind = {"t": "the time", "pi": "a constant"}.get(key, kind)
+        raise refuse("HS205", f"'{key}' is {kind} and cannot be a name", "choose another name")
+    return key
+
+
+def _argument(value: Any) -> Key:
+    scalar = _single(value, "a name")
+    if scalar.value == ABSENT:
+        return Key.at(ABSENT, scalar.place)
+    return _name(Key.at(scalar.value, scalar.place))
+
+
+def _state_name(key: Any) -> Key:
+    if key == "mode":
+        raise refuse("HS205", "a state cannot be called 'mode', which `initial` uses", "choose another name")
+    return _name(key)
+
+
+def _mode_name(key: Any) -> Key:
+    if not key or any(c.isspace() for c in key):
+        raise refuse("HS205", f"'{shown(key)}' cannot be the name of a mode", "a mode's name has no blanks")
+    return key
+
+
+def _any_key(key: Any) -> Key:
+    if assigned(key):
+        raise refuse("HS205", f"'{shown(key)}' is not a name", as_name(key))
+    return key
+
+
+def _is_left_out(value: Any) -> bool:
+    return is_empty(value) or (isinstance(value, Scalar) and value.value == ABSENT)
+
+
+def shaped_as_mapping(value: Any) -> Any:
+    """A mapping, empty where the value is left out."""
+    if not (_is_left_out(value) or isinstance(value, dict)):
+        raise _unexpected("a mapping (name: value)", value, as_mapping(value))
+    return dict[Any, Any]() if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
+
+
+def shaped_as_list(value: Any) -> Any:
+    """A list, empty where the value is left out."""
+    if not (_is_left_out(value) or isinstance(value, list)):
+        raise _unexpected("a list", value, as_list(value))
+    return [] if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
+
+
+def required(description: str, *examples: Any, alias: str | None = None) -> Any:
+    """A key that must be there."""
+    return Field(description=description, examples=list(examples), alias=alias)
+
+
+def optional(description: str, *examples: Any, default: Any = None, alias: str | None = None) -> Any:
+    """A key with a default."""
+    return Field(default, description=description, examples=list(examples), alias=alias)
+
+
+def mapping(description: str, *examples: Any, alias: str | None = None) -> Any:
+    """A key whose mapping is empty where it is left out."""
+    return Field(default_factory=dict[Any, Any], description=description, examples=list(examples), alias=alias)
+
+
+def items(description: str, *examples: Any) -> Any:
+    """A key whose list is empty where it is left out."""
+    return Field(default_factory=list[Any], description=description, examples=list(examples))
+
+
+class Document(BaseModel):
+    """A mapping with known keys."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True, defer_build=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _shape(cls, value: Any) -> Any:
+        return shaped_as_mapping(value)
+
+
+_NUMBER_OR_TEXT: dict[str, Any] = {"type": ["number", "string"]}
+_ANY_SCALAR: dict[str, Any] = {"type": ["string", "number", "boolean", "null"]}
+
+Expression = Annotated[Scalar, PlainValidator(_expression), WithJsonSchema(_NUMBER_OR_TEXT)]
+Equation = Annotated[Scalar, PlainValidator(_equation), WithJsonSchema({"type": "string"})]
+Inequality = Annotated[Scalar, PlainValidator(_inequality), WithJsonSchema({"type": "string"})]
+OptionalExpression = Annotated[Scalar | None, PlainValidator(_expression), WithJsonSchema(_NUMBER_OR_TEXT)]
+OptionalCondition = Annotated[
+    Scalar | None, PlainValidator(_condition), WithJsonSchema({"type": ["string", "boolean"]})
+]
+Text = Annotated[Scalar | None, PlainValidator(_text), WithJsonSchema(_ANY_SCALAR)]
+Label = Annotated[Scalar, PlainValidator(_label), WithJsonSchema({"type": ["string", "number", "boolean"]})]
+OptionalLabel = Annotated[
+    Scalar | None, PlainValidator(_label), WithJsonSchema({"type": ["string", "number", "boolean"]})
+]
+Flag = Annotated[bool, PlainValidator(_flag), WithJsonSchema({"type": "boolean"})]
+Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer"})]
+Priority = Annotated[int | Scalar, PlainValidator(_priority), WithJsonSchema({"type": ["integer", "string"]})]
+Word = Annotated[Scalar | None, PlainValidator(_identifier), WithJsonSchema({"type": "string"})]
+Version = Annotated[Scalar, PlainValidator(_version), WithJsonSchema({"const": 1})]
+Scheme = Annotated[
+    Scalar | None,
+    PlainValidator(choice("relaxed", "located", "paoli-schatzman")),
+    WithJsonSchema({"type": "string", "enum": ["relaxed", "located", "paoli-schatzman"]}),
+]
+Completion = Annotated[
+    Scalar | None,
+    PlainValidator(choice("contact", "auto", "none")),
+    WithJsonSchema({"type": "string", "enum": ["contact", "auto", "none"]}),
+]
+Hold = Annotated[
+    Literal["zero", "linear"],
+    PlainValidator(lambda value: choice("zero", "linear")(value).value),
+    WithJsonSchema({"type": "string", "enum": ["zero", "linear"]}),
+]
+ValuesOf = Annotated[
+    Literal["trigger", "execution"],
+    PlainValidator(lambda value: choice("trigger", "execution")(value).value),
+    WithJsonSchema({"type": "string", "enum": ["trigger", "execution"]}),
+]
+
+Name = Annotated[Key, PlainValidator(_name), WithJsonSchema({"type": "string"})]
+
+StateName = Annotated[Key, PlainValidator(_state_name), WithJsonSchema({"type": "string"})]
+ModeName = Annotated[Key, PlainValidator(_mode_name), WithJsonSchema({"type": "string"})]
+ArgumentName = Annotated[Key, PlainValidator(_argument), WithJsonSchema({"type": "string"})]
+AnyKey = Annotated[Key, PlainValidator(_any_key), WithJsonSchema({"type": "string"})]
+
+Table = Annotated[dict[Name, T], BeforeValidator(shaped_as_mapping)]
+StateTable = Annotated[dict[StateName, T], BeforeValidator(shaped_as_mapping)]
+ModeTable = Annotated[dict[ModeName, T], BeforeValidator(shaped_as_mapping)]
+OpenTable = Annotated[dict[AnyKey, T], BeforeValidator(shaped_as_mapping)]
+Items = Annotated[list[T], BeforeValidator(shaped_as_list)]

@@ -1,0 +1,70 @@
+"""The JSON Schema of model files, for editors: draft 7, with a description on every key."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic.json_schema import GenerateJsonSchema
+
+from hsdsl.language.schema.documents import SystemDocument
+
+_DRAFT = "http://json-schema.org/draft-07/schema#"
+
+
+class _Generator(GenerateJsonSchema):
+    """Without the titles that pydantic makes out of names."""
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        """Never."""
+        return False
+
+
+def json_schema() -> dict[str, Any]:
+    """The JSON Schema of a model file, as plain data.
+
+    Returns
+    -------
+    dict
+        A draft-7 schema: shared parts are under ``definitions``, and a ``$ref`` has no siblings.
+    """
+    made = SystemDocument.model_json_schema(
+        by_alias=True, ref_template="#/definitions/{model}", schema_generator=_Generator
+    )
+    definitions = {_short(name): _draft_7(part) for name, part in sorted(made.pop("$defs").items())}
+    transition = definitions["Transition"]
+    transition["anyOf"] = [{"required": transition.pop("required")}, {"required": ["event"]}]
+    root = _draft_7(made)
+    reference = root["properties"]["reference"]
+    item = reference.pop("items")
+    root["properties"]["reference"] = {
+        "description": reference.pop("description"),
+        "examples": reference.pop("examples"),
+        "anyOf": [item, {"type": ["array", "null"], "items": item}],
+    }
+    root["anyOf"] = [{"required": ["modes", "initial"]}, {"required": ["automata", "system"]}]
+    return {"$schema": _DRAFT, **root, "definitions": definitions}
+
+
+def _short(name: str) -> str:
+    """The name of a definition: that of its class without its ending."""
+    return name.removesuffix("Document")
+
+
+def _draft_7(part: Any) -> Any:
+    """A part with what may be left empty allowed to be null, and siblings of ``$ref`` moved next to an ``allOf``."""
+    if isinstance(part, list):
+        return [_draft_7(item) for item in part]  # pyright: ignore[reportUnknownVariableType]
+    if not isinstance(part, dict):
+        return part
+    made: dict[str, Any] = {key: _draft_7(value) for key, value in part.items()}  # pyright: ignore[reportUnknownVariableType]
+    if made.get("type") in ("object", "array"):
+        made["type"] = [made["type"], "null"]
+    if made.get("default", ...) is None:
+        del made["default"]
+    made.pop("propertyNames", None)
+    for key in ("title", "$ref"):
+        if isinstance(made.get(key), str):
+            made[key] = _short(made[key])
+    if "$ref" in made and len(made) > 1:
+        made["allOf"] = [{"$ref": made.pop("$ref")}]
+    return made

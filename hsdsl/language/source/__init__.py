@@ -1,0 +1,25 @@
+"""YAML files as nodes with a line and a column: the core rules of YAML 1.2, capped before anything recurses."""
+
+from hsdsl.language.source.compose import compose
+from hsdsl.language.source.nodes import (
+    ABSENT,
+    Key,
+    Mapping,
+    Node,
+    NodePath,
+    Scalar,
+    Sequence,
+    SourceRange,
+    absent,
+    child,
+    children,
+    descend,
+    is_empty,
+    keys,
+)
+from hsdsl.language.source.text import Text, decode
+
+__all__ = [
+    "ABSENT", "Key", "Mapping", "Node", "NodePath", "Scalar", "Sequence", "SourceRange", "Text", "absent", "child",
+    "children", "compose", "decode", "descend", "is_empty", "keys",
+]  # fmt: skip

@@ -1,0 +1,189 @@
+"""YAML events to nodes.
+
+PyYAML's parser gives the events; its own composer and constructors are not used, for they round numbers, follow
+YAML 1.1 (`on` is true, `010` is eight), lose places and recurse before anything is counted.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from hsdsl.base import limits
+from hsdsl.base.errors import Diagnostic, Findings, ModelError, Span
+from hsdsl.base.names import INVISIBLE, normalised, shown
+from hsdsl.language.source.nodes import Key, Mapping, Node, Scalar, Sequence, SourceRange, absent
+from hsdsl.language.source.split_expressions import rejoined_entries, rejoined_items, spaced_entries
+from hsdsl.language.source.text import Text
+from hsdsl.language.source.yaml_errors import DEEPEST, TOO_DEEP, colon_missing, explain, quote, strange_blank
+
+_Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+def compose(text: Text, findings: Findings) -> Node:
+    """The root node of a document.
+
+    Faults that leave the document readable go to ``findings``.
+
+    Raises ModelError: when the text is not YAML, breaks a cap, or is empty.
+    """
+    parser = _Parser(text.content)
+    try:
+        return _Composer(text, parser, findings).document()
+    except yaml.MarkedYAMLError as error:
+        findings.add(explain(text, error))
+        findings.raise_if_any()
+        raise
+    finally:
+        parser.dispose()
+
+
+class _Composer:
+    """One reading of one stream of events."""
+
+    def __init__(self, text: Text, parser: Any, findings: Findings) -> None:
+        self.text = text
+        self.parser = parser
+        self.findings = findings
+        self.depth = 0
+        self.count = 0
+        self.limits = limits.current()
+        self.anchors: dict[str, tuple[Node | None, int, int]] = {}  # node (None while open), nodes, height
+        self.unused: dict[str, Any] = {}
+
+    def document(self) -> Node:
+        """The only document of the stream."""
+        self.parser.get_event()
+        if self.parser.check_event(yaml.StreamEndEvent):
+            span = Span(self.text.path, 1, 1)
+            self._stop(self.text.diagnostic("HS011", "the file is empty", span, "a model begins with 'hsdsl: 1'"))
+        self.parser.get_event()
+        root, _, _ = self.node()
+        self.parser.get_event()
+        if not self.parser.check_event(yaml.StreamEndEvent):
+            place = self._place(self.parser.peek_event())
+            self._stop(place.diagnostic("HS010", "a second document begins here", "a file holds one model"))
+        for name, event in self.unused.items():
+            message = f"`&{name}` is an anchor in YAML, and nothing refers to it"
+            self.findings.add(self._place(event).diagnostic("HS007", message, "quote this expression"))
+        return root
+
+    def node(self) -> tuple[Node, int, int]:
+        """The next node, how many nodes it has with aliases expanded, and its height."""
+        event = self.parser.get_event()
+        if isinstance(event, yaml.AliasEvent):
+            return self._alias(event)
+        anchor = event.anchor
+        if anchor is not None:
+            self.anchors[anchor] = (None, 0, 0)
+        if event.tag is not None:
+            self._tag(event)
+        self._grow(event, 1, 1)
+        if isinstance(event, yaml.ScalarEvent):
+            measured: tuple[Node, int, int] = (self._scalar(event), 1, 1)
+            if anchor is not None and measured[0].plain:  # pyright: ignore[reportAttributeAccessIssue]
+                self.unused[anchor] = event
+        else:
+            self.depth += 1
+            measured = self._sequence(event) if isinstance(event, yaml.SequenceStartEvent) else self._mapping(event)
+            self.depth -= 1
+        if anchor is not None:
+            self.anchors[anchor] = measured
+        return measured
+
+    def _scalar(self, event: Any) -> Scalar:
+        if event.tag is not None:
+            return absent(self._place(event))
+        hidden = INVISIBLE.search(event.value)
+        if hidden:
+            message = f"this escape is the invisible character U+{ord(hidden.group()):04X}"
+            self.findings.add(self._place(event).diagnostic("HS002", message, "remove it"))
+            return Scalar(INVISIBLE.sub("", event.value), False, self._place(event))
+        return Scalar(event.value, event.style is None or event.style == "", self._place(event))
+
+    def _sequence(self, event: Any) -> tuple[Node, int, int]:
+        items: list[Node] = []
+        nodes, height = 1, 0
+        while not self.parser.check_event(yaml.SequenceEndEvent):
+            item, more, tall = self.node()
+            items.append(item)
+            nodes, height = nodes + more, max(height, tall)
+        place = self._place(event, self.parser.get_event())
+        if event.flow_style:
+            items = rejoined_items(items, self.findings)
+        return Sequence(tuple(items), place), nodes, height + 1
+
+    def _mapping(self, event: Any) -> tuple[Node, int, int]:
+        entries: list[tuple[Node, Node]] = []
+        nodes, height = 1, 0
+        while not self.parser.check_event(yaml.MappingEndEvent):
+            key, more_keys, _ = self.node()
+            value, more, tall = self.node()
+            entries.append((key, value))
+            if len(entries) > self.limits.modes:
+                message = f"a mapping has at most {self.limits.modes:,} entries, and here one has more"
+                hint = f"allow more with --limit modes={self.limits.modes * 10}"
+                self._stop(key.place.diagnostic("HS016", message, hint))
+            nodes, height = nodes + more_keys + more, max(height, tall)
+        place = self._place(event, self.parser.get_event())
+        if event.flow_style:
+            entries = rejoined_entries(spaced_entries(entries, self.findings), self.findings)
+        return Mapping(self._unique(entries), place), nodes, height + 1
+
+    def _unique(self, entries: list[tuple[Node, Node]]) -> dict[str, tuple[Key, Node]]:
+        unique: dict[str, tuple[Key, Node]] = {}
+        for node, value in entries:
+            if not isinstance(node, Scalar) or node.kind == "null":
+                self.findings.add(node.place.diagnostic("HS013", "a key must be a word", "quote it if it is one"))
+                continue
+            if node.plain and node.value[:1].isspace() and (strange := strange_blank(self.text, node.place.span.line)):
+                self._stop(strange)
+            if node.plain and "{" in node.value and (missing := colon_missing(self.text, node.place.span.line)):
+                self._stop(missing)
+            key = Key.at(normalised(node.value), node.place)
+            if key in unique:
+                line = unique[key][0].place.span.line
+                message = f"the key '{shown(key)}' is here a second time; the first is on line {line}"
+                self.findings.add(node.place.diagnostic("HS008", message, "keep one of them"))
+                continue
+            unique[str(key)] = (key, value)
+        return unique
+
+    def _alias(self, event: Any) -> tuple[Node, int, int]:
+        name = event.anchor
+        place = self._place(event)
+        if name not in self.anchors:
+            message = f"`*{name}` is an alias in YAML, and no anchor `&{name}` is before it"
+            _, line, column = place.start
+            self._stop(place.diagnostic("HS007", message, quote(self.text.lines[line], column)))
+        node, nodes, height = self.anchors[name]
+        self.unused.pop(name, None)
+        if node is None:
+            self._stop(place.diagnostic("HS012", f"`*{name}` is inside the value that it repeats"))
+            raise AssertionError
+        self._grow(event, nodes, height)
+        return node, nodes, height
+
+    def _tag(self, event: Any) -> None:
+        message = f"`{shown(event.tag)}` is a tag in YAML, and models have no tags"
+        hint = "quote this expression; a condition is negated with `not`"
+        self.findings.add(self._place(event).diagnostic("HS009", message, hint))
+
+    def _grow(self, event: Any, nodes: int, height: int) -> None:
+        self.count += nodes
+        if self.count > self.limits.values:
+            message = f"the file has more than {self.limits.values:,} values once its aliases are expanded"
+            hint = f"keep data in CSV files, or allow more with --limit values={self.limits.values * 10}"
+            self._stop(self._place(event).diagnostic("HS015", message, hint))
+        if self.depth + height > DEEPEST:
+            self._stop(self._place(event).diagnostic("HS014", TOO_DEEP))
+
+    def _place(self, event: Any, last: Any = None) -> SourceRange:
+        start, end = event.start_mark, (last or event).end_mark
+        return SourceRange(self.text, (start.index, start.line, start.column), (end.index, end.line, end.column))
+
+    def _stop(self, diagnostic: Diagnostic) -> None:
+        self.findings.add(diagnostic)
+        self.findings.raise_if_any()
+        raise ModelError([diagnostic])

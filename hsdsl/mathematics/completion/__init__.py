@@ -1,0 +1,16 @@
+"""Completions of a system: flows for states that its own flows and resets hold on a guard.
+
+`contact` is motion along the guard of an edge that leads back to its own mode, the limit of ever faster transitions;
+`nearby` has what it depends on, `branches` the reset near rest where it has kinks, `counts` the states that only count.
+`coupled_contacts` is the flow along several guards, and `overlay` has the motions of all edges of a mode in one.
+`sliding` is motion on a surface that two modes press on. `text` writes these into a model file, with expressions by
+`printer` and places by `insertions`.
+"""
+
+from __future__ import annotations
+
+from hsdsl.mathematics.completion.contact import Contact, contact
+from hsdsl.mathematics.completion.overlay import Overlay, overlays
+from hsdsl.mathematics.completion.sliding import Sliding, slidings, with_sliding
+
+__all__ = ["Contact", "Overlay", "Sliding", "contact", "overlays", "slidings", "with_sliding"]

@@ -1,0 +1,248 @@
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportReturnType=false
+"""Motion along a guard: the flow that ever faster transitions of one edge tend to (M11).
+
+Near a point that a reset R keeps, flow for a short time and reset, over and over, is flow projected along the
+directions that R contracts onto the tangents of its fixed points: the constrained flow is the flow plus a multiple of
+the reset's directions that keeps R(x) = x.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import sympy as sp
+from sympy.core.relational import Relational
+
+from hsdsl.base.functions import sign
+from hsdsl.base.names import memory, without_memory
+from hsdsl.language.expression.derivatives import derivative, lie_derivative
+from hsdsl.language.system import TIME, Edge, Mode, Surface
+from hsdsl.mathematics.completion.branches import branched
+from hsdsl.mathematics.completion.counts import counts_of
+from hsdsl.mathematics.completion.nearby import (
+    NO_SLOPES,
+    Nearby,
+    Point,
+    Slopes,
+    cancelled,
+    fixed_point,
+    is_zero,
+    jacobian,
+    mode_of_part,
+    product,
+    rank,
+    symbols,
+    value_at,
+)
+from hsdsl.mathematics.completion.printer import text_of
+
+MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
+
+
+@dataclass(frozen=True)
+class Contact:
+    """Motion of a mode along the guard of one of its edges, ``edge`` by its number.
+
+    ``base`` is the mode. ``rows`` has the constrained flow of the states whose flow changes, by their numbers.
+    ``projection`` has what each of these rows takes away of the flow, as shares of the rates of time and states.
+    ``release`` is in the place of the edge in contact: its surface is the push of the flow on the guard, negative.
+    ``further`` edges, beyond the mode's own, are where an `if` may end; ``ends`` has the condition under which each
+    does; ``kept`` has those of its inequalities that motion along the guard keeps at their limits. ``push`` is the
+    derivative of ``last`` along the flow. That is the guard where ``order`` is 1, or else, where the guard's own
+    derivative ``rate`` is zero on it, that rate. ``landing`` is the state to which repeated resets lead from a state
+    near the guard. ``counts`` are the states that they count with, which keep their values. ``along`` is the direction
+    of a reset that takes all of ``last`` back, None of another one.
+    """
+
+    edge: int
+    order: int
+    base: Mode
+    rows: dict[int, sp.Expr]
+    projection: dict[int, dict[sp.Symbol, sp.Expr]]
+    release: Edge
+    further: tuple[Edge, ...]
+    rate: sp.Expr
+    push: sp.Expr
+    landing: tuple[sp.Expr, ...]
+    ends: tuple[sp.Basic, ...]
+    near: Nearby
+    counts: tuple[int, ...] = ()
+    kept: tuple[Relational, ...] = ()
+    along: dict[sp.Symbol, sp.Expr] | None = None
+
+    @property
+    def last(self) -> sp.Expr:
+        """What the flow along the guard keeps at zero and the push is the derivative of."""
+        return self.near.guard if self.order == 1 else self.rate
+
+    @property
+    def mode(self) -> Mode:
+        """The mode with the constrained flow."""
+        flow, texts, edges = list(self.base.flow), list(self.base.flow_texts), list(self.base.edges)
+        for i, row in self.rows.items():
+            flow[i], texts[i] = row, text_of(row)
+        edges[self.edge] = self.release
+        return replace(self.base, flow=tuple(flow), flow_texts=tuple(texts), edges=(*edges, *self.further))
+
+
+def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES) -> Contact | None:
+    """The motion along the guard of edge k of a mode; None where there is none, or where it is not unique.
+
+    ``numbers`` are states that are modes of parts, ``moving`` has the slopes of inputs.
+    """
+    edge = mode.edges[k]
+    if edge.target != mode.name or edge.target_states != mode.states or mode.derived or not fires(edge):
+        return None
+    kept = [i for i, name in enumerate(mode.states) if not without_memory([name])] if edge.of_event else []
+    near = Nearby(mode, edge, mode_of_part(edge, numbers), kept, moving=moving)
+    if any(mode.states[i] in numbers for i in near.changed):
+        return None
+    near = branched(near) if near.changed and near.is_small() else near
+    if near is None:
+        return None
+    near = near.without(counts) if (counts := (*kept, *counts_of(near))) else near
+    constrained = _constrained(near) if near.changed and near.is_small() else None
+    if constrained is None:
+        return None
+    rows, projection, landing, at = constrained
+    push, order = _push(near, at)
+    if order is None:
+        return None
+    release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
+                      reset=symbols(mode.states), reset_texts=mode.states)  # fmt: skip
+    atoms = sorted(edge.condition.atoms(Relational), key=str) if edge.condition is not None else ()
+    kept = tuple(atom for atom in atoms if _is_kept(_falling(atom), near, rows, push, at))
+    further, ends = _ends_of_condition(release, edge.condition, [atom for atom in atoms if atom not in kept])
+    rate = cancelled(near.along(near.guard))
+    along = _direction(near, near.guard if order == 1 else rate, projection, at)
+    return Contact(
+        k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts, kept,
+        along,
+    )  # fmt: skip
+
+
+def fires(edge: Edge) -> bool:
+    """Whether an edge is no event's, or makes an event where its condition turns true, however others are ranked."""
+    if not edge.of_event:
+        return True
+    names = {name.name for name in edge.condition.free_symbols} if edge.condition is not None else set[str]()
+    remembered = names - {*without_memory(names)}
+    return edge.name == edge.of_event[0] and remembered == {memory(edge.of_event[0], "armed")}
+
+
+def _constrained(near: Nearby):
+    """The rows of the flow that stays where a reset keeps the state, what they take away, the way there, and a point.
+
+    None where there is none.
+    """
+    if (at := fixed_point(near)) is None:
+        return None
+    moved, own = near.moved, [near.states[i] for i in near.changed]
+    among = list(dict.fromkeys((*near.among(sp.Tuple(*moved)), *own)))
+    slopes, own = jacobian(moved, among), jacobian(moved, own)
+    count = rank(own, at)
+    if not 0 < count <= MOST_DIRECTIONS or rank(slopes, at) > count:
+        return None
+    part, size = sp.eye(len(near.changed)), sp.trace(own)
+    for k in range(2, count + 1):  # Faddeev and LeVerrier: own part / size projects along the reset's directions
+        part = product(own, part) - size * sp.eye(len(near.changed))
+        size = sp.trace(product(own, part)) / k
+    if is_zero(size, at):  # the reset does not contract: a shear
+        return None
+    rows: dict[int, sp.Expr] = {}
+    part, away, sided = product(part, slopes), product(part, moved), _sided(own, count, at)
+    for i, correction in zip(near.changed, product(part, sp.Matrix(list(map(near.flow, among)))), strict=True):
+        flow = near.flow(near.states[i])
+        rows[i] = flow if is_zero(correction, at) else cancelled(flow - correction / size) * sided
+    projection: dict[int, dict[sp.Symbol, sp.Expr]] = {}
+    for i, shares in zip(near.changed, part.tolist(), strict=True):
+        found = {x: cancelled(share / size) for x, share in zip(among, shares, strict=True)}
+        projection[i] = {x: share for x, share in found.items() if share != 0}
+    landing = list[sp.Expr](near.states)
+    for i, correction in zip(near.changed, away, strict=True):
+        landing[i] = cancelled(landing[i] - correction / size)
+    return rows, projection, tuple(landing), at
+
+
+def _sided(own: sp.Matrix, count: int, at: Point) -> sp.Expr:
+    """1 where kinks of a reset are on the sides that a point is on; no value at those beyond which it keeps less.
+
+    That is on an edge of what it keeps, as of `max(u - v, 0)` at u = 0: no one flow is known there.
+    """
+    found = sp.S.One
+    for kink in sorted(own.atoms(sign), key=str):
+        here = sp.Integer(1 if value_at(kink.args[0], at) > 0 else -1)
+        if rank(own.xreplace({kink: -here}), at) > count:
+            found *= 2 / (kink**2 + here * kink)
+    return found
+
+
+def _direction(near: Nearby, last: sp.Expr, projection: dict[int, dict[sp.Symbol, sp.Expr]], at: Point):
+    """The direction of a reset that keeps the states where ``last`` is zero: by a state with a constant slope in that.
+
+    It is short where the projection is long, and divides by nothing that parameters may make zero.
+    """
+    slopes = {x: derivative(last, x) for x in near.among(last)}
+    if (x := next((x for x in near.own if x in slopes and slopes[x].is_Number and slopes[x] != 0), None)) is None:
+        return None
+    found = {y: derivative(change, x) for y, change in zip(near.own, near.moved, strict=True)}
+    if not (found := {y: sp.Mul.make_args(u) for y, u in found.items() if not is_zero(u, at)}):
+        return None
+    common = set.intersection(*map(set, found.values()))
+    along = {y: sp.Mul(*(factor for factor in u if factor not in common)) for y, u in found.items()}
+    whole = sp.Add(*(u * slopes[y] for y, u in along.items() if y in slopes))
+    for i, y in zip(near.changed, near.own, strict=True):
+        for z in {**slopes, **projection[i]}:
+            share = along.get(y, sp.S.Zero) * slopes.get(z, sp.S.Zero)
+            if not is_zero(projection[i].get(z, sp.S.Zero) * whole - share, at):
+                return None
+    return along
+
+
+def _push(near: Nearby, at: Point):
+    """The first derivative of a guard along the flow that the reset takes back, and which one it is."""
+    rate = near.along(near.guard)
+    moved = {near.states[i]: change for i, change in zip(near.changed, near.moved, strict=True)}
+    for order, value in ((1, near.guard), (2, rate)):
+        slopes = [(derivative(value, x), moved[x]) for x in near.among(value) if x in moved]
+        by = near.among(sp.Tuple(*(change for _, change in slopes)))
+        back = [sum(g * derivative(change, y) for g, change in slopes) for y in by if y != TIME]
+        if not all(is_zero(b, at) for b in back):
+            return cancelled(near.along(value)), order
+    return rate, None
+
+
+def _is_kept(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], push: sp.Expr, at: Point) -> bool:
+    """Whether a value is zero all along the guard, and rises where the flow presses: what it decides never ends."""
+    constrained = {near.states[i]: row for i, row in rows.items()}
+    stays = lie_derivative(value, {x: constrained[x] if x in constrained else near.flow(x) for x in near.among(value)})
+    presses = value_at(near.along(value), at) * value_at(push, at) > 0
+    return presses and is_zero(value, at) and is_zero(stays, at)
+
+
+def _falling(atom: Relational) -> sp.Expr:
+    """What is positive where an inequality holds."""
+    return atom.gts - atom.lts if hasattr(atom, "gts") else atom.lhs - atom.rhs
+
+
+def _ends_of_condition(release: Edge, condition: sp.Basic | None, ending: Sequence[Relational]):
+    """Edges where an `if` may end, one for each inequality ``ending`` and each way that counts, and when it does."""
+    edges: list[Edge] = []
+    ends: list[sp.Basic] = []
+    if condition is None:
+        return edges, ends
+    plain = isinstance(condition, Relational) or (
+        isinstance(condition, sp.And) and set(condition.args) == condition.atoms(Relational)
+    )
+    for atom in ending:
+        falling = _falling(atom)
+        for residual, beyond in ((-falling, sp.false),) if plain else ((-falling, sp.false), (falling, sp.true)):
+            edges.append(replace(release, surface=zero_surface(residual)))
+            ends.append(sp.Not(condition.xreplace({atom: beyond})))
+    return edges, ends
+
+
+def zero_surface(residual: sp.Expr) -> Surface:
+    """The surface where an expression rises through zero."""
+    return Surface(residual, sp.S.Zero, residual, f"{text_of(residual)} >= 0")

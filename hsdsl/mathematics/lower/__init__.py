@@ -1,0 +1,143 @@
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
+"""HybridSystem -> Program: every expression becomes a straight-line routine over numbered states, parameters and time.
+
+The pipeline is in :func:`lower`. `hsdsl.mathematics.program.ModeProgram` lists the routines. `switches` takes out what jumps with
+time, `names` numbers, `mode` has the routines of a mode, `constants` those of parameters alone, `slopes` those that
+only exports need. `routines` writes each by `printer`, in steps that `straight` and `sharing` make small; `elimination`
+solves linear equations in them.
+
+Besides, a mode has bounds on round-off (`terms`), an order of elimination for implicit steps (`ordering`), and a `tape`
+for Taylor coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Protocol, TypeVar
+
+import sympy as sp
+
+from hsdsl.base import limits
+from hsdsl.base.errors import TOO_LONG, Diagnostic, ModelError
+from hsdsl.language.expression.scope import slope_symbol
+from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import OutOfTime, timebox
+from hsdsl.language.system import HybridSystem, SampledInput
+from hsdsl.mathematics import program as lowered
+from hsdsl.mathematics.completion import Overlay, overlays
+from hsdsl.mathematics.completion.nearby import slopes_of_inputs
+from hsdsl.mathematics.lower.constants import (
+    constants,
+    initial_order,
+    initial_values,
+    lower_constants,
+    lower_expressions,
+)
+from hsdsl.mathematics.lower.deciding import idle_states
+from hsdsl.mathematics.lower.mode import LoweredMode, lowered_overlay
+from hsdsl.mathematics.lower.names import Names, number
+from hsdsl.mathematics.lower.routines import print_routines
+from hsdsl.mathematics.lower.switches import switch_programs, switch_routines, with_switches
+
+__all__ = ["in_turn", "lower", "lower_constants", "lower_expressions"]
+
+First = TypeVar("First")
+Second = TypeVar("Second")
+
+
+class Both(Protocol):
+    """What does two things and answers with both results."""
+
+    def __call__(self, first: Callable[[], First], second: Callable[[], Second], /) -> tuple[First, Second]: ...
+
+
+def in_turn(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
+    """Do one thing, then the other."""
+    return first(), second()
+
+
+def lower(system: HybridSystem, both: Both = in_turn) -> lowered.Program:
+    """Lower a system; the result needs no SymPy to run. Both halves of the work are done by ``both``.
+
+    Raises ModelError: the symbolic work takes longer than the limits allow.
+    """
+    try:
+        with deep_stack(), timebox(limits.current().seconds):
+            return _lower(system, both)
+    except OutOfTime:
+        message = "deriving and writing out the expressions of this model takes too long"
+        hint = "make parts of its expressions states, or allow more time with --limit seconds=600"
+        raise ModelError([Diagnostic(TOO_LONG, message, None, hint)]) from None
+
+
+def _lower(system: HybridSystem, both: Both) -> lowered.Program:
+    system, switches = with_switches(system)
+    names = number(system, switches.symbols)
+    experiment = system.experiment
+    indices = {mode.name: i for i, mode in enumerate(system.modes)}
+    found = overlays(system)
+    modes, contacts = _modes(system, found, names, indices, both)
+    completed = [mode for mode in system.modes if mode.slides] + [each.mode for each in found if each]
+    followed = [e for mode in completed for e in (*mode.flow, *(s.residual for s in mode.surfaces))]
+    sloped = set[sp.Basic]().union(*(e.free_symbols for e in followed)) if slopes_of_inputs(system) else set[sp.Basic]()
+    return lowered.Program(
+        path=system.path,
+        digest=system.digest,
+        title=system.title,
+        parameters=tuple(p.name for p in system.parameters),
+        inputs=tuple(_sampled(i, slope_symbol(i.name) in sloped) for i in system.inputs),
+        modes=modes,
+        contacts=contacts,
+        parts=system.parts,
+        outputs=system.outputs,
+        units=system.units,
+        initial_mode=indices[system.initial.mode],
+        initial_states=tuple(name for name, _ in system.initial.values),
+        scheme=experiment.scheme,
+        method=experiment.method,
+        completion=experiment.completion,
+        constants=print_routines(constants(system, names), ()),
+        switches=switch_programs(switches),
+        switching=print_routines(switch_routines(switches, names.shared), names.data),
+        scaled_states=tuple(name for name, _ in experiment.scale),
+        initial_order=initial_order(system),
+        initial_values=print_routines(initial_values(system, names), ()),
+        assumptions=system.assumptions,
+    )
+
+
+def _modes(system: HybridSystem, found: Sequence[Overlay | None], names: Names, indices: dict[str, int], both: Both):
+    """The modes, and those with motion along their guards."""
+    modes = [LoweredMode(mode, names) for mode in system.modes]
+    every = [*modes, *(lowered_overlay(each, names) for each in found if each)]
+    routines, others = both(lambda: [each.routines() for each in every], lambda: [each.others() for each in every])
+    programs = [each.program(indices, *pair) for each, *pair in zip(every, routines, others, strict=True)]
+    for i, idle in enumerate(idle_states(system)):
+        programs[i] = replace(programs[i], idle=idle)
+    last = len(modes)
+    for i, motion in enumerate(found):
+        if motion:
+            programs[i] = replace(programs[i], held=last, edges=_with_contacts(programs[i].edges, motion))
+            pairs = zip(programs[last].edges, motion.releases, strict=True)
+            edges = tuple(replace(edge, releases=number) for edge, number in pairs)
+            programs[last] = replace(programs[last], edges=edges)
+            last += 1
+    return tuple(programs[: len(modes)]), tuple(programs[len(modes) :])
+
+
+def _with_contacts(edges: tuple[lowered.EdgeProgram, ...], found: Overlay) -> tuple[lowered.EdgeProgram, ...]:
+    """A mode's edges with what a run knows of motion along their guards."""
+    whole = list(edges)
+    for i, motion in enumerate(found.contacts):
+        whole[motion.edge] = replace(
+            edges[motion.edge], contact=i, push_order=motion.order, counts=motion.counts,
+            branched=motion.near.impact is not None,
+        )  # fmt: skip
+    return tuple(whole)
+
+
+def _sampled(given: SampledInput, sloped: bool) -> lowered.SampledInput:
+    exact = not any(isinstance(v, sp.Basic) for v in given.times + given.values)
+    times, values = (given.times, given.values) if exact else (None, None)
+    return lowered.SampledInput(given.name, given.hold, times, values, sloped)
