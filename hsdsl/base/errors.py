@@ -1,4 +1,4 @@
-"""What hsdsl says when something is wrong: diagnostics with a place, and the exceptions that carry them."""
+"""Diagnostics with a place, and the exceptions that carry them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Span:
     line, column : int
         From 1.
     length : int
-        How many characters it covers.
+        The number of characters.
     """
 
     path: str
@@ -31,7 +31,7 @@ class Span:
 
 @dataclass(frozen=True, order=True)
 class Edit:
-    """A change of a text: the characters from ``start`` to ``end`` give way to ``replacement``."""
+    """A change of a text: ``replacement`` replaces the characters from ``start`` to ``end``."""
 
     start: int
     end: int
@@ -45,21 +45,21 @@ class Diagnostic:
     Attributes
     ----------
     code : str
-        That of an error (:data:`CODES`) or of a lint rule; `hsdsl explain CODE` prints its page.
+        The code of an error (:data:`CODES`) or of a lint rule; `hsdsl explain CODE` prints its page.
     message : str
         One sentence.
     span : Span or None
-        Its place; None where no single place is to blame.
+        Its place; None if no single place is at fault.
     hint : str or None
-        The right form, where that is known.
+        The right form, if it is known.
     text : str or None
         The line of the file.
     severity : {"error", "warning", "note"}
         An error makes the model unusable; warnings and notes come from lint rules.
     decided : {"symbolic", "interval", "sampled"} or None
-        Of a finding: by which proof.
+        The kind of proof of a finding.
     fix : tuple of Edit
-        Edits that remedy the finding without changing the model's meaning.
+        Edits that remedy the finding and keep the model's meaning.
     """
 
     code: str
@@ -104,7 +104,7 @@ class UsageError(Exception):
     Attributes
     ----------
     hint : str or None
-        What to write instead, where that is known.
+        What to write instead, if it is known.
     """
 
     def __init__(self, message: str, hint: str | None = None) -> None:
@@ -119,7 +119,7 @@ MOST_DIAGNOSTICS = 500
 
 @dataclass
 class Findings:
-    """The diagnostics of reading one file, gathered so that all are reported and not the first alone."""
+    """The diagnostics of one file, gathered so that all are reported, not only the first."""
 
     path: str = ""
     diagnostics: dict[Diagnostic, None] = field(default_factory=dict[Diagnostic, None])

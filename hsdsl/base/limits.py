@@ -16,7 +16,7 @@ from hsdsl.base.errors import UsageError
 @checks_methods
 @dataclass(frozen=True)
 class Limits:
-    """Caps on a model file, each checked before what it bounds is done.
+    """Caps on a model file; each is checked before the bounded work begins.
 
     Attributes
     ----------
@@ -29,13 +29,13 @@ class Limits:
     seconds : float
         Processor time for the symbolic work on the whole file, once to read it and once to lower it.
     switches : int
-        How often each floor, sign, abs, min, max and atan2 of time may switch in a run.
+        Switches of each floor, sign, abs, min, max and atan2 of time in a run.
     memory : int
-        Bytes of the rows that a run keeps, and of samples.
+        Bytes of the rows and samples that a run keeps.
     compile : float
-        Seconds for the C compiler to make one library; on Linux of processor time while it runs.
+        Seconds of the C compiler for one library; on Linux its processor time.
     folders : tuple of Path
-        Where data files may lie besides the model's own folder.
+        Folders that may contain data files, besides the model's own folder.
     """
 
     bytes: int = 1 << 20

@@ -227,7 +227,9 @@ def headings(page: Path) -> set[str]:
 
 def test_reasons_of_verdicts_on_their_page_are_those_of_the_code():
     page = (ROOT / "docs" / "how-to" / "unknown.md").read_text(encoding="utf-8")
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "hsdsl" / "engine" / "simulate").rglob("*.py")]
+    trees = [
+        ast.parse(path.read_text(encoding="utf-8")) for path in (ROOT / "hsdsl" / "engine" / "simulate").rglob("*.py")
+    ]
     code = "\n".join(
         node.value
         for tree in trees

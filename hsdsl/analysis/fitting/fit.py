@@ -1,4 +1,4 @@
-"""What a fit found: values with their covariance, what is left over, and where it is not smooth."""
+"""The result of a fit: values with their covariance, residuals, and places that are not smooth."""
 
 from __future__ import annotations
 
@@ -21,25 +21,25 @@ from hsdsl.engine.execution import Array, Execution
 @checks_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class Fit:
-    """Values of parameters and initial states that measurements agree with best.
+    """The values of parameters and initial states that agree best with measurements.
 
     Attributes
     ----------
     values : dict
-        By name, as they were given in ``wrt``.
+        The values by name, as given in ``wrt``.
     covariance : array, shape (n, n)
-        Of the values in their order: from the standard deviations of the measurements where these were given, else from
-        what is left over. Infinite where the measurements do not determine a value.
+        The covariance of the values in their order. It follows from the standard deviations of the measurements, if
+        these were given, or else from the residuals. It is infinite if the measurements do not determine a value.
     residuals : dict of array
-        What the run is above each measurement, by column; NaN where nothing was measured, or the run has ended.
+        The run minus each measurement, by column; NaN if nothing was measured, or the run has ended.
     deviation : float
-        The root of the weighted mean square of residuals, over the degrees of freedom.
+        The root of the weighted sum of squared residuals per degree of freedom.
     success : bool
-        Whether the method came to a minimum; ``message`` says how it ended.
+        Whether the method reached a minimum; ``message`` says how it ended.
     at_bound : tuple of str
         The values that are at a bound of the file.
     nonsmooth : tuple of str
-        What is not smooth at the values found, so that the covariance may not hold, and what was met on the way.
+        The places without a derivative, at the values found and during the search; the covariance may be wrong there.
     execution : Execution
         The run with these values.
     units : mapping
@@ -80,7 +80,7 @@ class Fit:
         return dict(zip(self.values, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     def as_json(self) -> dict[str, Any]:
-        """The object of `fit --json`; what is not determined is null."""
+        """Return the object of `fit --json`; values that are not determined are null."""
         names = ("values", "deviations", "covariance", "deviation", "success", "message", "evaluations", "at_bound")
         known = {name: getattr(self, name) for name in names}
         return plain(known | {"measurements": self.measured.count, "nonsmooth": self.nonsmooth})

@@ -1,4 +1,4 @@
-"""Every distance comes as an interval: what it is at least, what it is at most, and how far that is proved."""
+"""Distances as intervals, with a status that says how far both ends are proved."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class EndsCross(RuntimeError):
 
 @dataclass(frozen=True)
 class Interval:
-    """A distance known to lie between ``lower`` and ``upper``, both included; ``inf`` where there is no path.
+    """A distance between ``lower`` and ``upper``, both included; ``inf`` if there is no path.
 
-    Status ``certified``: both ends are proved. ``up to N hops``: so are they, but a path with more passages may be
-    shorter than the upper end. ``sampled``: something was evaluated in points only. ``searched``: the upper end is the
-    best path of local solves; the lower end is proved.
+    Status ``certified``: both ends are proved. ``up to N hops``: both ends are proved, but a path with more passages
+    may be shorter than the upper end. ``sampled``: a part was evaluated only at points. ``searched``: the upper end is
+    the best path of local solves; the lower end is proved.
     """
 
     lower: float
@@ -44,12 +44,12 @@ class Interval:
 
     @property
     def width(self) -> float:
-        """Upper less lower; 0 where both are infinite."""
+        """The upper end minus the lower end; 0 if both are infinite."""
         return 0.0 if self.lower == self.upper else self.upper - self.lower
 
     @property
     def middle(self) -> float:
-        """Middle of the interval; not a number when only the upper end is infinite."""
+        """The middle of the interval; not-a-number if only the upper end is infinite."""
         if self.lower == self.upper:
             return self.lower
         return nan if self.upper == inf else (self.lower + self.upper) / 2

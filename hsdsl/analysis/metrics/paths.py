@@ -20,9 +20,10 @@ CLOSED = 1e-9  # relative: such a gap counts as none
 @checks_methods
 @dataclass(frozen=True)
 class SpacePoint:
-    """A point: of a mode's domain or, with ``edge``, of that edge's strip at a depth from 0 to the relaxation.
+    """A point of a mode's domain, or, with ``edge``, of that edge's strip at a depth from 0 to the relaxation.
 
-    ``x`` are the mode's states in file order; in a strip, the guard point's. ``t`` where time is a coordinate.
+    ``x`` has the mode's states in file order; in a strip, those of the guard point. ``t`` is the time, if it is a
+    coordinate.
     """
 
     mode: str
@@ -45,7 +46,7 @@ class PathPiece:
 
 @dataclass(frozen=True)
 class PointDistance:
-    """A distance with the path that attains its upper end, and what is certified of it, in words."""
+    """A distance with the path that attains its upper end, and a sentence about its certified part."""
 
     interval: Interval
     path: tuple[PathPiece, ...]
@@ -53,7 +54,7 @@ class PointDistance:
 
     @property
     def status(self) -> str:
-        """What the interval rests on, see :class:`Interval`."""
+        """The status of the interval (see :class:`Interval`)."""
         return self.interval.status
 
     @property

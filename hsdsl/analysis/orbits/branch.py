@@ -1,4 +1,4 @@
-"""A branch of orbits over a parameter, as it is reported."""
+"""A branch of orbits over a parameter, in the form of the report."""
 
 from __future__ import annotations
 
@@ -28,17 +28,18 @@ class Branch:
     ----------
     section, parameter : str
     states : tuple of str
-        The names of the states of points, right after the section's transition.
+        The names of the states of points, which are those right after the section's transition.
     points : tuple of Point
-        In the order of the branch: ``parameter``, ``state``, ``phase``, ``period``, ``multipliers``, ``unstable``.
+        The points in the order of the branch: ``parameter``, ``state``, ``phase``, ``period``, ``multipliers``,
+        ``unstable``.
     bifurcations : tuple of Bifurcation
         ``kind`` (fold, branch point, flip, torus or grazing), ``parameter``, ``state``.
     stable : list of (float, float)
-        The ranges of the parameter of its stable pieces, in the order of the branch.
+        The parameter ranges of the stable pieces, in the order of the branch.
     ends : tuple of str
-        Why the branch ends on either side.
+        The reasons of both ends of the branch.
     first : Orbit
-        The orbit that it was followed from.
+        The orbit at which the branch was started.
     """
 
     section: str
@@ -50,7 +51,7 @@ class Branch:
     first: Orbit = field(repr=False)
 
     def as_json(self) -> dict[str, Any]:
-        """The object of `orbit --continue --json`."""
+        """Return the object of `orbit --continue --json`."""
         points = [
             {
                 "parameter": p.parameter,
@@ -80,7 +81,7 @@ class Branch:
     def knots(self) -> list[tuple[float, Array, bool | None]]:
         """The points and, between them, the bifurcations: the parameter, the state, and whether the orbit is stable.
 
-        A bifurcation ends what is stable on one side of it, so it is neither.
+        A bifurcation ends a stable piece on one side, so it is neither stable nor unstable.
         """
         found: list[tuple[float, Array, bool | None]] = []
         for b in self.bifurcations:
@@ -93,7 +94,7 @@ class Branch:
 
     @property
     def stable(self) -> list[tuple[float, float]]:
-        """The ranges of the parameter of the pieces that are stable, in the order of the branch."""
+        """The parameter ranges of the stable pieces, in the order of the branch."""
         found: list[tuple[float, float]] = []
         knots = self.knots
         for stable, part in groupby(range(len(knots)), key=lambda k: knots[k][2]):
@@ -120,7 +121,7 @@ class Branch:
             yield f"  stable from {self.parameter} = {number(low, 10)} to {number(high, 10)}"
 
     def plot(self, path: str | os.PathLike[str]) -> None:
-        """Draw the state that varies most over the parameter to a .png or .svg file, with its bifurcations."""
+        """Draw the state that varies most over the parameter, with its bifurcations, to a .png or .svg file."""
         from hsdsl.analysis.plot.analyses import plot_branch
         from hsdsl.analysis.plot.panel import label
         from hsdsl.engine.simulate.verdict.run_view import RunView

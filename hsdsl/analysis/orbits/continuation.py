@@ -1,4 +1,4 @@
-"""A branch of periodic orbits over a parameter, followed by its arc length, with its bifurcations.
+"""Continuation of periodic orbits in a parameter by arc length, with bifurcations.
 
 With u the point, the phase and the parameter, each relative to its size, an orbit solves G(u) = 0, one equation fewer
 than unknowns. From an orbit a step goes along the tangent, and Newton's method with the derivatives of the return map
@@ -41,7 +41,7 @@ CIRCLE = "the branch is closed"
 
 @dataclass(frozen=True)
 class Solution:
-    """An orbit of the branch: its unknowns, the last passage, and the tangent of the branch there."""
+    """An orbit of the branch: its unknowns, the last passage, and the tangent of the branch."""
 
     unknowns: Array
     passage: Return
@@ -50,7 +50,9 @@ class Solution:
 
 @dataclass(frozen=True)
 class Point:
-    """An orbit of a branch: the parameter, state, period and multipliers, and how many of these leave the circle."""
+    """An orbit of a branch: its parameter, state, period, multipliers, and the number of multipliers outside the unit
+    circle.
+    """
 
     parameter: float
     state: Array
@@ -66,9 +68,9 @@ class Point:
 
 @dataclass(frozen=True)
 class Bifurcation:
-    """A place of a branch where orbits change: its kind (the table above), the parameter, and the state there.
+    """A point of a branch at which orbits change: its kind (the table above), the parameter, and the state.
 
-    It lies between the points ``after`` and the next one of the branch.
+    It is between the point with the index ``after`` and the next point of the branch.
     """
 
     kind: str

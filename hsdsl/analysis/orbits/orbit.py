@@ -1,4 +1,4 @@
-"""A periodic orbit: where it crosses its section, its period, its multipliers, and whether it is stable."""
+"""A periodic orbit: its state at the section, its period, its multipliers and its stability."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ class Orbit:
     Attributes
     ----------
     section : str
-        The transition that it is cut at; ``laps`` of them close it.
+        The transition that is the section; the orbit closes after ``laps`` of them.
     mode, state : str, dict
         The mode and the state right after that transition.
     phase : float or None
         The time of the state within the period of the forcing; None for a system that does not depend on time.
     period : float
-        How long it takes.
+        The duration of one period.
     multipliers : array, complex
-        Floquet multipliers, the largest first: of an autonomous system without the 1 along the orbit, and without those
-        of drifting states.
+        The Floquet multipliers, the largest first, without those of drifting states and, for an autonomous system,
+        without the 1 along the orbit.
     drift : dict
-        How far states go in a period that nothing depends on, such as the place of a runner.
+        The change in a period of states on which nothing depends, such as the position of a runner.
     residual : float
-        How far it is from closing, relative to the sizes of the states.
+        The gap between start and end, relative to the sizes of the states.
     verdict : {"stable", "unstable", "undecided"}
-        By the multipliers; ``reasons`` say more.
+        The stability by the multipliers; ``reasons`` has details.
     sides : dict
-        Where transitions are simultaneous and their order matters: the multipliers for each edge that goes first.
+        The multipliers for each edge that goes first, if transitions are simultaneous and their order matters.
     """
 
     section: str
@@ -62,11 +62,11 @@ class Orbit:
 
     @property
     def execution(self) -> Execution:
-        """The run over one period, with derivatives as further states."""
+        """The run over one period, with the derivatives as further states."""
         return self.sensitivity.execution
 
     def as_json(self) -> dict[str, Any]:
-        """The object of `orbit --json`."""
+        """Return the object of `orbit --json`."""
         from hsdsl.analysis.orbits.summary import as_json
 
         return as_json(self)
@@ -100,7 +100,7 @@ class Orbit:
 
 
 def multipliers_of(found: Closed, slopes: Array, forced: bool) -> Array:
-    """The eigenvalues of a return map, the largest first, without the zero along the flow and those of shifts.
+    """Return the eigenvalues of a return map, the largest first, without the zero along the flow and those of shifts.
 
     The map does not depend on where along the flow it begins: that direction has the eigenvalue zero.
     """
@@ -112,7 +112,7 @@ def multipliers_of(found: Closed, slopes: Array, forced: bool) -> Array:
 
 
 def return_matrix(slopes: Array, forced: bool) -> Array:
-    """The derivatives of where a lap leads, states and phase, by where it begins."""
+    """Return the derivatives of the state and phase at the end of a lap with respect to those at its beginning."""
     n = len(slopes) - 1
     matrix = slopes[:, : n + 1].copy()
     if forced:
@@ -121,7 +121,7 @@ def return_matrix(slopes: Array, forced: bool) -> Array:
 
 
 def returning(found: Closed, forced: bool) -> dict[str, dict[str, float]]:
-    """The directions in which executions nearby are apart after a lap, by what moves them a lap before.
+    """Return the directions of nearby executions after a lap, for each direction a lap before.
 
     Off a surface that a lap ends on none is, and where a lap ends in one point there is none.
     """
@@ -136,7 +136,7 @@ def returning(found: Closed, forced: bool) -> dict[str, dict[str, float]]:
 
 
 def judged(multipliers: Array, error: float) -> tuple[str, str]:
-    """The verdict of multipliers that are known to an error, and why."""
+    """Return the verdict of multipliers that are known up to an error, with its reasons."""
     if not len(multipliers):
         return "stable", "the section has one point"
     largest, margin = float(np.abs(multipliers[0])), max(LEAST_MARGIN, 10 * error)

@@ -1,8 +1,8 @@
-"""Orbital stability, tested by runs from nearby: do their distances in the quotient metric fall with the radius?
+"""Orbital stability, tested by nearby runs: do their distances in the quotient metric fall with the radius?
 
-An execution is orbitally stable where the executions of nearby initial points and inputs come as close as one likes,
-in the distance of curves that passes through guards (Burden et al. 2013, Section III). Runs can only sample that: the
-verdict says what was seen at a few radii, in a few directions.
+An execution is orbitally stable if the executions of nearby initial points and inputs come arbitrarily close in the
+quotient metric of curves (Burden et al. 2013, Section III). Runs can only sample this property: the verdict is about a
+few radii and a few directions.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ FALLS, STAYS = 0.4, 0.1  # exponents of the radius: from the one on distances fa
 
 @dataclass(frozen=True)
 class Nearby:
-    """A run from nearby: the shift of each name at a radius, its distance as an interval, and its transitions."""
+    """A nearby run: the shift of each name at a radius, its distance as an interval, and its transitions."""
 
     radius: float
     shift: dict[str, float]
@@ -36,17 +36,17 @@ class Nearby:
 @checks_methods
 @dataclass(frozen=True, eq=False)
 class OrbitalStability:
-    """What runs from nearby show of an execution.
+    """The orbital stability of an execution, as sampled by nearby runs.
 
     Attributes
     ----------
     verdict : {"stable", "not stable", "undecided"}
-        Whether distances fall with the radius, as far as was sampled: ``stable`` where their upper ends do, ``not
-        stable`` where their lower ends do not.
+        Whether the sampled distances fall with the radius: ``stable`` if their upper ends do, ``not stable`` if their
+        lower ends do not.
     sentence : str
         The verdict in words.
     exponent : float
-        The power of the radius that the largest distance falls with: 1 for a smooth execution, 1/2 at grazing.
+        The power of the radius with which the largest distance falls: 1 for a smooth execution, 1/2 at grazing.
     runs : tuple of Nearby
     """
 
@@ -58,7 +58,7 @@ class OrbitalStability:
     title: str = field(repr=False)
 
     def as_json(self) -> dict[str, Any]:
-        """The object of `sensitivity --stability --json`."""
+        """Return the object of `sensitivity --stability --json`."""
         return plain(
             {
                 "wrt": self.wrt,
@@ -71,7 +71,7 @@ class OrbitalStability:
         )
 
     def plot(self, path: str | os.PathLike[str]) -> None:
-        """Draw distances over radii to a .png or .svg file, a colour for each sequence of transitions."""
+        """Draw distances over radii to a .png or .svg file, with a colour for each sequence of transitions."""
         from hsdsl.analysis.plot.analyses import plot_nearby
 
         points = [(run.radius, run.upper, run.transitions) for run in self.runs]

@@ -1,4 +1,4 @@
-"""The derivatives of an execution: read off the execution of an augmented system, as numbers by name."""
+"""The derivatives of an execution, from the execution of an augmented system, as numbers by name."""
 
 from __future__ import annotations
 
@@ -57,10 +57,10 @@ class EndSlopes:
 
 @dataclass(frozen=True)
 class SampleSlopes:
-    """States and outputs at times, and their derivatives.
+    """The states and outputs at times, and their derivatives.
 
-    ``values[name]`` has shape (n,), and ``slopes[name]`` (n, number of what they are taken by), NaN where the mode has
-    no such state or the derivative does not exist.
+    ``values[name]`` has shape (n,), and ``slopes[name]`` has shape (n, number of names in ``wrt``). Both are NaN if the
+    mode has no such state; a derivative that does not exist is NaN as well.
     """
 
     times: Array
@@ -88,20 +88,20 @@ class Setting:
 @checks_methods
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """The derivatives of an execution by parameters and initial states.
+    """The derivatives of an execution with respect to parameters and initial states.
 
-    They are those of what a run records: where the time of a transition moves, the states before and after it are
-    followed to the new time, and so is the end where ``until`` depends on a parameter. Samples are followed where their
-    times do. A derivative that does not exist is NaN; :attr:`reasons` say why.
+    The derivatives are those of the recorded quantities. Those of the states before and after a transition include the
+    change of its time. So do those at the end, if ``until`` depends on a parameter, and those at samples whose times
+    do. A derivative that does not exist is NaN; :attr:`reasons` say why.
 
     Attributes
     ----------
     wrt : tuple of str
-        What the derivatives are taken by, as ``c`` or ``initial.v``.
+        The names to differentiate with respect to, as ``c`` or ``initial.v``.
     execution : Execution
-        The run of the system with the derivatives as states.
+        The run of the augmented system, with the derivatives as states.
     first : tuple of str
-        Edges that go first in ties: the derivatives are those of the executions on that side.
+        The edges that go first in ties; the derivatives are those of the executions on that side.
     """
 
     wrt: tuple[str, ...]
@@ -122,23 +122,23 @@ class Sensitivity:
 
     @property
     def verdict(self) -> Verdict:
-        """What can be said about the execution; where it is not ``holds`` a derivative may not exist."""
+        """The verdict of the execution; if it is not ``holds``, a derivative may not exist."""
         return self._whole.verdict
 
     @cached_property
     def ties(self) -> tuple[Tie, ...]:
-        """The instants where the order of transitions may matter, with the derivatives of each order."""
+        """The instants at which the order of transitions may matter, with the derivatives of each order."""
         moving = [any(row) for row in zip(*self.setting.parameters.values(), strict=True)]
         return tuple(ties(RunView(self.setting.augmented, self.execution), self.wrt, moving))
 
     @cached_property
     def sides(self) -> dict[str, Sensitivity]:
-        """The derivatives of the executions on either side of a tie, by the edge that goes first in all of them."""
+        """The derivatives of the executions on each side of a tie, keyed by the edge that goes first."""
         firsts = dict.fromkeys(order.first for tie in self._parting for order in tie.orders)
         return {first: self.one_sided((*self.first, first)) for first in firsts}
 
     def as_made(self) -> Sensitivity:
-        """The derivatives of the executions on which tied transitions go in the order of this run."""
+        """Return the derivatives of the executions whose tied transitions have the order of this run."""
         made = self.execution.transitions
         return replace(self, first=(*self.first, *(made[tie.index].edge for tie in self._parting)))
 
@@ -150,11 +150,11 @@ class Sensitivity:
 
     @cached_property
     def breaks(self) -> tuple[tuple[Any, str], ...]:
-        """Times from which on no derivative exists, and why; the verdict of the run has not been looked at."""
+        """The times after which no derivative exists, with the reasons; the verdict of the run is not used."""
         return self.breaks_along({by: {by: 1.0} for by in self.wrt})
 
     def breaks_along(self, ways: Mapping[str, Slopes]) -> tuple[tuple[Any, str], ...]:
-        """The same where only some directions count, each with its components by what derivatives are taken by."""
+        """Return the same for some directions only, each given by its components along the names of :attr:`wrt`."""
         found = [(tie.time, str(tie.reason)) for tie in self._parting]
         found += self._landings(ways)
         stop = self.execution.stop
@@ -197,9 +197,11 @@ class Sensitivity:
 
     @cached_property
     def starts(self) -> tuple[str, ...]:
-        """Surfaces that the run starts on: the derivatives are those of the executions that start inside the domain.
+        """The surfaces on which the run starts; the derivatives are those of the executions that start inside the
+        domain.
 
-        Beyond a guard an execution makes its transition at once, so one that the run crosses at once counts as well.
+        Beyond a guard an execution makes its transition at once, so a guard that the run crosses at once counts as
+        well.
         """
         run, arc = self.execution, self.execution.arcs[0]
         at = dict(zip(arc.states, run.values[arc.first].tolist(), strict=False))
@@ -213,7 +215,7 @@ class Sensitivity:
 
     @cached_property
     def touches(self) -> tuple[str, ...]:
-        """Guards that the run touches within its error, without a transition: no derivative exists from there on."""
+        """The guards that the run grazes within its error, without a transition; no derivative exists after that."""
         return tuple(reason for _, reason in touched(RunView(self.setting.plain, self._whole)))
 
     @cached_property
@@ -225,7 +227,9 @@ class Sensitivity:
 
     @property
     def exists(self) -> bool | None:
-        """Whether the derivatives exist; None where that is not known, as something of the run could not be decided."""
+        """Whether the derivatives exist; None if this is unknown, since a question about the run could not be
+        decided.
+        """
         if self.breaks or self.starts or self._smooth.theorem == "left":
             return False
         if self._smooth.theorem == "unknown" and self.touches:
@@ -234,7 +238,7 @@ class Sensitivity:
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """Why they do not exist, or are not known to."""
+        """The reasons why the derivatives do not exist, or are not known to exist."""
         own = (*self.starts, *(reason for _, reason in self.breaks))
         further = () if self._smooth.theorem == "holds" else (*self.touches, *self._smooth.reasons)
         return (*own, *(reason for reason in further if not any(reason in told for told in own)))
@@ -245,7 +249,7 @@ class Sensitivity:
 
     @cached_property
     def final(self) -> EndSlopes:
-        """The derivatives of the end of the run; where it leaves its domain there are none."""
+        """The derivatives of the end of the run; there are none if the run leaves its domain."""
         run, end = self.execution, self.execution.final
         by_event = run.stop.reason == "final" and bool(run.transitions)
         time = self._shifts(end.state) if by_event else self.setting.span
@@ -267,7 +271,7 @@ class Sensitivity:
         return tuple(map(self.transition, range(len(self.execution.transitions))))
 
     def transition(self, index: int) -> TransitionSlopes:
-        """The derivatives of one transition."""
+        """Return the derivatives of one transition."""
         made = self.execution.transitions[index]
         after, exists = made.after or {}, self._exists_at(made.index)
         time = self._shifts(after)
@@ -337,13 +341,12 @@ class Sensitivity:
         return {by: values[derivative_name(y, by)] + (values[rate] * time[by] if time[by] else 0) for by in self.wrt}
 
     def sample(self, times: Any = None) -> SampleSlopes:
-        """States, outputs and their derivatives at times.
+        """Return states, outputs and their derivatives at times.
 
         Parameters
         ----------
         times : numbers, optional
-            Times within the run, which stay where they are; left out, those of the run's ``samples``, or else of its
-            steps.
+            Fixed times within the run; by default those of the run's ``samples``, or else of its steps.
         """
         run, moving = self.execution, self.setting.samples if times is None else ()
         given = self.setting.plain.settings.samples if times is None else None

@@ -1,4 +1,4 @@
-"""Instants at which a derivative depends on the order of transitions: what each order leads to.
+"""Instants at which a derivative depends on the order of transitions, with the result of each order.
 
 Where several guards are reached together, a nearby execution reaches one of them first; which one depends on the way
 in which it differs. Each of them is taken first in turn, then what fires at that instant. Where all orders lead to the
@@ -45,7 +45,9 @@ class Order:
 
 @dataclass(frozen=True)
 class Tie:
-    """An instant with several orders. ``reason`` says why no derivative exists there; None where all orders agree."""
+    """An instant with several orders. ``reason`` says why no derivative exists there; it is None if all orders
+    agree.
+    """
 
     time: Number
     index: int

@@ -67,7 +67,7 @@ def save_npz(execution: Execution, file: BinaryIO) -> None:
 
 @checks_arguments
 def load(path: str | os.PathLike[str]) -> Execution:
-    """Read an execution from an ``.npz`` file that :meth:`hsdsl.engine.execution.Execution.save` wrote.
+    """Read an execution from an ``.npz`` file of :meth:`hsdsl.engine.execution.Execution.save`.
 
     Raises UsageError: when the file cannot be read, is damaged, is of a later version, or holds something else.
     """

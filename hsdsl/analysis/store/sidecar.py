@@ -36,7 +36,7 @@ def sidecar_of(table: Path) -> Path:
 
 @checks_arguments
 def read_sidecar(table: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read what the sidecar of a table says, if it is that table's.
+    """Read the sidecar of a table, if it belongs to that table.
 
     Raises UsageError: there is none, it is damaged, or the table was changed or replaced since.
     """

@@ -1,7 +1,7 @@
 # pyright: reportUnknownMemberType=false, reportUnknownVariableType=false, reportUnknownArgumentType=false
-"""A sweep's dataset: a folder with a manifest, and a Parquet file for each chunk of rows that was run.
+"""A sweep's dataset: a folder with a manifest, and a Parquet file for each finished chunk of rows.
 
-Each file appears whole, under its final name, and carries the tag of its manifest. Its pages have checksums.
+Each file appears complete, under its final name, and has the tag of its manifest. Its pages have checksums.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from hsdsl.engine.execution import Array
 @checks_methods
 @dataclass(frozen=True, eq=False)
 class Sweep:
-    """The dataset in a folder, of all rows or of those that have been run.
+    """The dataset of a sweep in a folder, with all rows or with the finished ones.
 
-    Any reader of Parquet opens the folder. Columns are listed in `hsdsl.analysis.sweep.rows`.
+    Every Parquet reader opens the folder. `hsdsl.analysis.sweep.rows` lists the columns.
     """
 
     folder: Path
@@ -42,7 +42,7 @@ class Sweep:
         return f"<Sweep of {of} in {self.folder}: {self.done:,} of {self.rows:,} rows>"
 
     def _repr_html_(self) -> str:
-        """Show what was varied and how the runs ended in notebooks."""
+        """Show the varied values and the ends of the runs in notebooks."""
         from hsdsl.analysis.plot.notebook import lines_html
         from hsdsl.analysis.sweep.summary import summary
 
@@ -50,34 +50,34 @@ class Sweep:
 
     @property
     def rows(self) -> int:
-        """How many rows it has when it is complete."""
+        """The number of rows of the complete dataset."""
         return self.manifest.variation.rows
 
     @cached_property
     def chunks(self) -> dict[int, Path]:
-        """The files there are, by the number of the chunk."""
+        """The existing files, by the number of the chunk."""
         there = {path.name: path for path in self.folder.iterdir()}
         named = ((chunk, path_of(self.folder, chunk).name) for chunk in range(self.manifest.chunks))
         return {chunk: there[name] for chunk, name in named if name in there}
 
     @property
     def done(self) -> int:
-        """How many rows there are."""
+        """The number of finished rows."""
         spans = (self.manifest.rows_of(chunk) for chunk in self.chunks)
         return sum(last - first for first, last in spans)
 
     @property
     def complete(self) -> bool:
-        """Whether all rows are there."""
+        """Whether all rows are finished."""
         return self.done == self.rows
 
     @property
     def columns(self) -> list[str]:
-        """The names of its columns."""
+        """The names of the columns."""
         return list(schema(self.manifest).names)
 
     def batches(self, columns: Sequence[str] | None = None) -> Iterator[Any]:
-        """Read the rows that there are, a chunk at a time, in their order.
+        """Read the finished rows in their order, one chunk at a time.
 
         Raises UsageError: no such column, or a file that is damaged.
         """
@@ -93,7 +93,7 @@ class Sweep:
                 ) from None
 
     def table(self, columns: Sequence[str] | None = None) -> Any:
-        """Read it as one Arrow table."""
+        """Read the dataset as one Arrow table."""
         arrow, tables = library(), list(self.batches(columns))
         if tables:
             return arrow.concat_tables(tables)
@@ -101,17 +101,17 @@ class Sweep:
         return empty if columns is None else empty.select(list(columns))
 
     def to_pandas(self, columns: Sequence[str] | None = None) -> Any:
-        """Read it as a pandas DataFrame."""
+        """Read the dataset as a pandas DataFrame."""
         return self.table(columns).to_pandas()
 
     def __getitem__(self, name: str) -> Array:
-        """The values of a column that has no lists."""
+        """Return the values of a column without lists."""
         column = self.table([column_of(name) if name in self.manifest.variation.names else name])
         return column.column(0).to_numpy()
 
     @cached_property
     def reasons(self) -> dict[str, int]:
-        """How many runs ended for which reason."""
+        """The number of runs for each reason of the end."""
         counts = Counter[str]()
         for table in self.batches(["stop"]):
             counts.update(table.column(0).to_pylist())
@@ -119,7 +119,7 @@ class Sweep:
 
     @cached_property
     def warning_counts(self) -> dict[str, int]:
-        """How many runs have which warning, by its code."""
+        """The number of runs for each code of a warning."""
         counts = Counter[str]()
         for table in self.batches(["warnings"] if "warnings" in self.columns else []):
             counts.update(
@@ -130,18 +130,20 @@ class Sweep:
     def plot(
         self, path: str | os.PathLike[str], of: str | None = None, *, tail: float = 0.5, over: str | None = None
     ) -> None:
-        """Draw a column over what varies, to a .png or .svg file: a curve, a map, or a bifurcation diagram.
+        """Draw a column over the varied names to a .png or .svg file: a curve, a map, or a bifurcation diagram.
 
         Parameters
         ----------
         path : path
         of : str, optional
-            A column; one of lists, such as ``before.v``, gives a bifurcation diagram. Left out: where transitions were
-            recorded over one name, the state before them that they change most, else ``transitions``.
+            A column; a column of lists, such as ``before.v``, gives a bifurcation diagram. If transitions were recorded
+            over one name, the default is the state that they change most, before transitions; otherwise it is
+            ``transitions``.
         tail : float
-            The share of each run, at its end, whose transitions and samples are drawn there.
+            The drawn fraction at the end of each run, for transitions and samples.
         over : {"time"}, optional
-            Draw a column of samples, such as ``sample.x``, over time: a curve for each row, in colours of what varies.
+            Whether to draw a column of samples, such as ``sample.x``, over time: a curve for each row, coloured by the
+            varied value.
 
         Raises UsageError: no such column, or more names that vary than a picture has axes.
         """
@@ -150,21 +152,21 @@ class Sweep:
         draw(self, path, of, tail, over)
 
     def as_json(self) -> dict[str, Any]:
-        """Its numbers, and where it is."""
+        """Return the numbers of the dataset, and its folder."""
         from hsdsl.analysis.sweep.summary import as_json
 
         return as_json(self)
 
     @property
     def summary(self) -> str:
-        """What it is of, how far it is, how its runs ended, and the range of each number."""
+        """The model, the progress, the ends of the runs, and the range of each number, as text."""
         from hsdsl.analysis.sweep.summary import summary
 
         return summary(self)
 
 
 def path_of(folder: Path, chunk: int) -> Path:
-    """The file of a chunk."""
+    """Return the file of a chunk."""
     return folder / f"chunk-{chunk:06}.parquet"
 
 
@@ -180,20 +182,20 @@ def load(folder: str | os.PathLike[str]) -> Sweep:
 
 
 def encoded(table: Any) -> bytes:
-    """A table as the bytes of a file."""
+    """Encode a table as the bytes of a file."""
     target = BytesIO()
     library("pyarrow.parquet").write_table(table, target, compression="zstd", write_page_checksum=True)
     return target.getvalue()
 
 
 def write_chunk(folder: Path, chunk: int, content: bytes) -> None:
-    """Write the file of a chunk, under another name that is changed when it is whole."""
+    """Write the file of a chunk under a temporary name, and rename it when it is complete."""
     with replacing(path_of(folder, chunk)) as file:
         file.write(content)
 
 
 def read_chunk(path: Path, manifest: Manifest, chunk: int, columns: Sequence[str] | None = None) -> Any:
-    """Read a file; OSError or ValueError where it is damaged, or not a chunk of this sweep."""
+    """Read a file; raise OSError or ValueError if it is damaged, or no chunk of this sweep."""
     first, last = manifest.rows_of(chunk)
     with library("pyarrow.parquet").ParquetFile(path, page_checksum_verification=True) as file:
         if (file.schema_arrow.metadata or {}).get(TAG) != manifest.tag.encode():
@@ -204,7 +206,7 @@ def read_chunk(path: Path, manifest: Manifest, chunk: int, columns: Sequence[str
 
 
 def damaged(sweep: Sweep) -> Iterator[int]:
-    """The chunks whose files cannot be read, or are not of this sweep."""
+    """Return the chunks whose files are unreadable, or belong to another sweep."""
     for chunk, path in sorted(sweep.chunks.items()):
         whole = False
         with suppress(OSError, ValueError):

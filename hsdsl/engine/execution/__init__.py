@@ -1,19 +1,19 @@
-"""An execution: what a run produced, as frozen columnar data in hybrid time (t, j).
+"""An execution: the result of a run, as frozen columnar data in hybrid time (t, j).
 
 An execution is a sequence of arcs. In a *flow* arc the state follows the mode's vector field; in a *strip*
-arc it waits on the relaxed guard (Burden et al. 2013, Def. 14) while ``depth`` runs from 0 to the relaxation.
+arc it is constant on the relaxed guard (Burden et al. 2013, Def. 14), and ``depth`` rises from 0 to the relaxation.
 At a jump the state has two values: the last row of one arc and the first row of the next, both at the same
-time. ``jump`` (the j of hybrid time) counts the transitions made so far; a strip belongs to the mode and the
-j before its transition. A jump of an input also ends an arc (j and mode go on). An arc of one row takes no
-time: between transitions at one instant, or on entering a final mode.
+time. ``jump`` (the j of hybrid time) counts the transitions so far; a strip has the mode and the j before its
+transition. A jump of an input also ends an arc (j and mode stay). An arc of one row has no duration: it is between
+transitions at one instant, or at the entry to a final mode.
 
 The columns, with N rows, A arcs, W states in the largest mode and K outputs:
 
 ============== ============== ===============================================================================
 times          (N,)           time of the row, never decreasing
 values         (N, W)         states in the order of the arc's ``states``, NaN beyond them
-outputs        (N, K)         outputs, NaN where the mode does not define the output
-depth          (N,)           0 in flow arcs; how deep in the strip otherwise
+outputs        (N, K)         outputs, NaN if the mode does not define the output
+depth          (N,)           0 in flow arcs; otherwise the depth in the strip
 coefficients   (N, P, W)      the piece from row k to row k+1 of one flow arc is
                               x_k + sum_{m=1..P} c_m s^m, s in [0, 1]; unused in an arc's last row and in
                               strips. P = 0: the piece is the straight line between the rows

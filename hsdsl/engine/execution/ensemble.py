@@ -1,4 +1,4 @@
-"""Many runs of one model at once: what is kept of each, as arrays."""
+"""Many runs of one model at once: their results as arrays."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from hsdsl.base.calls import checks_methods
 from hsdsl.base.names import called, visible
-from hsdsl.base.shown import shown
 from hsdsl.engine.execution.parts import COMPLETE
 from hsdsl.engine.execution.run import Execution
 from hsdsl.engine.execution.samples import Array
@@ -19,9 +18,9 @@ from hsdsl.engine.execution.samples import Array
 
 @dataclass(frozen=True)
 class Failure:
-    """An instance that did not get to where it was going.
+    """An instance that did not reach its end.
 
-    ``reason`` is one of `execution.REASONS`, or ``refused``: it could not be started. ``message`` is the
+    ``reason`` is one of `execution.REASONS`, or ``refused`` if it could not be started. ``message`` is a
     sentence for a person.
     """
 
@@ -32,16 +31,17 @@ class Failure:
 
 @dataclass(frozen=True, eq=False)
 class TransitionTable:
-    """Every transition of an ensemble's instances, one instance's behind the other's, in their order.
+    """Every transition of an ensemble's instances, ordered by instance and then by time.
 
     Attributes
     ----------
     first : array of int, shape (instances + 1,)
-        Where the transitions of each instance begin (instances as in the flattened arrays); the last one is the end.
+        The index of the first transition of each instance (in the order of the flattened arrays); the last element is
+        the end.
     time, edge, entry : array, shape (transitions,)
-        When it was made, the transition's name, and whether it fired at once on entering its mode.
+        The time and the name of each transition, and whether it fired at once on entry to its mode.
     before, after : dict of array, shape (transitions,)
-        States by name, not-a-number where the mode lacks the state, and after one that a run ended in.
+        States by name; not-a-number if the mode lacks the state, and after a transition in which a run ended.
     """
 
     first: Array
@@ -52,41 +52,42 @@ class TransitionTable:
     after: dict[str, Array]
 
     def of(self, instance: int) -> slice:
-        """Where the transitions of an instance are."""
+        """Return the slice of the transitions of an instance."""
         return slice(int(self.first[instance]), int(self.first[instance + 1]))
 
 
 @checks_methods
 @dataclass(frozen=True, eq=False)
 class Ensemble:
-    """The runs of an ensemble. Every array begins with :attr:`shape`, the common shape of what was varied.
+    """The runs of an ensemble. The shape of every array begins with :attr:`shape`, the common shape of the varied
+    values.
 
     Attributes
     ----------
     varied : dict
-        Values of the parameters, and of initial states as ``initial.NAME``, that were varied.
+        The varied values of parameters, and of initial states as ``initial.NAME``.
     stop : array of str
-        Why each run ended: one of `execution.REASONS`; ``refused`` where an instance could not be started,
-        ``interrupted`` where Ctrl-C came first.
+        The reason of each run's end: one of `execution.REASONS`; ``refused`` if an instance could not be
+        started, ``interrupted`` if Ctrl-C came first.
     time : array of float
-        When it ended (not-a-number where it was not run).
+        The time of its end (not-a-number if it was not run).
     mode : array of str
-        The mode at the end; empty where it was not run.
+        The mode at the end; empty if it was not run.
     state, outputs : dict of array
-        Values at the end by name, not-a-number where the mode lacks the state.
+        The values at the end by name; not-a-number if the mode lacks the state.
     transitions : array of int
-        How many were made.
+        The number of transitions.
     warnings : array of str
-        Codes of what the runs themselves noted (`errors.WARNINGS`), with a space between two; empty where nothing
-        was: walls followed roughly, motion along guards, limits of accumulating transitions, sliding, strips. The other
-        codes take a verdict: ``ensemble.run(...).warnings``.
+        The codes of the runs' own warnings (`errors.WARNINGS`), separated by spaces; empty if there are none.
+        They concern walls that were not checked, motion along guards, limits of accumulating transitions, sliding, and
+        waits in strips. The other codes need a verdict: ``ensemble.run(...).warnings``.
     transition_times : array, shape (..., n)
-        Times of the first n transitions, for a positive n; not-a-number where fewer were made.
+        The times of the first n transitions, for a positive n; not-a-number if fewer were made.
     sample_times : array, shape (..., n)
     samples : dict of array, shape (..., n)
-        States and outputs at these times by name, not-a-number beyond a run's end; empty without sample times.
+        The states and outputs at these times by name; not-a-number beyond a run's end; empty without sample times.
     transition_table : TransitionTable or None
-        Every transition, where they were to be kept.
+        Every transition, if they were kept.
     """
 
     model: str
@@ -118,8 +119,10 @@ class Ensemble:
         return f"<Ensemble of {visible(called(self.title, self.model))}: {how}, stops: {counts or 'none'}>"
 
     def _repr_html_(self) -> str:
-        """Show what was varied, how the runs ended, and a picture in notebooks."""
-        return shown("ensemble_html", self)
+        """Show the varied values, the ends of the runs, and a picture in notebooks."""
+        from hsdsl.analysis.plot.notebook import ensemble_html
+
+        return ensemble_html(self)
 
     def to_pandas(self, what: Literal["runs", "samples", "transitions"] = "runs") -> Any:
         """Make a pandas DataFrame with a row for each run, each sample, or each transition.
@@ -146,18 +149,18 @@ class Ensemble:
 
     @property
     def reasons(self) -> dict[str, int]:
-        """How many instances ended for which reason."""
+        """The number of instances for each reason of the end."""
         found, counts = np.unique(self.stop, return_counts=True)
         return dict(zip(found.tolist(), counts.tolist(), strict=True))
 
     @property
     def warning_counts(self) -> dict[str, int]:
-        """How many instances have which code of :attr:`warnings`."""
+        """The number of instances for each code of :attr:`warnings`."""
         return dict(sorted(Counter(" ".join(self.warnings.ravel().tolist()).split()).items()))
 
     @property
     def failed(self) -> Array:
-        """Which instances did not get to where they were going: array of bool."""
+        """Whether each instance failed to reach its end: array of bool."""
         return ~np.isin(self.stop, COMPLETE)
 
     def failures(self, most: int = 100) -> tuple[Failure, ...]:
@@ -166,7 +169,7 @@ class Ensemble:
         Parameters
         ----------
         most : int
-            How many to name.
+            The largest number of instances to name.
         """
         places = [tuple(map(int, place)) for place in np.argwhere(self.failed)[:most]]
         return tuple(self._failure(place) for place in places)
@@ -180,7 +183,7 @@ class Ensemble:
         return Failure(place, reason, self.run(*place).stop.message)
 
     def run(self, *index: int) -> Execution:
-        """Run one instance by itself: the whole execution.
+        """Run one instance again, and return the whole execution.
 
         Raises IndexError: there is no such instance.
         """

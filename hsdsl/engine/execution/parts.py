@@ -1,4 +1,4 @@
-"""What an execution is made of: arcs, transitions, how it stopped, and what may be said about it."""
+"""The parts of an execution: arcs, transitions, stop, verdict and warnings."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ class Arc:
 
 @dataclass(frozen=True)
 class Transition:
-    """One transition.
+    """A transition that a run made.
 
-    ``time`` is when the guard was reached and ``resumed`` when flow went on (None when the run ended in the
-    strip, and then ``after`` is None too). ``alternatives`` are the edges that were reached within the tie
-    tolerance and passed over. ``entry`` says that it fired at once because the state entered its mode beyond
-    the surface.
+    ``time`` is the time at which the guard was reached, ``resumed`` that at which the flow continued. If the run ended
+    in the strip, ``resumed`` and ``after`` are None. ``alternatives`` are the edges reached within the tie tolerance
+    and not taken. ``entry`` says that the transition fired at once because the state entered its mode beyond the
+    surface.
     """
 
     index: int
@@ -46,15 +46,15 @@ class Transition:
 
 @dataclass(frozen=True)
 class Stop:
-    """Why and when a run ended.
+    """The reason and time of a run's end.
 
     Attributes
     ----------
     reason : str
-        ``until`` or ``final``; ``left_domain`` or ``zeno``, where the execution itself ends; ``transition_limit``,
+        ``until`` or ``final``; ``left_domain`` or ``zeno``, at which the execution itself ends; ``transition_limit``,
         ``waiting_limit``, ``memory_limit``, ``not_finite``, ``step_underflow`` or ``interrupted``.
     time : number
-        When.
+        The time of the end.
     message : str
         A sentence for a person.
     """
@@ -65,7 +65,7 @@ class Stop:
 
     @property
     def complete(self) -> bool:
-        """Whether the run got to where it was going (exit code 0)."""
+        """Whether the run reached its end (exit code 0)."""
         return self.reason in COMPLETE
 
 
@@ -77,7 +77,7 @@ REASONS = (*COMPLETE, *LEFT, *INCOMPLETE)
 
 @dataclass(frozen=True)
 class RunWarning(Deferred):
-    """Something about a run that its reader should know first.
+    """A warning about a run, which is reported before its verdict.
 
     Attributes
     ----------
@@ -99,9 +99,9 @@ class RunWarning(Deferred):
 
 @dataclass(frozen=True)
 class Verdict(Deferred):
-    """What can be said about the theorem's hypotheses for this run: ``holds``, ``left`` or ``unknown``.
+    """Whether the theorem's hypotheses hold for a run: ``holds``, ``left`` or ``unknown``.
 
-    ``reasons`` are all of them; ``warnings`` are what the look at the run has found besides.
+    ``reasons`` has all reasons; ``warnings`` has the warnings found with the verdict.
     """
 
     theorem: Literal["holds", "left", "unknown"]
@@ -111,7 +111,7 @@ class Verdict(Deferred):
 
 @dataclass(frozen=True)
 class Point:
-    """The value of an execution at one time. ``state`` and ``outputs`` are by name; indexing finds either."""
+    """The value of an execution at one time. ``state`` and ``outputs`` are keyed by name; indexing accepts both."""
 
     time: Any
     mode: str

@@ -1,4 +1,4 @@
-"""Records: frozen dataclasses with fields made on first use, and equality of recorded data."""
+"""Frozen dataclasses with fields computed at first use, and equality of recorded data."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 
 class Deferred:
-    """A frozen dataclass some of whose fields may be made later; to its users it is as if they had been there.
+    """A frozen dataclass that may compute some of its fields at first use; users do not notice the difference.
 
     A run of a tenth of a millisecond would else spend several times that on tables that few look at.
     """
@@ -20,8 +20,7 @@ class Deferred:
     def deferred(
         cls, later: Mapping[str, Callable[[Any], Any]], known: Mapping[str, Any] = MappingProxyType({}), **now: Any
     ) -> Self:
-        """Make one from the values of some fields and, for the others, functions that make
-        them of the object itself.
+        """Make an object from the values of some fields, and from functions of the object for the other fields.
 
         Fields in ``later`` must have no default; nothing is checked. ``known`` is what many have in common.
         """
@@ -30,7 +29,7 @@ class Deferred:
         return made
 
     def _elsewhere(self, name: str) -> str:
-        """Where the value of a public name is that is no attribute, as a hint."""
+        """Return a hint where to find the value of a public name that is no attribute."""
         return ""
 
     if not TYPE_CHECKING:
@@ -44,17 +43,17 @@ class Deferred:
             return value
 
     def __dir__(self) -> list[str]:
-        """List the public names: fields, made or deferred, properties and methods."""
+        """List the public names: fields, computed or deferred, properties and methods."""
         own = {field.name for field in fields(self)}  # pyright: ignore[reportArgumentType]
         return sorted(name for name in own.union(dir(type(self))) if not name.startswith("_") and name != "deferred")
 
     def __getstate__(self) -> dict[str, Any]:
-        """Give every field: what makes them does not travel."""
+        """Return every field; the functions that compute deferred fields are not pickled."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]
 
 
 def same(a: Any, b: Any) -> bool:
-    """Compare numbers, texts, arrays, dataclasses and containers of them by value.
+    """Compare numbers, texts, arrays, dataclasses and containers by value.
 
     Arrays must agree in shape and in kind of number (float64 or object), containers in kind and order; fields
     marked ``compare=False`` are left out.

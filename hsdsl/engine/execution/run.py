@@ -1,4 +1,4 @@
-"""The execution: columns that a run filled, with sampling, equality, display and saving."""
+"""The execution: the columns of a run, with sampling, equality, display and saving."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Assessment = Callable[..., Verdict]
 
 
 class CompiledRecord(Protocol):
-    """What the loop in C wrote of a run; columns and transitions are made of it when they are first used."""
+    """The output of the C loop for a run; columns and transitions are computed from it at first use."""
 
     @property
     def made(self) -> int:
@@ -35,22 +35,22 @@ class CompiledRecord(Protocol):
 
     @property
     def enters_beyond(self) -> bool:
-        """Whether one fired at once on entry."""
+        """Whether a transition fired at once on entry."""
         ...
 
 
 @checks_methods
 @dataclass(frozen=True, eq=False, repr=False)
 class Execution(Deferred):
-    """A run's result; see the package's docstring for the arrays.
+    """The result of a run; the package's docstring describes the arrays.
 
-    Two executions are equal when every field is, not-a-number being equal to itself; ``seconds``,
-    ``output_function`` and ``sampler`` are left out.
+    Two executions are equal if all their fields are equal, where not-a-number equals itself. ``seconds``,
+    ``output_function`` and ``sampler`` do not count.
 
     Attributes
     ----------
     stop : Stop
-        Why and when the run ended.
+        The reason and time of the run's end.
     transitions : tuple of Transition
         The transitions, in order.
     final : Point
@@ -58,33 +58,33 @@ class Execution(Deferred):
     verdict : Verdict
         Whether the theorem holds for the run, with reasons.
     settings : dict
-        The settings that the run had.
+        The settings of the run.
     seconds : dict
         Seconds for loading, compiling and simulating.
     times, values, outputs : array, shape (n,), (n, states) and (n, outputs)
         The recorded rows, two at a jump; :meth:`rows` gives them by name.
     overrides : dict
-        The settings beyond the model's file, by the names of `--set` (``c``, ``initial.v``,
-        ``experiment.until``), each value as it was written.
+        The settings given beyond the model's file, by the names of `--set` (``c``, ``initial.v``,
+        ``experiment.until``), with each value as written.
     output_function : callable or None
-        ``output_function(mode, t, state) -> values of the outputs``. Outputs are recorded at rows only: between rows
-        this function gives them from the state there (not-a-number where they have no value); without it (an
-        execution read from a file) they are interpolated linearly between the two rows.
+        ``output_function(mode, t, state) -> values of the outputs``. Rows have recorded outputs. Between rows this
+        function computes them from the state (not-a-number if they have no value). Without it (in an execution read
+        from a file) they are interpolated linearly between rows.
     sampler : callable or None
-        A faster way to the same values at many times, of a compiled run.
+        A faster evaluation of the same values at many times, for a compiled run.
     assessment : callable or None
-        ``assessment(execution, finer) -> Verdict``: the verdict, held against a finer run, or against its own
-        ``finer`` where that is None and steps are not fixed; without it the verdict stays what it is.
+        ``assessment(execution, finer) -> Verdict``: the verdict by comparison with a finer run, or, if that is None and
+        steps are not fixed, with its own ``finer``. Without this function the verdict does not change.
     repetition : callable or None
-        ``repetition(execution) -> Execution``: the same run again, finer (`hsdsl.engine.simulate.refinement`).
+        ``repetition(execution) -> Execution``: the same run with finer steps (`hsdsl.engine.simulate.refinement`).
     differentiation : callable or None
-        ``differentiation(wrt) -> Sensitivity``: its derivatives.
+        ``differentiation(wrt) -> Sensitivity``: the derivatives of the run.
     compiled : CompiledRecord or None
-        Of a run made in C: what its loop wrote, sooner known than the transitions.
+        The output of the C loop, for a compiled run; it is available before the transitions.
     noted : callable or None
-        ``noted(execution) -> str``: codes of what the Python loop itself noted, without a verdict.
+        ``noted(execution) -> str``: the codes of the Python loop's own warnings, without a verdict.
     look : callable or None
-        ``look() -> dict``: what a picture shows of its model, as options of `hsdsl.analysis.plot.View`.
+        ``look() -> dict``: the parts of the model that a picture shows, as options of `hsdsl.analysis.plot.View`.
     """
 
     model: str
@@ -147,7 +147,7 @@ class Execution(Deferred):
     __hash__ = None  # type: ignore[assignment]
 
     def __getstate__(self) -> dict[str, Any]:
-        """Give what can travel: a copy, or what is read from a pickle, is as one that was saved and read."""
+        """Return the fields to pickle: a copy, or an unpickled execution, equals one that was saved and read."""
         local = [each.name for each in fields(self) if not each.compare and each.name != "seconds"]
         return super().__getstate__() | dict.fromkeys(local)
 
@@ -179,12 +179,12 @@ class Execution(Deferred):
         return ""
 
     def plot(self, figure: Any = None, **options: Any) -> list[Any]:
-        """Draw the run with Matplotlib, and return the axes: those over time, then those of phase plots.
+        """Draw the run with Matplotlib, and return the axes: first those over time, then those of phase plots.
 
         Parameters
         ----------
         figure : Figure or SubFigure, optional
-            Where to draw; left out, a new figure of pyplot, which notebooks show by themselves.
+            The figure to draw on; by default a new figure of pyplot, which notebooks display automatically.
         **options
             ``columns`` (names), ``phases`` (pairs of names), ``title``; see `hsdsl.analysis.plot.View`.
 
@@ -193,24 +193,26 @@ class Execution(Deferred):
         return shown("axes", self, figure, **(self.view() | options))
 
     def view(self) -> dict[str, Any]:
-        """Return what a picture shows of the model: units, levels of guards; nothing for a run read from a file."""
+        """Return the parts of the model that a picture shows: units, levels of guards; nothing for a run read from a
+        file.
+        """
         return {} if self.look is None else self.look()
 
     @property
     def warnings(self) -> tuple[RunWarning, ...]:
-        """What a reader should know first: surfaces passed while an `if` was false, walls that were not checked, motion
-        that completes the run, assumptions of the file. They are found with the verdict.
+        """The warnings of the run: surfaces passed while an `if` was false, walls that were not checked, motion that
+        completes the run, assumptions of the file. They are found with the verdict.
         """
         return self.verdict.warnings
 
     @property
     def made(self) -> int:
-        """How many transitions were made; of a long run that is sooner known than the transitions."""
+        """The number of transitions; for a long run it is available before the transitions."""
         return len(self.transitions) if self.compiled is None else self.compiled.made
 
     @property
     def enters_beyond(self) -> bool:
-        """Whether a transition fired at once on entry; of a compiled run that is sooner known than the transitions."""
+        """Whether a transition fired at once on entry; a compiled run knows this before its transitions."""
         return any(made.entry for made in self.transitions) if self.compiled is None else self.compiled.enters_beyond
 
     @property
@@ -225,11 +227,11 @@ class Execution(Deferred):
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """The names of all states, in the order in which the run first has them."""
+        """The names of all states, in the order of their first occurrence in the run."""
         return tuple(dict.fromkeys(name for arc in self.arcs for name in arc.states))
 
     def sizes(self, arcs: Iterable[Arc] | None = None, start: float = -inf, end: float = inf) -> dict[str, float]:
-        """The largest size that each state has at the rows of arcs, all by default, between two times or at them."""
+        """Return the largest size of each state at the rows of arcs (by default all), from one time to another."""
         found: dict[str, float] = {}
         for arc in self.arcs if arcs is None else arcs:
             times = self.times[arc.first : arc.last + 1].astype(float)
@@ -241,22 +243,22 @@ class Execution(Deferred):
 
     @property
     def shown(self) -> tuple[str, ...]:
-        """The states and outputs that readers see: all but the memory of events."""
+        """The states and outputs in displays and tables: all except the memory of events."""
         return (*without_memory(self.states), *self.output_names)
 
     @cached_property
     def finer(self) -> Execution | None:
-        """The same run, finer; None for one that was read from a file."""
+        """The same run with finer steps; None if the run was read from a file."""
         return None if self.repetition is None else self.repetition(self)
 
     def estimated(self) -> Execution:
-        """Return the same execution with its verdict held against the finer run, also where steps are fixed."""
+        """Return the same execution with a verdict that uses the finer run, also if steps are fixed."""
         if self.assessment is None:
             return self
         return replace(self, verdict=self.assessment(self, self.finer))
 
     def sensitivity(self, wrt: str | Sequence[str]) -> Any:
-        """Return the derivatives of this run by parameters and initial states (see `Model.sensitivity`).
+        """Return the derivatives of this run with respect to parameters and initial states (see `Model.sensitivity`).
 
         Raises UsageError: the run was read from a file, or a name is unknown.
         """
@@ -270,7 +272,7 @@ class Execution(Deferred):
         Parameters
         ----------
         t : number
-            Within :attr:`time_span`, or outside it by no more than the tie tolerance.
+            Within :attr:`time_span`, or outside it by at most the tie tolerance.
         side : {"right", "left"}
             At a jump: the value after the last transition at that instant, or before the first.
 
@@ -294,7 +296,7 @@ class Execution(Deferred):
         Parameters
         ----------
         times : numbers
-            Within :attr:`time_span`, or outside it by no more than the tie tolerance.
+            Within :attr:`time_span`, or outside it by at most the tie tolerance.
         side : {"right", "left"}
             At a jump: the value after the last transition at that instant, or before the first.
         columns : names, optional
@@ -306,7 +308,7 @@ class Execution(Deferred):
         return sample(self, times, side, columns)
 
     def rows(self) -> Samples:
-        """Return the recorded rows, two at each jump, without those that only repeat the one above."""
+        """Return the recorded rows, two at each jump, without rows that repeat the row above."""
         rows = np.arange(len(self.times))
         return evaluate(self, rows[_changes(self)], self.times[_changes(self)])
 
@@ -323,18 +325,17 @@ class Execution(Deferred):
         """Save to ``.npz`` (everything, without loss), or to ``.csv`` or ``.parquet`` (a table, with a JSON
         sidecar).
 
-        Files are written under another name and renamed, so that a failure leaves what was there.
+        Files are written under another name and then renamed, so that a failure keeps existing files.
 
         Parameters
         ----------
         path : path
-            The suffix says which.
+            The suffix chooses the format.
         samples : times, optional
-            For a table: rows at these times and both rows of each jump, instead of the rows the integrator
-            chose. Times outside the run are left out (a run may stop early). Left out: the run's own
-            :attr:`sample_times`.
+            For a table: rows at these times and both rows of each jump, instead of the integrator's rows. Times outside
+            the run are skipped (a run may stop early). The default is the run's own :attr:`sample_times`.
         columns : names, optional
-            For a table: which states and outputs, in this order; left out, those of :attr:`shown`.
+            For a table: its states and outputs, in this order; by default those of :attr:`shown`.
 
         Returns
         -------
@@ -356,7 +357,7 @@ class Execution(Deferred):
 
 
 def _changes(execution: Execution) -> Array:
-    """Mark the rows that are not the first of an arc that goes on exactly as the arc before it ended."""
+    """Mark all rows except the first of an arc that continues exactly from the end of the arc before it."""
     keep = np.ones(len(execution.times), dtype=bool)
     for before, after in zip(execution.arcs, execution.arcs[1:], strict=False):
         if (before.mode, before.jump, before.states) == (after.mode, after.jump, after.states):

@@ -24,18 +24,18 @@ HYBRID_TIME = ("time", "mode", "j")
 @checks_methods
 @dataclass(frozen=True, eq=False)
 class Samples(Deferred):
-    """Values of an execution at n points of hybrid time, by column.
+    """The values of an execution at n points of hybrid time, by column.
 
     Attributes
     ----------
     time, mode, jump, kind : array, shape (n,)
         Time, name of the mode, transitions made so far, and ``flow`` or ``strip``.
     states, outputs : tuple of str
-        Names, in the order in which the execution first has them.
+        Names, in the order of their first occurrence in the execution.
     state_columns, output_columns : array, shape (n, number of names)
-        Values, NaN where the mode lacks the state (or does not define the output).
+        Values; NaN if the mode lacks the state (or does not define the output).
     present : array of bool, shape (n, number of states)
-        Whether the mode has the state, so that a state that *is* NaN differs from an absent one.
+        Whether the mode has the state; this distinguishes a state that *is* NaN from an absent one.
 
     ``samples["x"]`` is the column of a state or output, shape (n,); ``len(samples)`` is n.
     """
@@ -66,7 +66,7 @@ class Samples(Deferred):
         return self.states + self.outputs
 
     def only(self, columns: Sequence[str] | None) -> Samples:
-        """Keep only the states and outputs named, in the order named (states before outputs).
+        """Keep only the named states and outputs, in the given order (states before outputs).
 
         Raises UsageError: for a name that is neither a state nor an output; the closest one is suggested.
         """
@@ -86,13 +86,15 @@ class Samples(Deferred):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """What heads the columns of a table: ``time``, ``mode``, ``j``, states, outputs."""
+        """The names of the columns of a table: ``time``, ``mode``, ``j``, states, outputs."""
         states = [f"state.{name}" if name in HYBRID_TIME else name for name in self.states]
         outputs = [f"output.{name}" if name in HYBRID_TIME else name for name in self.outputs]
         return (*HYBRID_TIME, *states, *outputs)
 
     def columns(self) -> Iterator[tuple[str, Array, Array | None]]:
-        """Give each column of the table: label, values (n,), and where it has a value (None: everywhere)."""
+        """Yield each column of the table: its label, its values (n,), and a mask of the rows with a value (None: all
+        rows).
+        """
         values = [self.time, self.mode, self.jump, *self.state_columns.T, *self.output_columns.T]
         computed = [column == column for column in self.output_columns.T]
         present = [None, None, None, *self.present.T, *computed]
@@ -110,7 +112,7 @@ class Samples(Deferred):
 def split(
     columns: Sequence[str], states: tuple[str, ...], outputs: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Sort names of columns into those of states and those of outputs, each once.
+    """Sort names of columns into names of states and names of outputs, without repetition.
 
     Raises UsageError: for a name that is neither; the closest one is suggested.
     """
@@ -131,7 +133,7 @@ def _split(
 
 
 def optional(library: str, what: str, extra: str = "table") -> Any:
-    """Import a library of an extra, or say how to get it."""
+    """Import a library of an extra, or say how to install it."""
     try:
         return import_module(library)
     except ImportError:

@@ -1,4 +1,4 @@
-"""The value of an execution at any time: which piece a time falls in, and the piece's polynomial there."""
+"""The value of an execution at any time: the piece that contains the time, and its polynomial there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Side = Literal["right", "left"]
 
 
 class Evaluated(Protocol):
-    """What a sampler finds at n times; all but the first may be made on first use.
+    """The result of a sampler at n times; all fields except the first may be computed at first use.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ Sampler = Callable[[Array, bool, Sequence[str], int], Evaluated]
 
 
 class ArcTable:
-    """The arcs as columns: each distinct tuple of states is one layout."""
+    """The arcs as columns; each distinct tuple of states is one layout."""
 
     def __init__(self, arcs: Sequence[Arc]) -> None:
         self.first = np.array([arc.first for arc in arcs])
@@ -57,12 +57,12 @@ class ArcTable:
         self.layout = np.array([number[arc.states] for arc in arcs])
 
     def present(self, states: Sequence[str]) -> Array:
-        """Say which arcs have which states: shape (arcs, states)."""
+        """Return which arcs have which states: shape (arcs, states)."""
         return np.array([[name in layout for name in states] for layout in self.layouts], dtype=bool)[self.layout]
 
 
 def within(execution: Execution, times: Any) -> tuple[Array, Array]:
-    """Take times into the execution's number type, and say which of them are within the run.
+    """Convert times to the execution's number type, and mark those within the run.
 
     A time outside the run by no more than the tie tolerance, relative to the run's length, counts as its end.
     """
@@ -86,7 +86,7 @@ def _as_times(execution: Execution, times: Any) -> Array:
 
 
 def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
-    """Find the row that begins the piece each time lies in (the row itself where the time is a row's).
+    """Find the first row of the piece that contains each time (the row itself if the time is that of a row).
 
     Of several rows at one time ``right`` takes the last and ``left`` the first.
 
@@ -121,7 +121,7 @@ def _outside(execution: Execution, time: Any) -> ValueError:
 
 
 def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] | None) -> Samples:
-    """Evaluate at any times, by the execution's own sampler where it has one."""
+    """Evaluate at any times, by the execution's own sampler if it has one."""
     if execution.sampler is None:
         return evaluate(execution, *find(execution, times, side)).only(columns)
     _check(side)
@@ -137,7 +137,7 @@ def sample(execution: Execution, times: Any, side: Side, columns: Sequence[str] 
 
 
 class _Source:
-    """What columns of samples are made of on first use."""
+    """The data from which the columns of samples are computed at first use."""
 
     def __init__(self, execution: Execution, found: Evaluated, side: Side) -> None:
         self.execution, self.found = execution, found
@@ -154,11 +154,11 @@ class _Source:
 
     @cached_property
     def arcs(self) -> Array:
-        """Which arc each time is in."""
+        """The arc of each time."""
         return _arcs(self.execution, find(self.execution, self.found.times, self.side)[0])
 
     def outputs(self, names: Sequence[str]) -> Array:
-        """Columns of some outputs."""
+        """Return the columns of some outputs."""
         known, values = self.execution.output_names, self.found.outputs
         return values if names == known else values[:, [known.index(name) for name in names]]
 
@@ -175,7 +175,7 @@ _LATER: dict[str, Callable[[Samples], Array]] = {
 
 @dataclass(frozen=True, eq=False)
 class _Places:
-    """Where n times lie: arc, row, the row after it, and how far between them (0 at the row itself)."""
+    """The places of n times: arc, row, the next row, and the fraction between both (0 at the row itself)."""
 
     time: Array
     arc: Array
@@ -199,7 +199,7 @@ def _arcs(execution: Execution, rows: Array) -> Array:
 
 
 def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
-    """Evaluate at ``times``, each lying in the piece that begins at its row.
+    """Evaluate at ``times``, each in the piece that begins at its row.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
 
 
 def _states(execution: Execution, at: _Places) -> Array:
-    """Return the states in the order of each arc; on a strip the state waits."""
+    """Return the states in the order of each arc; in a strip the state is constant."""
     values = execution.values[at.row]
     moving = at.between & (execution.arc_table.kind[at.arc] == "flow")
     k, s = at.row[moving], at.fraction[moving][:, None]
@@ -262,7 +262,7 @@ def _outputs(execution: Execution, at: _Places, values: Array) -> Array:
 
 
 def _by_name(execution: Execution, at: _Places, values: Array) -> tuple[Array, Array]:
-    """Sort the states into one column a name, and say where a mode has them."""
+    """Sort the states into one column per name, and mark the rows whose mode has them."""
     table = execution.arc_table
     return columns_by_name(values, table.layout[at.arc], table.layouts, execution.states)
 
@@ -270,7 +270,9 @@ def _by_name(execution: Execution, at: _Places, values: Array) -> tuple[Array, A
 def columns_by_name(
     values: Array, layout: Array, layouts: Sequence[tuple[str, ...]], names: tuple[str, ...]
 ) -> tuple[Array, Array]:
-    """Sort rows of states, each of a layout, into one column a name; also where a row has the state."""
+    """Sort rows of states, each with its layout, into one column per name, with a mask of the rows that have the
+    state.
+    """
     columns = np.full((len(values), len(names)), float("nan"), dtype=values.dtype)
     present = np.zeros(columns.shape, dtype=bool)
     for number, states in enumerate(layouts):

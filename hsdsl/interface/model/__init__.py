@@ -1,15 +1,15 @@
-"""A model: a YAML file turned into something that runs.
+"""A model: from a YAML file to executions, ensembles and analyses.
 
 ================= ==========================================================================================
-``model``         :func:`load`, :func:`loads`, :class:`Model`: what can be done with a model
+``model``         :func:`load`, :func:`loads`, :class:`Model`: a model with its operations
 ``call_cache``    runs prepared for the last calls
 ``ensemble``      many instances, from an ``ensemble_request``; ``workers`` runs them
 ``sweeps``        many instances into a dataset; ``chunk_work`` makes a part of it
-``stream``        a run whose rows go to a file while it goes on
+``stream``        a run that writes its rows to a file
 ``estimate``      a run's error, by a finer run
 ``distances``     distances of runs; ``points`` those of points
 ``differentiate`` sensitivities; ``fits`` to measurements
-``orbits``        periodic orbits; ``nearby`` orbital stability by runs from nearby
+``orbits``        periodic orbits; ``nearby`` orbital stability by nearby runs
 ``guards``        levels for pictures
 ================= ==========================================================================================
 """

@@ -32,21 +32,21 @@ SECONDS = 60.0  # that a search may take, by default
 
 
 def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> Interval:
-    """Return how far apart two runs are, or two points of a model.
+    """Return the distance of two runs, or of two points of a model.
 
     Parameters
     ----------
     first : Execution, Model or path
-        One of two runs of a model; or a model, of two of its points.
+        The first of two runs of a model; or a model, for the distance of two of its points.
     second : Execution, str or SpacePoint
-        The other run; or a point, as ``"free x=13 v=5"``.
+        The second run; or a point, as ``"free x=13 v=5"``.
     third : str or SpacePoint, optional
-        The other point.
+        The second point.
     **arguments
-        Further ones of :func:`distance_of_runs`, or of :meth:`hsdsl.Model.distance`.
+        Further arguments of :func:`distance_of_runs`, or of :meth:`hsdsl.Model.distance`.
 
-    The interval has the least and the largest possible distance; :meth:`hsdsl.Model.distance` also has the path, and
-    that function the time.
+    The interval contains the distance; :meth:`hsdsl.Model.distance` also returns the path, and :func:`distance_of_runs`
+    the time.
 
     Raises UsageError: the arguments are neither, or do not fit the model.
     """
@@ -77,31 +77,31 @@ def distance_of_runs(
     seconds: float = SECONDS,
     watch: Callable[[float, float], None] | None = None,
 ) -> CurveDistance:
-    """Return how far apart two runs of one model are.
+    """Return the distance of two runs of one model.
 
     Parameters
     ----------
     run, other : Execution
-        Of one model file; schemes, steps, engines, initial values and lengths may differ.
+        Runs of one model file; schemes, steps, engines, initial values and lengths may differ.
     metric : str
         A key of `table.CURVE_METRICS`: rho, quotient, relaxed, rho-hat, sup, skorokhod or tau-epsilon.
     relaxation : number or str, optional
-        For ``rho`` and ``relaxed``: how deep the strips of the relaxed space are.
+        For ``rho`` and ``relaxed``: the depth of the strips of the relaxed space.
     model : Model or path, optional
-        The model that the space is made of; left out, the file that the first run names.
+        The model that defines the space; by default the file that the first run names.
     parameters : mapping, optional
-        Overrides by name, beyond those of the first run: the space has guards and resets at these values. Where the
-        second run has others, the note says so.
+        Overrides by name, beyond those of the first run, for the guards and resets of the space. If the second run has
+        other values, the note says so.
     coordinates : names, optional
         For ``rho-hat``: the states that count as the position.
     hops : int, optional
-        For ``rho``, ``quotient`` and ``relaxed``: the most passages of a path; left out, eight more than the fewest
-        that connect the modes. The lower end holds for paths with more, too.
+        For ``rho``, ``quotient`` and ``relaxed``: the largest number of passages of a path; by default eight more than
+        the fewest that connect the modes. The lower end also holds for paths with more.
     seconds : float
-        For ``rho``, ``quotient`` and ``relaxed``: the time for the search. After it the interval is wider, and the note
-        says so.
+        For ``rho``, ``quotient`` and ``relaxed``: the time limit of the search. If it is reached, the interval is
+        wider, and the note says so.
     watch : callable, optional
-        Called now and then with the bounds so far, for those three.
+        Called from time to time with the present bounds, for those three.
 
     Raises UsageError: runs of different models, no time in common, an unknown metric, or a model that is missing or was
     edited since.

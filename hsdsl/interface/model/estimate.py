@@ -1,4 +1,4 @@
-"""The error of a run, estimated by the same run made finer and the distance of the two."""
+"""The error of a run, estimated by its distance to a finer run."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ SAMPLES = 1000
 @checks_methods
 @dataclass(frozen=True)
 class Estimate:
-    """The distance between a run and a finer one.
+    """The differences between a run and a finer run.
 
-    ``settings`` are those of the finer run that differ; ``same_transitions`` says whether both made the same
-    transitions in the same order and stopped alike. ``time`` is the largest difference between transition times,
-    strips' delays subtracted (None where there is none in common). ``final`` has the difference of each final state
-    (None where the runs ended in different modes or at different times), ``largest`` that of each state at `SAMPLES`
-    times away from transitions (None where the runs make other transitions or no such time is left).
+    ``settings`` has the settings of the finer run that differ. ``same_transitions`` says whether both runs made the
+    same transitions in the same order and stopped for the same reason. ``time`` is the largest difference between
+    transition times, without the delays of strips (None if there are no common transitions). ``final`` has the
+    difference of each final state (None if the runs ended in different modes or at different times). ``largest`` has
+    the largest difference of each state at `SAMPLES` times away from transitions (None if the transitions differ or no
+    such time is left).
     """
 
     settings: dict[str, Any]
@@ -35,12 +36,12 @@ class Estimate:
     largest: dict[str, Number] | None = None
 
     def as_json(self) -> dict[str, Any]:
-        """The ``estimate`` object of ``hsdsl run --estimate --json``."""
+        """Return the ``estimate`` object of ``hsdsl run --estimate --json``."""
         return asdict(self)
 
     @property
     def sentence(self) -> str:
-        """The estimate, for a person."""
+        """The estimate as a sentence."""
         finer = ", ".join(f"{name} {show(value)}" for name, value in self.settings.items())
         if not self.same_transitions:
             return f"estimate: unknown; the finer run ({finer}) makes other transitions, so neither can be trusted"
@@ -55,7 +56,7 @@ class Estimate:
 
 
 def estimate(run: Execution) -> Estimate:
-    """Compare a run with the same run made finer.
+    """Compare a run with a finer run.
 
     Raises UsageError: the run was read from a file, so that it cannot be run again.
     """
@@ -104,7 +105,7 @@ def _is_near_transition(run: Execution, t: Number, margin: Number) -> bool:
 
 
 def corrected_times(transitions: tuple[Transition, ...]) -> list[Number]:
-    """Transition times less the time spent in strips before them."""
+    """Return the transition times minus the time spent in strips before them."""
     times: list[Number] = []
     spent = 0
     for transition in transitions:

@@ -1,4 +1,4 @@
-"""``Model``: a checked model with its operations; its stages are in `hsdsl.engine.preparation.pipeline`."""
+"""``Model``: a checked model with its operations; `hsdsl.engine.preparation.pipeline` has its stages."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ MOST_PREPARED = 16
 def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: bytes | None = None) -> Model:
     """Read a model file; `-` is standard input.
 
-    ``text`` is the file's content, where it is not to be read from ``path``; ``limits`` are caps on the file and
-    folders for its data, in place of the defaults.
+    ``text`` is the file's content if it does not come from ``path``; ``limits`` replace the default caps on the file
+    and the folders of its data.
 
     Raises ModelError: the model has errors; all of them are carried.
     Raises UsageError: the file cannot be read.
@@ -58,7 +58,7 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: by
 
 @checks_arguments
 def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limits | None = None) -> Model:
-    """Read a model from its text; data files are in ``folder``, or in the present one.
+    """Read a model from its text; data files are in ``folder``, by default the current one.
 
     ``limits`` are as for :func:`load`.
 
@@ -77,7 +77,7 @@ ELSEWHERE = {
 
 
 def _elsewhere(model: Model, name: str) -> str | None:
-    """Where to give what is no argument of a method."""
+    """Say where to give a name that is no argument of a method."""
     if name in model.program.parameters:
         return f"it is a parameter: parameters={{'{name}': ...}}"
     if name in model.program.all_states:
@@ -87,9 +87,9 @@ def _elsewhere(model: Model, name: str) -> str | None:
 
 @partial(checks_methods, elsewhere=_elsewhere)
 class Model:
-    """A checked model. ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` holds both.
+    """A checked model: ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` both.
 
-    It stays as it was loaded, also where its file changes later, and it can be pickled.
+    It does not change if its file changes later, and it can be pickled.
     """
 
     def __init__(self, of: HybridSystem | Pipeline) -> None:
@@ -131,7 +131,7 @@ class Model:
 
     @property
     def system(self) -> HybridSystem:
-        """The mathematics; of a cached model it is elaborated at the first use."""
+        """The mathematics; a cached model elaborates it at the first use."""
         return self.pipeline.system
 
     @property
@@ -171,43 +171,44 @@ class Model:
     ) -> Execution:
         """Run the model from t = 0.
 
-        Every number may be given as a number or as an expression of the model's parameters, such as ``"40*pi"``.
+        A number may be given as an expression of the model's parameters, such as ``"40*pi"``.
 
         Parameters
         ----------
         until : number or str, optional
             End of the run.
         scheme, method : str, optional
-            A name of `simulate.SCHEMES`; a name of `integrators.METHODS`, or ``auto``.
+            A name in `simulate.SCHEMES`; a name in `integrators.METHODS`, or ``auto``.
         step, tolerance : number or str, optional
             Fixed step, or bound on the local error relative to the largest size each state has had; they exclude each
             other.
         relaxation : number or str, optional
             The paper's epsilon: a depth in the model's own units, and a time.
         scale : mapping, optional
-            Sizes of states by name: the scale of a state is this size until the state has been larger.
+            Typical sizes of states by name: the scale of a state is this size until the state becomes larger.
         samples : int, str or sequence, optional
-            How many equally spaced samples, their times, or ``every=TIME`` for its multiples; what files are written
-            at.
+            The number of equally spaced samples, their times, or ``every=TIME`` for its multiples; files have rows at
+            these times.
         max_transitions : int or str, optional
-            Stop rather than make more.
+            The largest number of transitions; the run stops before it makes another one.
         completion : {"contact", "auto", "none"}, optional
-            How a run goes on where transitions accumulate.
+            The motion that follows accumulating transitions.
         parameters, initial : mapping, optional
-            Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed anew.
+            Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed again.
         settings : mapping, optional
-            Settings below the ones above but above the file's (what ``--set experiment.NAME`` reaches).
+            Settings as of ``--set experiment.NAME``: the arguments above override them, and they override the file's.
         engine : {"auto", "c", "python"}
-            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler, unless the
-            run is made sooner while another process compiles the model.
+            Compiled code, or the Python loop. ``auto`` is ``c`` if there is a compiler, except that the Python loop may
+            finish while another process compiles the model.
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
         outputs : sequence of str, optional
-            States and outputs; states that none of them depends on are not integrated (see :meth:`only`).
+            States and outputs of the result; states on which none of them depends are not integrated (see
+            :meth:`only`).
         watch : callable, optional
-            Given the recorder before the run starts.
+            Called with the recorder before the run starts.
 
-        Raises UsageError: a name, value or combination that cannot be served.
+        Raises UsageError: a name, value or combination is not valid.
         """
         arguments = (
             until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions, completion,
@@ -233,7 +234,9 @@ class Model:
         return run
 
     def _kept(self, key: Hashable | None, ready: Prepared) -> Prepared:
-        """A run to be made, kept for the same call; one that compiled code is still made for is prepared anew then."""
+        """Return a prepared run, which is kept for the same call; it is prepared again if its code is still being
+        compiled.
+        """
         if ready.pending is None:
             self._prepared.keep(key, ready)
         return ready
@@ -243,12 +246,12 @@ class Model:
         return self._sliding_for(call)._differentiator.of_run(call, wrt)
 
     def _flat(self, what: str) -> None:
-        """Refuse what systems of parts are not made for yet."""
+        """Refuse operations that systems of parts do not support yet."""
         if self.program.parts:
             raise UsageError(f"{what} cannot be had of a system of parts", "write the modes of a small one out")
 
     def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:
-        """The model that a run with these arguments is of: with modes of sliding where its completion is `auto`."""
+        """Return the model of a run with these arguments: with modes of sliding if its completion is `auto`."""
         settings, completion = arguments.get("settings"), arguments.get("completion")
         key = call_key(settings, completion)
         slides = self._slides.find(key)
@@ -260,7 +263,7 @@ class Model:
     def _reduced_run(
         self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
     ) -> Execution:
-        """Run the model reduced to some outputs; initial values and scales of states that are left out do not count."""
+        """Run the model reduced to some outputs; initial values and scales of removed states are ignored."""
         smaller = self.only(outputs)
         gone = set(self.columns) - {"mode", *smaller.columns}
         for group in ("initial", "scale"):
@@ -270,19 +273,19 @@ class Model:
         return smaller.simulate(**arguments, watch=watch)
 
     def sensitivity(self, wrt: str | Sequence[str], **arguments: Any) -> Sensitivity:
-        """Derivatives of a run's end, transition times, states and outputs, through its jumps.
+        """Differentiate a run's end, transition times, states and outputs, through its jumps.
 
-        They are those of the located execution, whose variational equations and saltation matrices are computed along
-        with it.
+        The derivatives are those of the located execution. They follow from its variational equations and saltation
+        matrices.
 
         Parameters
         ----------
         wrt : str or sequence of str
             Parameters by name and initial states as ``initial.NAME``; a text may have several, with commas.
         **arguments
-            Arguments of :meth:`simulate`, but ``step`` and ``outputs``. The scheme is ``located``.
+            Arguments of :meth:`simulate`, except ``step`` and ``outputs``. The scheme is ``located``.
 
-        Raises UsageError: an unknown name, or an argument that cannot be served.
+        Raises UsageError: an unknown name, or an argument that is not valid.
         """
         return self._sliding_for(arguments)._differentiator.sensitivity(wrt, arguments)
 
@@ -297,18 +300,18 @@ class Model:
     ) -> Orbit:
         """Find a periodic orbit by shooting on a section, with its Floquet multipliers.
 
-        The first guess is where the model's own run changes least from one passage of the section to the next.
+        The initial guess is the passage of the section in the model's own run to which the run returns most closely.
 
         Parameters
         ----------
         section : str
             The name of a transition.
         laps : int
-            How many transitions of the section close the orbit.
+            Number of transitions of the section after which the orbit closes.
         period : number or str, optional
-            The period of the forcing; left out, that of the sines and cosines of time in the model.
+            The period of the forcing; by default that of the sines and cosines of time in the model.
         progress : callable, optional
-            Called before every run with which it is, and the value of the parameter that is followed, if any.
+            Called before every run with its number, and the value of the continuation parameter, if any.
         **arguments
             Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
 
@@ -332,9 +335,10 @@ class Model:
         progress: Callable[[int, float | None], None] | None = None,
         **arguments: Any,
     ) -> Branch:
-        """Follow a periodic orbit in a parameter, around folds, with its bifurcations located.
+        """Follow a periodic orbit in a parameter, around folds, and locate its bifurcations.
 
-        It begins at the parameter's own value where that is in the range, else at ``start``, and goes both ways.
+        The branch begins at the parameter's own value if that is in the range, or else at ``start``, and goes in both
+        directions.
 
         Parameters
         ----------
@@ -363,25 +367,25 @@ class Model:
         progress: Callable[[int, int], None] | None = None,
         **arguments: Any,
     ) -> OrbitalStability:
-        """Test by runs from nearby whether the model's execution is orbitally stable, in the quotient metric.
+        """Test by nearby runs whether the model's execution is orbitally stable, in the quotient metric.
 
         Parameters
         ----------
         wrt : str or sequence of str, optional
-            What is moved: initial states as ``initial.NAME``, and parameters, such as those of inputs. Left out, all
+            Names to vary: initial states as ``initial.NAME``, and parameters, such as those of inputs; by default all
             initial states.
         radii : sequence of float
-            How far, relative to each value (or where it is zero to the state's largest size), falling.
+            Decreasing distances, relative to each value (or, if that is zero, to the state's largest size).
         samples : int
-            How many directions at each radius; at least both ways along every axis.
+            Number of directions at each radius; at least both directions of every axis.
         seed : int
-            Of the random directions.
+            Seed of the random directions.
         progress : callable, optional
-            Called after each run with how many are done, and how many there are.
+            Called after each run with the number of finished runs and their total number.
         **arguments
             Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
 
-        Raises UsageError: an unknown name, or radii that do not fall.
+        Raises UsageError: an unknown name, or radii that do not decrease.
         """
         from hsdsl.interface.model.nearby import orbital_stability
 
@@ -407,16 +411,16 @@ class Model:
         data : path, mapping or DataFrame
             A CSV file, or columns by name: ``t`` or ``time``, states, outputs. An empty or NaN cell was not measured.
         wrt : str or sequence of str
-            What to fit: parameters, within the bounds of the file, and initial states as ``initial.NAME``. The first
-            values are those of the file, or of ``parameters`` and ``initial``.
+            Names to fit: parameters, within the bounds of the file, and initial states as ``initial.NAME``. The initial
+            guess is that of the file, or of ``parameters`` and ``initial``.
         sigma : mapping or number, optional
-            The standard deviation of each column, or of the only one.
+            The standard deviation of each column, or of a single column.
         weights : mapping or number, optional
-            Weights of columns instead; left out, one over the largest size of each.
+            Weights of columns instead; by default one over the largest size of each.
         progress : callable, optional
-            Called after every run with how many there were, the values, and the weighted sum of squares.
+            Called after every run with the number of runs, the values, and the weighted sum of squares.
         **arguments
-            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples``, ``precision`` and ``until``.
+            Arguments of :meth:`simulate`, except ``step``, ``scheme``, ``samples``, ``precision`` and ``until``.
 
         Raises UsageError: an unknown name or column, or a run that does not reach the measurements.
         """
@@ -435,10 +439,10 @@ class Model:
         watch: Callable[[Progress], None] | None = None,
         **arguments: Any,
     ) -> Streamed:
-        """Run the model with its rows going to a CSV file while it runs, in constant memory.
+        """Run the model and write its rows to a CSV file during the run, in constant memory.
 
-        The file has the first row, every k-th, both rows of each jump and the last; it holds whole lines at any moment,
-        so that what a run that was killed has written can be read. A file of this name is written over.
+        The file has the first row, every k-th, both rows of each jump and the last. It has complete lines at any time,
+        so the file of a killed run is readable. An existing file of this name is overwritten.
 
         Parameters
         ----------
@@ -447,11 +451,11 @@ class Model:
         every : int
             k.
         columns : names, optional
-            Which states and outputs; left out, all of them.
+            States and outputs in the file; by default all.
         watch : callable, optional
             As for :meth:`simulate`.
         **arguments
-            Further arguments of :meth:`simulate`, but ``precision`` and ``samples``.
+            Further arguments of :meth:`simulate`, except ``precision`` and ``samples``.
 
         Raises UsageError: there is no compiled engine, the file cannot be written, or the disk is full.
         """
@@ -477,28 +481,28 @@ class Model:
         progress: Callable[[int, int], None] | None = None,
         **arguments: Any,
     ) -> Ensemble:
-        """Run many instances of the model, on all cores where there is a compiler.
+        """Run many instances of the model, on all cores if there is a compiler.
 
-        Every instance gives what :meth:`simulate` gives, to the last bit. Ctrl-C keeps those that are done.
+        Every instance equals the run of :meth:`simulate`, to the last bit. Ctrl-C keeps the finished instances.
 
         Parameters
         ----------
         parameters, initial : mapping, optional
-            Overrides by name: numbers, expressions, or arrays of numbers. Arrays are brought to a common shape, as
-            NumPy does; each of its elements is an instance.
+            Overrides by name: numbers, expressions, or arrays of numbers. Arrays are broadcast to a common shape, as in
+            NumPy; each element is an instance.
         samples : int, sequence of float or str, optional
-            Sample every run: at so many equally spaced times from 0 to its ``until``, at these times, or at the
-            multiples of an expression of parameters, such as ``"2*pi/w"``.
+            Sample times of every run: their number, equally spaced from 0 to its ``until``, the times, or an expression
+            of parameters, such as ``"2*pi/w"``, for its multiples.
         transition_times : int
-            Keep the times of so many first transitions of each run.
+            Number of first transitions of each run whose times are kept.
         every_transition : bool
-            Keep every transition, with the states around it: `Ensemble.transition_table`.
+            Whether to keep every transition, with the states before and after it: `Ensemble.transition_table`.
         threads : int, optional
             How many; left out, as many as there are cores for this process.
         progress : callable, optional
-            Called now and then with how many instances are done and how many there are.
+            Called from time to time with the number of finished instances and their total number.
         **arguments
-            Further arguments of :meth:`simulate` for every instance, but ``precision`` and ``outputs``.
+            Further arguments of :meth:`simulate` for every instance, except ``precision`` and ``outputs``.
 
         Raises UsageError: an unknown name, arrays of different shapes, or no instance that can be run.
         """
@@ -526,7 +530,7 @@ class Model:
     ) -> Sweep:
         """Run the model over many values into a dataset of Parquet files, on all cores or on a Dask cluster.
 
-        The same call goes on with a dataset that is not complete. A run that fails is a row with its reason.
+        The same call resumes a dataset that is not complete. A run that fails is a row with its reason.
 
         Parameters
         ----------
@@ -536,23 +540,23 @@ class Model:
         out : path
             The folder of the dataset: a new one, or that of the same sweep.
         random : int, optional
-            How many rows each point of the grid has, where something is drawn.
+            Rows for each point of the grid, if values are drawn.
         seed : int
-            Of the draws. A row has the same values for any number of workers.
+            Seed of the draws. A row has the same values for any number of workers.
         record : str or sequence of str
-            What is kept of each run besides how it ended (`hsdsl.analysis.sweep.recording`).
+            Records of each run besides its end (`hsdsl.analysis.sweep.recording`).
         outputs : sequence of str, optional
             States and outputs, as for :meth:`simulate`; the others have no columns.
         cluster : str, optional
             The address of a Dask scheduler, such as ``tcp://host:8786``.
         processes : int, optional
-            How many on this machine; left out, as many as there are cores for this process.
+            Number of processes on this machine; by default the number of cores of this process.
         chunk : int, optional
-            How many rows a file has; left out, it follows from a few runs that are timed.
+            Rows of each file; by default it follows from a few timed runs.
         progress : callable, optional
-            Called after each chunk with how many rows are there, and how many there will be.
+            Called after each chunk with the number of finished rows and their total number.
         **arguments
-            Further arguments of :meth:`simulate` for every run, but ``precision``, ``samples`` and ``watch``.
+            Further arguments of :meth:`simulate` for every run, except ``precision``, ``samples`` and ``watch``.
 
         Raises UsageError: an unknown name, a folder of another sweep, or a cluster that does not answer.
         """
@@ -565,14 +569,14 @@ class Model:
 
     @cached_property
     def sliding(self) -> Model:
-        """The model with a mode for each surface that two modes press on; this one where there is none."""
+        """The model with a sliding mode for each surface towards which two flows point; this model if there is none."""
         return self if self.pipeline.sliding is self.pipeline else Model(self.pipeline.sliding)
 
     def completed(self) -> str | None:
-        """The text of the model with modes for motion along guards and for sliding; None where there are none.
+        """Return the text of the model with modes for motion along guards and for sliding; None if there are none.
 
-        It is an ordinary model, for every engine and export. A transition enters the motion along its guard where the
-        flight that follows it would last less than the parameter ``contact_time``.
+        It is an ordinary model, for every engine and export. A transition enters the motion along its guard if the next
+        flight would last less than the parameter ``contact_time``.
         """
         self._flat("a completed text")
         from hsdsl.language.elaborate import elaborate_files
@@ -593,10 +597,10 @@ class Model:
         return text
 
     def only(self, outputs: Sequence[str]) -> Model:
-        """Return the model with these states and outputs and those they, or any transition, depend on.
+        """Return the model reduced to these states and outputs, and to all that they or any transition depend on.
 
-        It runs as a model written without the rest: adaptive steps follow the remaining states alone, and a state that
-        is left out can neither stop a run nor keep one from coming to rest.
+        It runs as a model without the other states: adaptive steps depend on the remaining states alone, and a state
+        that is left out can neither stop a run nor prevent a rest.
         """
         names = tuple(sorted(set(outputs)))
         for name in names:
@@ -608,7 +612,7 @@ class Model:
         return self._smaller[names]
 
     def estimate(self, execution: Execution) -> Estimate:
-        """Compare an execution of this model with the same run made finer (see `hsdsl.interface.model.estimate`)."""
+        """Compare an execution of this model with a finer run (see `hsdsl.interface.model.estimate`)."""
         from hsdsl.interface.model.estimate import estimate
 
         return estimate(execution)
@@ -625,9 +629,9 @@ class Model:
         Parameters
         ----------
         runs : Execution or sequence of Execution
-            Several are drawn in one picture.
+            One execution, or several for one picture.
         parameters : mapping, optional
-            The overrides of the run, which the levels depend on.
+            The overrides of the run, on which the levels depend.
         **options
             ``columns``, ``phases``, ``labels`` and ``title`` of `hsdsl.analysis.plot.View`.
 
@@ -645,16 +649,17 @@ class Model:
         progress: Callable[[int, int], None] | None = None,
         **arguments: Any,
     ) -> Execution:
-        """Run the model and write its scene as a film: .gif, or .mp4 where ffmpeg is there.
+        """Run the model and write its scene as a film: .gif, or .mp4 if ffmpeg is installed.
 
         Parameters
         ----------
         speed : float, optional
-            Time of the run by seconds of the film; left out, 1 where the film then lasts 4 to 20 s, else what fits.
+            Model time per second of the film; by default 1 if the film then lasts 4 to 20 s, or else a value for such a
+            length.
         progress : callable, optional
-            Called after each frame with how many there are, and how many there will be.
+            Called after each frame with the number of finished frames and their total number.
         **arguments
-            Arguments of :meth:`simulate`, but ``outputs``.
+            Arguments of :meth:`simulate`, except ``outputs``.
 
         Returns
         -------
@@ -673,24 +678,24 @@ class Model:
         return run
 
     def check_scene(self) -> None:
-        """Raise UsageError where the model has no scene."""
+        """Raise UsageError if the model has no scene."""
         if not self.system.scene:
             raise UsageError("the model has no scene to animate", "a scene has shapes: scene: [{point: [x, 0]}]")
 
     @cached_property
     def _staged(self) -> Model:
-        """The model with the numbers of its scene as further outputs."""
+        """Return the model with the numbers of its scene as further outputs."""
         from hsdsl.language.elaborate.scene import scene_as_outputs
 
         self.check_scene()
         return Model(scene_as_outputs(self.system))
 
     def with_outputs(self, run: Execution) -> Execution:
-        """Return a run of this model that was read from a file, with its outputs between rows as the model has them.
+        """Return a run that was read from a file, with outputs between rows computed by this model.
 
-        A file holds the outputs at rows only.
+        A file has the outputs only at rows.
 
-        Raises UsageError: the run is not one of this model as it is now.
+        Raises UsageError: the run is not one of this model in its present form.
         """
         if run.digest != self.program.digest:
             hint = "run it again, or give the model as it was"
@@ -701,7 +706,9 @@ class Model:
         return with_output_function(run, self.pipeline.prepare(arguments))
 
     def look(self, parameters: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """What a picture shows of the model: its units, levels of its guards, and the program of its mode graph."""
+        """Return what a picture shows of the model: its units, levels of its guards, and the program of its mode
+        graph.
+        """
         from hsdsl.interface.model.guards import guard_lines
 
         values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
@@ -719,27 +726,27 @@ class Model:
         seconds: float = 60.0,
         plot: str | os.PathLike[str] | None = None,
     ) -> PointDistance:
-        """Return how far apart two points are: the length of the shortest curve that may pass through guards.
+        """Return the distance of two points: the length of the shortest curve, which may pass through guards.
 
         Parameters
         ----------
         p, q : str or SpacePoint
             A mode and all its states, as ``"free x=13 v=5"``; values are expressions of parameters.
         metric : {"quotient", "relaxed"}
-            The paper's d_M (Def. 12), or that of the relaxed space (Def. 19).
+            The paper's d_M (Def. 12), or the metric of the relaxed space (Def. 19).
         relaxation : number or str, optional
-            The paper's epsilon; left out, that of a run of the file.
+            The paper's epsilon; by default that of a run of the file.
         parameters : mapping, optional
             Overrides by name.
         hops : int, optional
-            The most passages of a path; left out, eight more than the fewest that connect the modes. The lower end
-            holds for paths with more, too.
+            The largest number of passages of a path; by default eight more than the fewest that connect the modes. The
+            lower end also holds for paths with more.
         seconds : float
-            The time for the search. After it the interval is wider, and ``certified`` says so.
+            Time limit of the search. If it is reached, the interval is wider, and ``certified`` says so.
         plot : path, optional
-            Draw the shortest path found there (.png or .svg), where its modes have two coordinates.
+            File for a picture of the shortest path found (.png or .svg), if its modes have two coordinates.
 
-        Raises UsageError: a point or a number that does not fit the model, or a point outside its mode's domain.
+        Raises UsageError: a point or a number does not fit the model, or a point is outside its mode's domain.
         """
         from hsdsl.interface.model.distances import budget_of
         from hsdsl.interface.model.points import distance_of_points

@@ -1,4 +1,4 @@
-"""``Model.stream``: a run of any length whose rows go to a file while it runs, in constant memory."""
+"""``Model.stream``: a run of any length that writes its rows to a file, in constant memory."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Streamed:
-    """A run whose rows are in a file: the rows written, all steps, the number of transitions, and the last row.
+    """A run with its rows in a file: the numbers of rows, steps and transitions, and the last row.
 
-    ``warnings`` are those that take no verdict.
+    ``warnings`` has the warnings that need no verdict.
     """
 
     path: Path
@@ -133,7 +133,7 @@ def check(
 
 
 def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | None, watch: Watch | None) -> Streamed:
-    """Run to the end, rows going to a CSV file.
+    """Run to the end, and write the rows to a CSV file.
 
     Raises UsageError: the file cannot be written, or not on to its end (a full disk); what was written stays.
     Raises BecomesStiff: the method that `auto` has chosen does not serve.
