@@ -6,7 +6,7 @@ import inspect
 import re
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from importlib import import_module
+from pkgutil import resolve_name
 from typing import Any
 
 from writing.markdown import code, table
@@ -99,13 +99,8 @@ def python_api() -> str:
     for heading, names in SECTIONS.items():
         parts.append(f"## {heading}\n\n")
         for name, members in names:
-            parts += _entry(name, _found(name), members)
+            parts += _entry(name, resolve_name(name), members)
     return "".join(parts)
-
-
-def _found(name: str) -> Any:
-    module, _, last = name.rpartition(".")
-    return getattr(import_module(module), last)
 
 
 def _entry(name: str, thing: Any, members: str) -> Iterator[str]:

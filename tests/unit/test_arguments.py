@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
 import os
+import pkgutil
 import subprocess
 import sys
 import threading
@@ -128,8 +128,7 @@ def public_functions():
     from writing.python_api import MADE, SECTIONS
 
     for name, members in (pair for pairs in SECTIONS.values() for pair in pairs):
-        module, _, last = name.rpartition(".")
-        thing = getattr(importlib.import_module(module), last)
+        thing, last = pkgutil.resolve_name(name), name.rpartition(".")[2]
         if not isinstance(thing, type):
             yield name, thing
             continue

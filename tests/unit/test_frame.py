@@ -109,9 +109,13 @@ def test_architecture_page_has_the_layers_that_are_checked():
         "contracts"
     ]
     page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
-    table = re.search(r"^```text\n(__main__.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
-    assert table is not None
-    assert [line.split("  ")[0] for line in table[1].splitlines()] == contracts[0]["layers"]
+    rows = dict(re.findall(r"^\| `(\w+)` \| (.*) \|$", page, flags=re.MULTILINE))
+    checked = {each["containers"][0].removeprefix("hsdsl."): each["layers"] for each in contracts if "layers" in each}
+    storeys = checked.pop("hsdsl")
+    assert re.findall(r"^  (\w+)/ ", page, flags=re.MULTILINE) == storeys[1:]
+    for storey, layers in checked.items():
+        named = [set(re.findall(r"`(\w+)`", re.sub(r"\(.*?\)", "", layer))) for layer in rows[storey].split(";")]
+        assert named == [set(layer.split(" | ")) for layer in layers], storey
 
 
 def test_architecture_page_names_files_that_there_are():

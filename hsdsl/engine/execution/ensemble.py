@@ -11,6 +11,7 @@ import numpy as np
 
 from hsdsl.base.calls import checks_methods
 from hsdsl.base.names import called, visible
+from hsdsl.base.shown import shown
 from hsdsl.engine.execution.parts import COMPLETE
 from hsdsl.engine.execution.run import Execution
 from hsdsl.engine.execution.samples import Array
@@ -120,9 +121,7 @@ class Ensemble:
 
     def _repr_html_(self) -> str:
         """Show the varied values, the ends of the runs, and a picture in notebooks."""
-        from hsdsl.analysis.plot.notebook import ensemble_html
-
-        return ensemble_html(self)
+        return shown("ensemble_html", self)
 
     def to_pandas(self, what: Literal["runs", "samples", "transitions"] = "runs") -> Any:
         """Make a pandas DataFrame with a row for each run, each sample, or each transition.
