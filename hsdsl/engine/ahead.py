@@ -249,12 +249,12 @@ def _compile(lowered: Answer) -> None:
     """Compile the program that runs, for the cache; where there is none, let a run that is shorter than this end."""
     import time
 
-    from hsdsl.engine.runtime import programs
+    from hsdsl.engine.runtime import library
     from hsdsl.engine.runtime.compiler import NoCompiler
 
     if isinstance(lowered, Lowered):
         with applied(lowered.files.limits), suppress(NoCompiler):  # the run that needs it reports the failure
-            if not programs.keep(lowered.sliding or lowered.program):
+            if not library.keep_program(lowered.sliding or lowered.program):
                 time.sleep(time.process_time())
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from hsdsl.base.functions import FUNCTIONS
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.engine.backends.c.printer import function_body
+from hsdsl.engine.backends.c.routine import function_body
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.runtime.kernel import CompiledModel

@@ -16,7 +16,7 @@ from hsdsl.base.cache import making
 from hsdsl.base.errors import ModelError
 from hsdsl.engine import ahead
 from hsdsl.engine.preparation.pipeline import pipeline_of
-from hsdsl.engine.runtime import kernel, library, programs
+from hsdsl.engine.runtime import kernel, library
 from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
 from hsdsl.language.elaborate import elaborate_files
 from hsdsl.language.files import ModelFiles
@@ -114,7 +114,7 @@ def test_another_model_is_not_taken_for_it_and_nothing_is_left():
 
 @pytest.mark.parametrize("options", [[], ["--json"], ["-q", "--json"]])
 def test_a_plain_run_begins_before_its_words_are_read(options, monkeypatch):
-    monkeypatch.setattr(programs, "loop", lambda: None)  # which takes seconds to compile
+    monkeypatch.setattr(library, "loop", lambda: None)  # which takes seconds to compile
     model = str(MODELS / "thermostat.yaml")
     ahead.begin_run(["run", model, *options])
     ahead.begin(ModelFiles.read(Path(model)))  # as the command does
@@ -213,7 +213,7 @@ def test_what_goes_on_holds_nothing_open(monkeypatch):
 def test_nobody_compiles_what_others_do_or_what_is_not_kept(closed, monkeypatch, tmp_path):
     files = ModelFiles.read(MODELS / "thermostat.yaml")
     compiler, program = find_compiler(), lower(elaborate_files(files).system)
-    keys = [library._key(each, compiler) for each in (programs._content(program), library.LOOP[0])]
+    keys = [library._key(each, compiler) for each in (library._content(program), library.LOOP[0])]
     if closed:
         monkeypatch.setenv("XDG_CACHE_HOME", __file__)
     monkeypatch.setattr(library, "_made", lambda *_: (tmp_path / "made").touch())
@@ -226,9 +226,9 @@ def test_nobody_compiles_what_others_do_or_what_is_not_kept(closed, monkeypatch,
 
 def test_a_run_does_not_wait_for_what_another_process_compiles():
     model = hsdsl.load(MODELS / "bouncing-ball.yaml")
-    key = library._key(programs._content(model.program), find_compiler())
+    key = library._key(library._content(model.program), find_compiler())
     with making(library.KIND, key):
-        assert library.made_elsewhere(programs._content(model.program))()
+        assert library.made_elsewhere(library._content(model.program))()
         first = model.simulate()
     second = hsdsl.load(MODELS / "bouncing-ball.yaml").simulate()
     assert (first.engine, second.engine) == ("python", "c")

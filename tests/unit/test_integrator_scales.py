@@ -8,7 +8,7 @@ import pytest
 
 import hsdsl
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.engine.integrators.scales import flow_terms
+from hsdsl.engine.integrators.stepper import flow_terms
 
 
 @pytest.mark.parametrize("n", [3, 7, 20])

@@ -11,7 +11,7 @@ import numpy as np
 from hsdsl.analysis.metrics.rounding import UNIT
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64
 from hsdsl.base.numbers.enclosures import ENCLOSED, Array, as_range, hull
-from hsdsl.engine.backends.text import compile_routines
+from hsdsl.engine.backends.python import compile_routines
 from hsdsl.mathematics.program import Routines
 
 Boxes = Callable[[Array, Array], tuple[Array, Array]]

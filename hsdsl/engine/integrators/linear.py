@@ -1,16 +1,20 @@
-"""Systems of linear equations for any number type: dense LU with partial pivoting, for the few states of a mode.
+"""Systems of linear equations for any number type: dense, sparse, and of states with derivatives of them.
 
-A pivot is the largest number of its column relative to the scale of its row's unknown, so that it does not depend on
-the units of the unknowns. Complex numbers are pairs of real ones, so that every number type has them, and every engine
-the same.
+Dense LU has partial pivoting: a pivot is the largest number of its column relative to the scale of its row's unknown,
+so that it does not depend on the units of the unknowns. Sparse LU keeps to a pattern known before and to the pivots of
+the diagonal: a step whose matrix has none is too long, as one whose iteration does not converge. A matrix of states and
+derivatives has the same block for the states and for each column of derivatives, and below the first one how these
+vary with the states: a solution is one of the states, then one for each column. Complex numbers are pairs of real ones,
+so that every number type has them, and every engine the same.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import Number
+from hsdsl.base.sparsity import Elimination, Variation
 
 Matrix = list[list[Number]]
 Vector = list[Number]
@@ -143,3 +147,177 @@ def factored_complex(
                 re[i][j] = re[i][j] - (p * re[k][j] - q * im[k][j])
                 im[i][j] = im[i][j] - (p * im[k][j] + q * re[k][j])
     return ComplexFactors(re, im, order)
+
+
+@dataclass(frozen=True)
+class SparseFactors:
+    """Factors in a pattern: below the diagonal L (its diagonal is 1), above it U; the diagonal has inverse pivots."""
+
+    of: Elimination
+    values: Vector
+
+    def solve(self, right: Vector) -> Vector:
+        """Solve for a right-hand side."""
+        of, values = self.of, self.values
+        y = [right[i] for i in of.order]
+        for i in range(len(y)):
+            for at in range(of.start[i], of.diagonal[i]):
+                y[i] = y[i] - values[at] * y[of.column[at]]
+        found = list(y)
+        for i in range(len(y) - 1, -1, -1):
+            for at in range(of.diagonal[i] + 1, of.start[i + 1]):
+                y[i] = y[i] - values[at] * y[of.column[at]]
+            y[i] = y[i] * values[of.diagonal[i]]
+            found[of.order[i]] = y[i]
+        return found
+
+
+def sparse_factored(of: Elimination, entries: Vector) -> SparseFactors:
+    """Factor a matrix, given by all entries of the pattern.
+
+    Raises Singular: a pivot is zero or not a number.
+    """
+    values = list(entries)
+    row = [entries[0] * 0] * len(of.order)
+    for i in range(len(of.order)):
+        for at in range(of.start[i], of.start[i + 1]):
+            row[of.column[at]] = values[at]
+        for at in range(of.start[i], of.diagonal[i]):
+            k = of.column[at]
+            share = row[k] = row[k] * values[of.diagonal[k]]
+            for above in range(of.diagonal[k] + 1, of.start[k + 1]):
+                row[of.column[above]] = row[of.column[above]] - share * values[above]
+        for at in range(of.start[i], of.start[i + 1]):
+            values[at] = row[of.column[at]]
+        if not abs(row[i]) > 0:
+            raise Singular("a matrix without a pivot on its diagonal")
+        values[of.diagonal[i]] = 1 / row[i]
+    return SparseFactors(of, values)
+
+
+@dataclass(frozen=True)
+class ComplexSparseFactors:
+    """The same of a complex matrix, real and imaginary parts apart."""
+
+    of: Elimination
+    real: Vector
+    imaginary: Vector
+
+    def solve(self, real: Vector, imaginary: Vector) -> tuple[Vector, Vector]:
+        """Solve for a right-hand side; returns the real and the imaginary parts."""
+        of = self.of
+        a, b = [real[i] for i in of.order], [imaginary[i] for i in of.order]
+        for i in range(len(a)):
+            self._less(a, b, i, of.start[i], of.diagonal[i])
+        one, two = list(a), list(b)
+        for i in range(len(a) - 1, -1, -1):
+            self._less(a, b, i, of.diagonal[i] + 1, of.start[i + 1])
+            c, d = self.real[of.diagonal[i]], self.imaginary[of.diagonal[i]]
+            a[i], b[i] = c * a[i] - d * b[i], c * b[i] + d * a[i]
+            one[of.order[i]], two[of.order[i]] = a[i], b[i]
+        return one, two
+
+    def _less(self, a: Vector, b: Vector, i: int, first: int, end: int) -> None:
+        for at in range(first, end):
+            c, d, j = self.real[at], self.imaginary[at], self.of.column[at]
+            a[i], b[i] = a[i] - (c * a[j] - d * b[j]), b[i] - (c * b[j] + d * a[j])
+
+
+def sparse_factored_complex(of: Elimination, real: Vector, imaginary: Vector) -> ComplexSparseFactors:
+    """Factor a complex matrix, likewise.
+
+    Raises Singular: a pivot is zero or not a number.
+    """
+    re, im = list(real), list(imaginary)
+    zero: Number = real[0] * 0
+    c, d = [zero] * len(of.order), [zero] * len(of.order)
+    for i in range(len(of.order)):
+        for at in range(of.start[i], of.start[i + 1]):
+            c[of.column[at]], d[of.column[at]] = re[at], im[at]
+        for at in range(of.start[i], of.diagonal[i]):
+            k = of.column[at]
+            p, q, u, v = c[k], d[k], re[of.diagonal[k]], im[of.diagonal[k]]
+            c[k], d[k] = u * p - v * q, u * q + v * p
+            for above in range(of.diagonal[k] + 1, of.start[k + 1]):
+                j = of.column[above]
+                c[j] = c[j] - (c[k] * re[above] - d[k] * im[above])
+                d[j] = d[j] - (c[k] * im[above] + d[k] * re[above])
+        for at in range(of.start[i], of.start[i + 1]):
+            re[at], im[at] = c[of.column[at]], d[of.column[at]]
+        size = c[i] * c[i] + d[i] * d[i]
+        if not size > 0:
+            raise Singular("a matrix without a pivot on its diagonal")
+        re[of.diagonal[i]], im[of.diagonal[i]] = c[i] / size, -d[i] / size
+    return ComplexSparseFactors(of, re, im)
+
+
+@dataclass(frozen=True)
+class _Blocks:
+    """What a column's right-hand sides have of the states' changes: h times the derivatives ``of.links``."""
+
+    of: Variation
+    linked: Vector
+
+    def _linked(self, right: Vector, own: Vector) -> Vector:
+        """Right-hand sides with what the changes of the states add."""
+        found = list(right)
+        for i, j, d in zip(self.of.linked, self.of.linking, self.linked, strict=True):
+            found[i] = found[i] + d * own[j]
+        return found
+
+    def _ranges(self) -> Iterable[tuple[range, list[int]]]:
+        """Where each column is, and which states it has derivatives of."""
+        of = self.of
+        for begin, end in zip(of.columns, of.columns[1:], strict=False):
+            yield range(begin, end), of.rows[begin - of.own : end - of.own]
+
+    def _spread(self, values: Vector, rows: list[int]) -> Vector:
+        """The right-hand side of a column, zero for derivatives that it does not have."""
+        spread = [values[0] * 0] * self.of.own
+        for row, value in zip(rows, values, strict=True):
+            spread[row] = value
+        return spread
+
+
+@dataclass(frozen=True)
+class BlockFactors(_Blocks):
+    """A real matrix of this kind."""
+
+    factors: Factors | SparseFactors
+
+    def solve(self, right: Vector) -> Vector:
+        """Solve for a right-hand side."""
+        return self.solve_columns(self.factors.solve(right[: self.of.own]), right)
+
+    def solve_columns(self, own: Vector, right: Vector) -> Vector:
+        """Solve for the columns, where the solution for the states is known."""
+        rest, found = self._linked(right, own), [*own, *(r * 0 for r in right[self.of.own :])]
+        for places, rows in self._ranges():
+            column = self.factors.solve(self._spread([rest[i] for i in places], rows))
+            for i, row in zip(places, rows, strict=True):
+                found[i] = column[row]
+        return found
+
+
+@dataclass(frozen=True)
+class ComplexBlockFactors(_Blocks):
+    """The same of a complex matrix, real and imaginary parts apart."""
+
+    factors: ComplexFactors | ComplexSparseFactors
+
+    def solve(self, real: Vector, imaginary: Vector) -> tuple[Vector, Vector]:
+        """Solve for a right-hand side; returns the real and the imaginary parts."""
+        n = self.of.own
+        own = self.factors.solve(real[:n], imaginary[:n])
+        rest = [self._linked(part, a) for part, a in zip((real, imaginary), own, strict=True)]
+        a, b = ([*known, *(r * 0 for r in real[n:])] for known in own)
+        for places, rows in self._ranges():
+            column = self.factors.solve(*(self._spread([part[i] for i in places], rows) for part in rest))
+            for i, row in zip(places, rows, strict=True):
+                a[i], b[i] = column[0][row], column[1][row]
+        return a, b
+
+
+def linked(of: Variation, h: Number, rows: Matrix) -> Vector:
+    """What a column's right-hand sides have of the changes of the states."""
+    return [h * rows[i][j] for i, j in zip(of.linked, of.linking, strict=True)]

@@ -1,12 +1,15 @@
 """Radau IIA of order 5: the method for stiff modes, implicit, with the derivatives of the flow from the model itself.
 
-A step is collocation at the nodes (4 - sqrt 6)/10, (4 + sqrt 6)/10 and 1: the polynomial of degree 3 from the step's
+A step is collocation at the nodes (4 - sqrt 6)/10, (4 + sqrt 6)/10 and 1: the polynomial u of degree 3 from the step's
 start that has the flow's slope at these three times. It is L-stable: what decays fast is gone after one step, however
-long.
+long. The unknowns are the increments Z_i = u(t + c_i h) - x, with Z = h A f(x + Z). A similarity T takes the inverse of
+A to one real number and a block of two, so that a Newton iteration solves one real and one complex system instead of
+one of three times the size.
 
 What a step must know is expensive: derivatives of the flow, factors of two matrices, a first guess. So what one step
 leaves is kept for the next: the derivatives as long as the iterations converge fast, the factors as long as the step
-keeps its length too, and the guess is the last polynomial, gone on with.
+keeps its length too, and the guess is the last polynomial, gone on with. The iterations converge linearly, by a factor
+that the last two changes tell; what the next ones would still add follows from it.
 
 E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 1996, IV.5 and IV.8
 (doi:10.1007/978-3-642-05221-7).
@@ -16,31 +19,31 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
+from functools import cache
+from itertools import islice
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.base.sparsity import Elimination
-from hsdsl.engine.integrators.blocks import BlockFactors, ComplexBlockFactors, linked
-from hsdsl.engine.integrators.collocation import coefficients
 from hsdsl.engine.integrators.implicit import RADAU as RADAU
 from hsdsl.engine.integrators.implicit import Derivatives
 from hsdsl.engine.integrators.linear import (
+    BlockFactors,
+    ComplexBlockFactors,
     ComplexFactors,
+    ComplexSparseFactors,
     Factors,
     Matrix,
     Singular,
+    SparseFactors,
     Vector,
     factored,
     factored_complex,
-)
-from hsdsl.engine.integrators.newton import Convergence, Increments, Iteration, NoConvergence
-from hsdsl.engine.integrators.scales import resolved, rows_of
-from hsdsl.engine.integrators.sparse import (
-    ComplexSparseFactors,
-    SparseFactors,
+    linked,
     sparse_factored,
     sparse_factored_complex,
 )
-from hsdsl.engine.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
+from hsdsl.engine.integrators.stepper import Flow, Polynomial, Stages, State, Stepper, resolved, rows_of
 
 
 def radau_stepper(known: Derivatives, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:
@@ -298,3 +301,235 @@ def _weighted(weights: State, vectors: Stages | Increments | list[State]) -> Vec
 def _three(vectors: Iterator[Vector]) -> Increments:
     a, b, c = vectors
     return a, b, c
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Coefficients in one number type.
+
+    Attributes
+    ----------
+    nodes : tuple of Number
+        The three c_i.
+    a : tuple of tuple of Number
+        Weights of the slopes at the nodes in the increments; the last row is that of the step itself.
+    powers : tuple of tuple of Number
+        Row m has the weights of the three increments in the polynomial's coefficient of s**(m + 1), s the share of
+        the step.
+    gamma, alpha, beta : Number
+        The eigenvalues of the inverse of a: gamma and alpha +- i beta.
+    mix, unmix : tuple of tuple of Number
+        T, whose columns are an eigenvector to gamma and the parts of one to alpha + i beta, and its inverse.
+    estimate : tuple of Number
+        Weights of the increments in the embedded method's defect, added to h times the flow at the step's start.
+    share : Number
+        Where inside a step its polynomial is held against the flow: (6 - sqrt 6)/10.
+    values, slope : tuple of Number
+        Weights of the increments in the polynomial and in its derivative by s there.
+    end_slope : tuple of Number
+        Weights of the increments in the derivative by s at the step's end.
+    """
+
+    nodes: State
+    a: tuple[State, ...]
+    powers: tuple[State, ...]
+    gamma: Number
+    alpha: Number
+    beta: Number
+    mix: tuple[State, ...]
+    unmix: tuple[State, ...]
+    estimate: State
+    share: Number
+    values: State
+    slope: State
+    end_slope: State
+
+
+@cache
+def coefficients(arithmetic: Arithmetic) -> Coefficients:
+    """Make the coefficients in a number type."""
+    one = arithmetic.zero + 1
+    root = arithmetic.sqrt(6 * one)
+    nodes = ((4 - root) / 10, (4 + root) / 10, one)
+    share = (6 - root) / 10
+    cubic = arithmetic.functions["pow"](3 * one, one / 3)  # the eigenvalues are the roots of s^3 - 9 s^2 + 36 s - 60
+    gamma, alpha = 3 - cubic + cubic * cubic, 3 + (cubic - cubic * cubic) / 2
+    beta = arithmetic.sqrt(3 * one) * (cubic + cubic * cubic) / 2
+    powers = _powers(nodes)
+    mix = _eigenvectors(nodes, gamma, alpha, beta)
+    return Coefficients(
+        nodes,
+        _weights(nodes),
+        powers,
+        gamma,
+        alpha,
+        beta,
+        mix,
+        _inverse(mix),
+        ((-13 - 7 * root) / 3, (-13 + 7 * root) / 3, -one / 3),
+        share,
+        _combined((share, share * share, share * share * share), powers),
+        _combined((one, 2 * share, 3 * share * share), powers),
+        _combined((one, 2 * one, 3 * one), powers),
+    )
+
+
+def _weights(nodes: State) -> tuple[State, ...]:
+    """The integrals from 0 to each node of the polynomials of degree 2 that are 1 at one node and 0 at the others."""
+    columns: list[State] = []
+    for i, c in enumerate(nodes):
+        p, q = (other for j, other in enumerate(nodes) if j != i)
+        scale = (c - p) * (c - q)
+        columns.append(tuple(s * (p * q + s * (-(p + q) / 2 + s / 3)) / scale for s in nodes))
+    return tuple(zip(*columns, strict=True))
+
+
+def _powers(nodes: State) -> tuple[State, ...]:
+    """The coefficients of s, s**2, s**3 of the polynomials that are 1 at one node and 0 at the others and at 0."""
+    columns: list[State] = []
+    for i, c in enumerate(nodes):
+        p, q = (other for j, other in enumerate(nodes) if j != i)
+        scale = c * (c - p) * (c - q)
+        columns.append((p * q / scale, -(p + q) / scale, (c * 0 + 1) / scale))
+    return tuple(zip(*columns, strict=True))
+
+
+def _eigenvectors(nodes: State, gamma: Number, alpha: Number, beta: Number) -> tuple[State, ...]:
+    """To the eigenvalue s of the inverse of a belongs s^2 M' + s M'' + M''' at the nodes, M the product over s - c_i.
+
+    For a maps a polynomial of degree 2, by its values at the nodes, to the values of its integral from 0.
+    """
+    p, q, r = nodes
+    columns: list[tuple[Number, Number, Number]] = []
+    for c in nodes:
+        first = 3 * c * c - 2 * (p + q + r) * c + (p * q + p * r + q * r)
+        second = 6 * c - 2 * (p + q + r)
+        real = gamma * gamma * first + gamma * second + 6
+        columns.append(
+            (real, (alpha * alpha - beta * beta) * first + alpha * second + 6, beta * (2 * alpha * first + second))
+        )
+    u, v, w = columns[-1]  # scaled to 1 at the last node
+    size = v * v + w * w
+    return tuple((a / u, (b * v + c * w) / size, (c * v - b * w) / size) for a, b, c in columns)
+
+
+def _inverse(matrix: tuple[State, ...]) -> tuple[State, ...]:
+    factors, n = factored([list(row) for row in matrix]), len(matrix)
+    zero = matrix[0][0] * 0
+    columns: Matrix = [factors.solve([zero + (i == j) for i in range(n)]) for j in range(n)]
+    return tuple(zip(*columns, strict=True))
+
+
+def _combined(terms: State, rows: tuple[State, ...]) -> State:
+    """Sum rows with weights."""
+    return tuple(terms[0] * a + terms[1] * b + terms[2] * c for a, b, c in zip(*rows, strict=True))
+
+
+Increments = tuple[Vector, Vector, Vector]
+Iteration = tuple[Vector, Increments]  # the largest change of each state, and the increments after it
+
+MOST_ITERATIONS = 7  # iterations of a step that has a tolerance
+RENEWED = 1e-3  # an iteration that leaves more than this of the one before has old derivatives,
+FEW = 2  # which matters where a step takes more than these
+LEAST_LEFT, MOST_LEFT = 1e-3, 0.03  # of the tolerance: what the iterations of such a step may leave
+DIVERGING = 0.99  # an iteration that leaves more than this of the one before is one of too long a step
+SLOW_RATE = 0.5  # likewise for iterations that go on to round-off
+NEWTON_NOISE = 2**10  # units of round-off, relative to the scales: a correction this small may be all noise
+NEWTON_SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
+
+
+class NoConvergence(ValueError):
+    """The equations of a step are not solved by the iteration: the step is too long."""
+
+
+class Convergence:
+    """How iterations converge, over the steps of one stretch of flow.
+
+    Attributes
+    ----------
+    rate : Number
+        What the last iteration left of the one before it; 1 where that is not known, or they do not converge.
+    left : Number
+        What all that follow would have added to the last of a step, relative to it.
+    aged : bool
+        Whether the derivatives they use should be renewed for the next step.
+    """
+
+    def __init__(self, tolerance: Number | None, arithmetic: Arithmetic) -> None:
+        self._tolerance, self._arithmetic = tolerance, arithmetic
+        self.rate = self.left = arithmetic.zero + 1
+        self.aged = False
+
+    def to_tolerance(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
+        """Iterate until what is left is a small share of the tolerance.
+
+        Raises NoConvergence: it will not be, within the iterations that a step may take.
+        """
+        unit, tolerance, one = self._arithmetic.unit, self._tolerance, self._arithmetic.zero + 1
+        assert tolerance is not None
+        noise = NEWTON_NOISE * unit / tolerance
+        enough = max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, self._arithmetic.sqrt(tolerance))))
+        left, before = self._arithmetic.functions["pow"](max(self.left, unit), one * 4 / 5), None
+        for count, (largest, z) in enumerate(iterations, 1):
+            size = _scaled(largest, x, scales, z) / tolerance
+            rated = before is not None and count > 1 + _followers(x, scales, z)
+            if rated:
+                rate = size / before
+                if rate >= DIVERGING:
+                    if size <= noise:
+                        return z
+                    break
+                self.rate, left = rate, rate / (1 - rate)
+            self.aged = count > FEW and self.rate > RENEWED
+            ahead = left * size
+            if size == 0 or ahead <= enough:
+                self.left = left
+                return z
+            for _ in range(count, MOST_ITERATIONS if rated else count):
+                ahead = ahead * self.rate
+            if count == MOST_ITERATIONS or (rated and ahead > enough and size > noise):
+                break
+            before = size
+        self.rate, self.left, self.aged = one, one, True
+        raise NoConvergence("an iteration that does not settle")
+
+    def to_roundoff(self, x: State, scales: Sequence[Number], iterations: Iterator[Iteration]) -> Increments:
+        """Iterate until the next correction would be below the last digit, or they are all noise.
+
+        Raises NoConvergence: they become no smaller before that.
+        """
+        unit, before, z = self._arithmetic.unit, None, None
+        allowed = max(NEWTON_NOISE * unit, NEWTON_SHARE * (self._tolerance or 0))
+        for count, (largest, z) in enumerate(islice(iterations, self._arithmetic.most_halvings), 1):
+            size = _scaled(largest, x, scales, z)
+            rate = SLOW_RATE if not before else size / before
+            reach = [max(abs(a), *(abs(a + k) for k in ks)) for a, *ks in zip(x, *z, strict=True)]
+            if size == 0 or (
+                rate < SLOW_RATE and all(rate * d <= unit * a for d, a in zip(largest, reach, strict=True))
+            ):
+                self.rate, self.aged = rate, rate > RENEWED
+                return z
+            if before and rate >= SLOW_RATE and count > 1 + _followers(x, scales, z):
+                if size <= allowed:
+                    return z
+                self.rate, self.aged = self._arithmetic.zero + 1, True
+                raise NoConvergence("an iteration that does not settle")
+            before = size
+        assert z is not None
+        return z
+
+
+def _scaled(largest: Vector, x: State, scales: Sequence[Number], z: Increments) -> Number:
+    """The largest change relative to the scales; of a state that has been zero so far, to where it is now."""
+    size = largest[0] * 0
+    for i, (d, s) in enumerate(zip(largest, scales, strict=True)):
+        if d > 0:
+            reach = s if s > 0 else max(abs(x[i] + k[i]) for k in z)
+            size = max(size, d / reach if reach > 0 else reach + 1)
+    return size
+
+
+def _followers(x: State, scales: Sequence[Number], z: Increments) -> int:
+    """How many states that have been zero so far no longer are: each may follow another one, an iteration later."""
+    moved = (max(abs(x[i] + k[i]) for k in z) > 0 for i, s in enumerate(scales) if not s > 0)
+    return sum(moved)

@@ -14,8 +14,7 @@ from math import ceil
 from typing import ClassVar, Literal
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Arithmetic, Number
-from hsdsl.engine.integrators.scales import root
-from hsdsl.engine.integrators.stepper import Flow, Polynomial, Stages, State, Stepper
+from hsdsl.engine.integrators.stepper import Flow, Polynomial, Stages, State, Stepper, root
 from hsdsl.engine.kernel import Taylor
 
 LEAST_ORDER = 4

@@ -17,7 +17,7 @@ from functools import cache, partial
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean
 from hsdsl.engine import ahead
-from hsdsl.engine.runtime import kernel, programs
+from hsdsl.engine.runtime import kernel, library
 from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.engine.runtime.structures import SCHEMES
@@ -50,7 +50,7 @@ def choose(
     take = partial(_taken, engine, settings, precision, make)
     if program is not None and engine == "auto" and _refusal(settings, precision) is None:
         with suppress(NoCompiler):  # what needs the compiler says so
-            elsewhere = programs.under_way(program)
+            elsewhere = library.under_way(program)
             return Pending(lambda: ahead.compiling() or elsewhere(), take)
     return take()
 

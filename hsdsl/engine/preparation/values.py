@@ -15,8 +15,7 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean, without_memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.base.parts import meant, numbers_of, of_all
-from hsdsl.engine.backends.python import PythonKernel
-from hsdsl.engine.backends.text import compile_routines
+from hsdsl.engine.backends.python import PythonKernel, compile_routines
 from hsdsl.engine.preparation.options import KEYS, names_of
 from hsdsl.engine.simulate.stops import show
 from hsdsl.mathematics.program import Program

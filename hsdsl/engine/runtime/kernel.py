@@ -1,15 +1,17 @@
-"""The hand-written runtime, and programs compiled to libraries that it runs."""
+"""The hand-written runtime, programs compiled to libraries that it runs, and values of their runs at many times."""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, Protocol
 
+import numpy as np
+
+from hsdsl.engine.execution import Array, Evaluated
 from hsdsl.engine.runtime import structures
-from hsdsl.engine.runtime.library import loop
-from hsdsl.engine.runtime.programs import SYMBOL, compiled
+from hsdsl.engine.runtime.library import SYMBOL, compiled, loop
 from hsdsl.mathematics.program import Program
 
 
@@ -53,3 +55,108 @@ class CompiledModel:
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made on first use."""
         return self._shared[key] if key in self._shared else self._shared.setdefault(key, make())
+
+
+class Placed(Protocol):
+    """Columns that C can be shown."""
+
+    @property
+    def record(self) -> int:
+        """Where the ``hs_record`` is that says where they are."""
+        ...
+
+
+class Sampled:
+    """What is the same for all runs of one model over one timeline (a pointer to the ``hs_timeline``).
+
+    ``library`` is the runtime that the runs need anyway: it has all that samples need.
+    """
+
+    def __init__(self, library: ctypes.CDLL, compiled: CompiledModel, timeline: Any) -> None:
+        self.table = structures.Sampling(model=structures.address(ctypes.pointer(compiled.table)), timeline=timeline)
+        self.scratch = 2 * compiled.table.width
+        self.evaluate, self.address = library.hs_sample_record, ctypes.addressof(self.table)
+        self._kept = compiled, timeline
+        self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
+
+    def columns(self, layouts: tuple[tuple[str, ...], ...], names: Sequence[str]) -> tuple[int, int]:
+        """Where it is written how many states each layout has, and which of them have these names."""
+        key = layouts, tuple(names)
+        if key not in self._columns:
+            dimension = np.array([len(states) for states in layouts], np.int32)
+            places = [[there.index(name) if name in there else -1 for name in names] for there in layouts]
+            column = np.array(places, np.int32)
+            self._columns[key] = dimension, column, dimension.ctypes.data, column.ctypes.data
+        return self._columns[key][2:]
+
+
+class Filled:
+    """Memory that C has filled at n times: times, k states, m outputs."""
+
+    def __init__(self, memory: Array, outside: int, n: int, k: int, m: int) -> None:
+        self._memory, self.outside, self._n, self._k, self._m = memory, outside, n, k, m
+
+    @property
+    def times(self) -> Array:
+        """Shape (n,)."""
+        return self._memory[: self._n]
+
+    @property
+    def states(self) -> Array:
+        """Shape (n, k)."""
+        return self._memory[self._n : (1 + self._k) * self._n].reshape(self._k, self._n).T
+
+    @property
+    def outputs(self) -> Array:
+        """Shape (n, m)."""
+        start = (1 + self._k) * self._n
+        return self._memory[start : start + self._n * self._m].reshape(self._n, self._m)
+
+
+class Sampler:
+    """Evaluates one run.
+
+    Parameters
+    ----------
+    sampled : Sampled
+    columns : object
+        The run's columns; its ``record`` says what of them is where.
+    kinds : tuple of tuples of str
+        The states of each kind of arcs.
+    layout : array of int32, optional
+        Of which kind each arc is; None where there is only one.
+    """
+
+    def __init__(
+        self, sampled: Sampled, columns: Placed, kinds: tuple[tuple[str, ...], ...], layout: Array | None
+    ) -> None:
+        self._sampled, self._columns, self._kinds, self._layout = sampled, columns, kinds, layout
+
+    def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: int) -> Evaluated:
+        """Evaluate the states named, and the outputs: all that the model has, or 0.
+
+        Parameters
+        ----------
+        times : array of float, shape (n,)
+        left : bool
+            At a jump take the value before the first transition.
+        states : sequence of str
+        outputs : int
+            How many outputs.
+        """
+        n, k, shared, layout = len(times), len(states), self._sampled, self._layout
+        room = n * (1 + k + outputs)
+        memory = np.empty(room + shared.scratch)
+        memory[:n] = times
+        outside = shared.evaluate(
+            shared.address,
+            self._columns.record,
+            None if layout is None else layout.ctypes.data,
+            *shared.columns(self._kinds, states),
+            n,
+            k,
+            outputs,
+            left,
+            structures.start_of(memory),
+        )
+        return Filled(memory, outside, n, k, outputs)

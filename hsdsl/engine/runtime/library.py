@@ -1,4 +1,4 @@
-"""C text to a loaded library: compiled at first use, kept by content in the user's cache folder.
+"""C text to a loaded library: compiled at first use, kept by content in the user's cache folder. A program is one.
 
 A wheel for one platform has the hand-written loop compiled already, in ``shipped``; another loop than that of the
 wheel's own C is not taken from there.
@@ -19,6 +19,7 @@ from hsdsl.base import limits
 from hsdsl.base.cache import can_keep, find, is_made, keep, key_of, making
 from hsdsl.base.names import shown
 from hsdsl.engine.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
+from hsdsl.mathematics.program import Program
 
 RUNTIME = Path(__file__).parent / "c"
 BACKENDS = Path(__file__).parents[1] / "backends"
@@ -221,3 +222,64 @@ def _copy(library: Path, target: Path) -> None:
 @cache
 def _say_unkept(refusal: str) -> None:
     print(f"hsdsl: compiled code is not kept: {refusal}", file=sys.stderr)
+
+
+SYMBOL = "hs_the_model"
+
+
+def compiled(program: Program) -> ctypes.CDLL:
+    """The library of a program, from the cache or compiled for it.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    try:
+        return load(_content(program), SYMBOL, lambda: _source(program))
+    except TooSlow as error:
+        raise NoCompiler(f"{error}; {_longest(program)}") from None
+
+
+def keep_program(program: Program) -> bool:
+    """Compile a program and the loop for the cache, unless they are there or other processes do; False if it is closed.
+
+    Raises NoCompiler: there is no compiler, or it fails.
+    """
+    content = _content(program)
+    if not can_be_kept(content):
+        return False
+    if is_missing(content):
+        compiled(program)
+    if is_missing(LOOP[0]):
+        loop()
+    return True
+
+
+def under_way(program: Program) -> Callable[[], bool]:
+    """A function that says whether other processes compile a program, or the loop, at the moment.
+
+    Raises NoCompiler: there is no compiler.
+    """
+    looks = made_elsewhere(_content(program)), made_elsewhere(LOOP[0])
+    return lambda: any(look() for look in looks)
+
+
+def _content(program: Program) -> str:
+    data = len(program.parameters), len(program.inputs), len(program.switches)
+    return repr(((*data, len(program.outputs), program.initial_states), program.flows))
+
+
+def _longest(program: Program) -> str:
+    """Say where most of the work of a model is."""
+    flows = (
+        (text, f"the flow of {state} in mode {mode.name}")
+        for mode in program.modes
+        for state, text in zip(mode.states, mode.flow_texts, strict=True)
+    )
+    guards = ((edge.text, f"the guard of {edge.name}") for mode in program.modes for edge in mode.edges)
+    text, where = max((*flows, *guards), key=lambda pair: len(pair[0]), default=("", "none"))
+    return f"the longest expression is {where}, with {len(text):,} characters"
+
+
+def _source(program: Program) -> list[str]:
+    from hsdsl.engine.backends.c import model_parts  # what is compiled already needs none
+
+    return model_parts(program, limits.cores())

@@ -2,19 +2,26 @@
 
 ``hs_task`` is the class :data:`Task`, a pointer in it an address, ``hs_arc`` also the NumPy type :data:`ARC`, and
 ``hs_reason`` the tuple :data:`REASONS` of its names in words: ``HS_UNTIL_IN_STRIP`` is "until in strip".
-:data:`STOPPED` has for each the word that an execution stops with.
+:data:`STOPPED` has for each the word that an execution stops with. Methods and interpolations are written into them as
+numbers instead of fractions, in rows without their zeros.
 """
 
 from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from ctypes import c_double, c_int, c_int32, c_int64, c_void_p
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.engine import integrators
+from hsdsl.engine.integrators.tableau import Row as Terms
+from hsdsl.engine.integrators.tableau import table_numbers
 
 HEADERS = ("hs.h", "hs_simulate.h", "hs_screen.h")
 FOLDER = Path(__file__).parent / "c"
@@ -96,3 +103,77 @@ def array_at(kind: Any, start: int | None, count: int) -> Any:
 def addresses(start: int | None, count: int) -> list[int]:
     """The addresses in an array of pointers."""
     return list(array_at(c_void_p, start, count))
+
+
+def interpolation_table(
+    nodes: Sequence[float], tests: Sequence[float], matrix: Sequence[Sequence[float]], share: float
+) -> Any:
+    """Write an interpolation as the runtime takes it."""
+    columns = (nodes, tests, [number for line in matrix for number in line])
+    numbers = (address((c_double * len(column))(*column)) for column in columns)
+    return Interpolation(len(nodes) - 1, *numbers, share)
+
+
+@cache
+def method_table(method: integrators.Method) -> Any:
+    """Write a method as the runtime takes it."""
+    if method.kind == "table":
+        return _butcher_table(method)
+    return Method(
+        kind=METHOD_KINDS.index(method.kind),
+        order=method.error_order,
+        interpolant=INTERPOLANTS.index("dense"),
+        degree=method.degree,
+        collocation=address(ctypes.pointer(_collocation())) if method.implicit else None,
+    )
+
+
+def _collocation() -> Any:
+    """Write the coefficients of Radau IIA."""
+    from hsdsl.engine.integrators.radau import coefficients  # most runs need none
+
+    known = coefficients(FLOAT64)
+
+    def square(rows: Sequence[Sequence[float]]) -> Any:
+        return (c_double * 3 * 3)(*((c_double * 3)(*row) for row in rows))
+
+    return Collocation(
+        (c_double * 3)(*known.nodes),
+        square(known.powers),
+        known.gamma,
+        known.alpha,
+        known.beta,
+        square(known.mix),
+        square(known.unmix),
+        (c_double * 3)(*known.estimate),
+        known.share,
+        (c_double * 3)(*known.values),
+        (c_double * 3)(*known.slope),
+        (c_double * 3)(*known.end_slope),
+    )
+
+
+def _butcher_table(table: integrators.ButcherTableau) -> Any:
+    """Write a tableau."""
+    numbers = table_numbers(table)
+    return Method(
+        kind=METHOD_KINDS.index(table.kind),
+        stages=numbers.stages,
+        extra=numbers.extra,
+        order=table.order,
+        interpolant=INTERPOLANTS.index(table.interpolant),
+        degree=table.degree,
+        c=address((c_double * len(numbers.nodes))(*numbers.nodes)),
+        a=address((Row * len(numbers.a))(*map(_row, numbers.a))),
+        b=_row(numbers.b),
+        error=_row(numbers.error),
+        coarse=_row(numbers.coarse),
+        dense=address((Row * max(1, len(numbers.dense)))(*map(_row, numbers.dense))),
+        gain=float(sum(map(abs, table.b))),
+    )
+
+
+def _row(terms: Terms) -> Any:
+    count = max(1, len(terms))
+    stages, weights = (c_int * count)(*(i for i, _ in terms)), (c_double * count)(*(w for _, w in terms))
+    return Row(len(terms), address(stages), address(weights))

@@ -17,9 +17,8 @@ import numpy as np
 from hsdsl.base.interrupts import Noted
 from hsdsl.base.numbers.arithmetic import FLOAT64, Number
 from hsdsl.engine.execution import Array, Stop
-from hsdsl.engine.runtime import methods, structures
-from hsdsl.engine.runtime.kernel import CompiledModel, runtime
-from hsdsl.engine.runtime.sampling import Sampled
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.runtime.kernel import CompiledModel, Sampled, runtime
 from hsdsl.engine.simulate import stops
 from hsdsl.engine.simulate.columns import Columns, Shape
 from hsdsl.engine.simulate.control import make_control
@@ -50,7 +49,7 @@ class CompiledPlan:
     def __init__(self, problem: Problem, compiled: CompiledModel) -> None:
         settings, program = problem.settings, problem.program
         assert settings.method is not None
-        method, model = methods.method_table(settings.method), compiled.table
+        method, model = structures.method_table(settings.method), compiled.table
         shape = Shape(model.width, model.outputs, settings.method.degree, model.edges, model.contacts)
         self.problem, self.compiled, self.layouts = problem, compiled, StateLayouts(program, problem.states)
         scheme = settings.scheme
@@ -116,7 +115,7 @@ def _interpolation(settings: Settings) -> Any:
     """Surfaces along steps."""
     degree, share = along_steps(settings)
     by = interpolation(degree, FLOAT64)
-    table = methods.interpolation_table(by.nodes, by.tests, by.matrix, share + by.rounding)
+    table = structures.interpolation_table(by.nodes, by.tests, by.matrix, share + by.rounding)
     return structures.address((structures.Interpolation * 1)(table))
 
 

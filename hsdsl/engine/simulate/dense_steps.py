@@ -12,7 +12,7 @@ from typing import Protocol
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.integrators import TaylorMethod
-from hsdsl.engine.integrators.newton import NoConvergence
+from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper
 from hsdsl.engine.integrators.taylor import proposed_step
 from hsdsl.engine.kernel import Series, Taylor

@@ -13,7 +13,7 @@ from functools import partial
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
-from hsdsl.engine.integrators.newton import NoConvergence
+from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Stages, State, Stepper
 from hsdsl.engine.simulate.cascade import takes_back
 from hsdsl.engine.simulate.chatter import Chatter

@@ -12,7 +12,7 @@ import numpy as np
 from hsdsl.base.defaults import DEFAULTS
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Arc, Execution, Point, Stop, Transition, Verdict
-from hsdsl.engine.runtime.sampling import Sampler
+from hsdsl.engine.runtime.kernel import Sampler
 from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.compiled import CompiledRun
 from hsdsl.engine.simulate.diagnostics import LEFT_OUT, TWO_STEP, Diagnostics

@@ -1,7 +1,7 @@
 """The scales of states along a run: what errors are held against, and what counts as moving.
 
-See `hsdsl.engine.integrators.scales`. What a flow is computed from is looked at only where a step would be rejected for
-the second time.
+See `hsdsl.engine.integrators.stepper`. What a flow is computed from is looked at only where a step would be rejected
+for the second time.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.integrators.linear import Vector
-from hsdsl.engine.integrators.scales import resolved, rows_of
-from hsdsl.engine.integrators.stepper import State, Stepper
+from hsdsl.engine.integrators.stepper import State, Stepper, resolved, rows_of
 from hsdsl.engine.simulate.root_isolation import total
 from hsdsl.engine.simulate.run import ModeState, Run
 

@@ -17,10 +17,9 @@ from hsdsl.base.names import visible
 from hsdsl.base.numbers.arithmetic import FLOAT64, Arithmetic, Number
 from hsdsl.base.parts import layout_of
 from hsdsl.engine.backends.c import constant_bodies, derivatives, factors, initial_bodies, lines, width
-from hsdsl.engine.backends.c.printer import constant, literal
+from hsdsl.engine.backends.c.routine import constant, literal
 from hsdsl.engine.runtime import structures
-from hsdsl.engine.runtime.methods import method_table
-from hsdsl.engine.runtime.structures import METHOD_KINDS, SCHEMES, Row, array_at
+from hsdsl.engine.runtime.structures import METHOD_KINDS, SCHEMES, Row, array_at, method_table
 from hsdsl.engine.simulate import Problem, Settings
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.interpolation import Interpolation, along_steps, interpolation

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from hsdsl.engine.backends.c.source import width
 from hsdsl.engine.integrators import ButcherTableau
-from hsdsl.engine.integrators.numbers import table_numbers
+from hsdsl.engine.integrators.tableau import table_numbers
 from hsdsl.engine.simulate import Problem
 from hsdsl.export.jax.inputs import fixed_parameters, timeline_text
 from hsdsl.export.jax.language import function, literal

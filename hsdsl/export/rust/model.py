@@ -8,7 +8,7 @@ from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import layout_of
 from hsdsl.engine.backends.c import width
 from hsdsl.engine.backends.printer import number_text
-from hsdsl.engine.runtime.methods import method_table
+from hsdsl.engine.runtime.structures import method_table
 from hsdsl.engine.simulate import Problem
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.export.source import Source

@@ -1,4 +1,4 @@
-"""C99 from a program: `source` writes the whole text, `printer` one routine of it."""
+"""C99 from a program: `source` writes the whole text, `routine` one routine of it, `series` its Taylor coefficients."""
 
 from hsdsl.engine.backends.c.source import (
     constant_bodies,

@@ -1,4 +1,4 @@
-/* Systems of equations of an implicit step, of states and their derivatives. See hsdsl/engine/integrators/blocks.py.
+/* Systems of equations of an implicit step, of states and their derivatives. See hsdsl/engine/integrators/linear.py.
 
    `own` states have a matrix; the columns of derivatives, where there are any, have the same one. */
 

@@ -1,6 +1,6 @@
 /* Sums in coefficient k > 0 of a series, from its own earlier coefficients and those of its operands.
 
-   See hsdsl/engine/backends/recurrences.py, whose functions these are: the same sums in the same order. */
+   See hsdsl/engine/backends/taylor.py, whose functions these are: the same sums in the same order. */
 
 #ifndef HS_SERIES_H
 #define HS_SERIES_H

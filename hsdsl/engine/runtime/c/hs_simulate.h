@@ -22,7 +22,7 @@ typedef enum { HS_SECANT, HS_HERMITE, HS_DENSE } hs_interpolant;
 
 typedef enum { HS_TABLE, HS_TAYLOR, HS_RADAU } hs_method_kind;
 
-/* The coefficients of Radau IIA: see Coefficients in hsdsl/engine/integrators/collocation.py. */
+/* The coefficients of Radau IIA: see Coefficients in hsdsl/engine/integrators/radau.py. */
 typedef struct {
   hs_real node[3], power[3][3];
   hs_real gamma, alpha, beta, mix[3][3], unmix[3][3];

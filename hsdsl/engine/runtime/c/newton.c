@@ -1,4 +1,4 @@
-/* Stopping rules of the iterations for an implicit step. See hsdsl/engine/integrators/newton.py. */
+/* Stopping rules of the iterations for an implicit step. See hsdsl/engine/integrators/radau.py. */
 
 #include "functions.h"
 

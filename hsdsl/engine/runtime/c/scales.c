@@ -1,5 +1,5 @@
 /* The scale of a state: the largest size it has had in a run, and what round-off in its flow makes of that.
-   See hsdsl/engine/integrators/scales.py. */
+   See hsdsl/engine/integrators/stepper.py. */
 
 #include "functions.h"
 

@@ -1,4 +1,4 @@
-/* Systems of linear equations with few entries: LU in a pattern known before. See hsdsl/engine/integrators/sparse.py.
+/* Systems of linear equations with few entries: LU in a pattern known before. See hsdsl/engine/integrators/linear.py.
    Rows and columns are numbered in the order of elimination; `row`, `c`, `d`, `a`, `b` are scratch of n numbers. */
 
 #include "functions.h"
