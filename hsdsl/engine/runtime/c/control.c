@@ -1,7 +1,5 @@
 /* The step size: fixed, or from the embedded error estimate. See hsdsl/engine/simulate/control.py. */
 
-#include "functions.h"
-
 #define ALMOST (1 - 0x1p-30)
 #define SAFETY 0.9
 #define LEAST 0.2

@@ -1,9 +1,5 @@
 /* Many instances of one model, of which little is kept. See hsdsl/engine/simulate/ensemble.py. */
 
-#include <stdio.h>
-
-#include "functions.h"
-
 /* Evaluate the samples that fall into the chunk; after its last time another row may
    follow, unless it is the end. */
 static void sample_chunk(hs_ensemble *e, int at_end) {

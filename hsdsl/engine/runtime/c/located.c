@@ -1,6 +1,366 @@
-/* The located scheme: Burden et al. 2013, Fig. 8. See hsdsl/engine/simulate/located.py. */
+/* The located scheme: Burden et al. 2013, Fig. 8. Its steps, the first crossing of a step, transitions there.
+   See hsdsl/engine/simulate/located.py. */
 
-#include "functions.h"
+#define BLUR 2
+#define UNKNOWN_TOLERANCE 1e-10
+#define LAST_TERM 4
+#define TERM_BEFORE 32
+
+/* Let steps go to the other stages, and to `end` (of a step from run->x), for a shorter step. */
+static void aside(hs_run *run, hs_real **end) {
+  hs_real **const kept = run->k;
+  run->k = run->other_k;
+  run->other_k = kept;
+  swap(&run->end, &run->other_end);
+  swap(&run->z, end);
+  run->k[0] = run->slope;
+  run->k[run->method->stages] = run->end;
+}
+
+/* Time and state at the share s of the step: of a table those of a step that ends there. */
+static int span_point(hs_run *run, hs_real s, hs_time *time, hs_real **state) {
+  const hs_span *span = &run->span;
+  const int n = run->here.dimension;
+  *time = s == 1 ? span->t1 : span->t + s * span->h;
+  if (s == 1) return copy(*state, run->z, n), 0;
+  if (!(s > 0)) return copy(*state, run->x, n), 0;
+  if (run->method->kind == HS_TAYLOR) return at(run, &span->piece, s, *state), 0;
+  aside(run, state);
+  const int status = part_of_step(run, n, span->t, s * span->h);
+  aside(run, state);
+  return status ? RAISED : 0;
+}
+
+/* The same, of Taylor's method the states that surfaces depend on. */
+static int span_place(hs_run *run, hs_real s, hs_time *time, hs_real **state) {
+  if (run->method->kind != HS_TAYLOR || s == 1 || !(s > 0)) return span_point(run, s, time, state);
+  *time = run->span.t + s * run->span.h;
+  return part_at(run, &run->span.piece, s, 0, run->here.table->own, *state), 0;
+}
+
+/* The other states where span_place() was. */
+static void span_rest(hs_run *run, hs_real s, hs_real *state) {
+  if (run->method->kind != HS_TAYLOR || s == 1 || !(s > 0)) return;
+  part_at(run, &run->span.piece, s, run->here.table->own, run->here.dimension, state);
+}
+
+static int shorter_piece(hs_run *run, hs_real s, hs_polynomial *piece) {
+  const hs_span *span = &run->span;
+  const hs_real h = s * span->h;
+  return part_of_step(run, run->here.dimension, span->t, h) ||
+         run->here.table->flow(run->here.p, span->t + h, run->z, run->end) || method_piece(run, span->t, h, piece);
+}
+
+/* The interpolant of the states up to the share s of the step, over [0, 1]. */
+static void span_cut(hs_run *run, hs_real s, hs_polynomial *piece) {
+  int status = 1;
+  if (run->method->kind != HS_TAYLOR) {
+    aside(run, &run->q);
+    status = shorter_piece(run, s, piece);
+    aside(run, &run->q);
+  }
+  if (status) shortened(run, &run->span.piece, s, piece);
+}
+
+/* The sums of the absolute terms that the state at the share s of a step is computed from. */
+HS_INLINE hs_real span_size(const hs_run *run, const hs_span *span, hs_real s, int state) {
+  if (run->method->kind == HS_TABLE)
+    return fabs(span->x[state]) + s * span->h * run->method->gain * span->largest[state];
+  const int w = run->width, last = span->piece.degree - 1;
+  hs_real v = fabs(span->piece.c[last * w + state]) * s;
+  for (int m = last - 1; m >= 0; m--) v = (fabs(span->piece.c[m * w + state]) + v) * s;
+  return fabs(span->x[state]) + v;
+}
+
+static void begin_span(hs_run *run, hs_real h, hs_time t1) {
+  hs_span *const span = &run->span;
+  span->t = run->here.t;
+  span->h = h;
+  span->t1 = t1;
+  copy(span->x, run->x, run->here.dimension);
+}
+
+/* Let no rise count that is lower than what the step's error moves a surface by. */
+static int blur(hs_run *run, int n, hs_time t1) {
+  const hs_curves *curves = &run->curves;
+  for (int s = 0; s < n; s++) run->at[s] = run->z[s] + BLUR * run->error[s];
+  if (run->here.table->values(run->here.p, t1, run->at, run->middle)) return RAISED;
+  for (int part = 0; part < curves->parts; part++)
+    for (int k = 0; k < curves->count; k++) {
+      hs_real *const off = off_of(curves, part, k);
+      *off = *off + fabs(run->middle[k] - run->ends[k]);
+    }
+  return 0;
+}
+
+/* Try a step of a table or of an implicit method, or say what is in its way. */
+HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time t1) {
+  hs_span *const span = &run->span;
+  const hs_mode *mode = run->here.table;
+  const hs_real *p = run->here.p;
+  begin_span(run, h, t1);
+  const int status = step(run, n, span->t, h);
+  if (status == NO_CONVERGENCE) return HS_UNSOLVED;
+  if (status || mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
+  if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
+  if (run->control.tolerance > 0) {
+    local_error(run, h);
+    run->ratio = error_ratio(run, h);
+    if (!(run->ratio <= 1)) return HS_ERROR;
+  }
+  for (int s = 0; s < n; s++) {
+    span->largest[s] = fabs(run->k[0][s]);
+    for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->k[i][s]));
+  }
+  if (method_piece(run, span->t, h, &span->piece)) return HS_NOT_FINITE;
+  for (int m = 0; m < span->piece.degree; m++) /* it may overflow where its end does not */
+    if (!all_finite(span->piece.c + m * run->width, n)) return HS_NOT_FINITE;
+  if (curves_along(run)) return HS_NOT_FINITE;
+  if (mode->values(p, t1, run->z, run->ends)) return HS_NOT_FINITE;
+  const int blurred = run->control.implicit && run->control.tolerance > 0;
+  return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
+}
+
+/* Make one step of a table or of an implicit method: rejected by the error estimate, halved where something has no value. */
+HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
+  hs_control *const control = &run->control;
+  const hs_time t = run->here.t;
+  int halvings = 0;
+  if (!run->sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
+  if (!run->sloped) begin_steps(run);
+  run->sloped = 1;
+  hs_real h = within_reach(run, control->h);
+  hs_time t1;
+  for (;;) {
+    t1 = end_of_step(t, &h, limit);
+    run->refused = 0;
+    const hs_step_failure tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
+    if (tried == HS_CLEAR) {
+      if (control->tolerance > 0 && chatters(run, n, t1)) return HS_JUMP;
+      if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
+      slow_enough(run, h);
+      run->creeping = halvings >= CREEPING ? run->creeping + 1 : 0;
+      return run->creeping <= MOST_CREEPING ? HS_CLEAR : HS_CREEPING;
+    }
+    if (halvings == 0 && (tried == HS_ERROR || (tried == HS_UNSOLVED && control->tolerance > 0))) {
+      reject(control, h, tried == HS_UNSOLVED ? NAN : run->ratio);
+      h = within_reach(run, control->h);
+    } else {
+      if (run->refused) too_fast(run, h);
+      h = h / 2, halvings++;
+    }
+    if (halvings > MOST_HALVINGS || !(t + h > t) || struggles(control)) return tried;
+  }
+}
+
+/* The smaller of two steps; of not-a-number and another one the other. */
+static hs_real smaller(hs_real least, hs_real h) { return h != h ? least : least != least ? h : hs_min(h, least); }
+
+/* The step at which the first terms of a state that are left out stay below the tolerance beside the first that is not
+   0; not-a-number where there are none, or where that is in the later half. */
+static hs_real from_zero(const hs_run *run, int s, hs_real tolerance) {
+  const int order = run->method->order;
+  const hs_real *c = series_of(run, s);
+  hs_real least = NAN;
+  int first = 1;
+  while (first < order && c[first] == 0) first++;
+  const hs_real allowed = tolerance * fabs(c[first]);
+  if (first > (order + 2) / 2 || !(allowed > HS_NOTHING)) return NAN;
+  for (int m = order; m <= order + 1; m++)
+    if (c[m] != 0) least = smaller(least, root(fabs(c[m]) / allowed, m - first));
+  return least;
+}
+
+/* The step at which the first terms that are left out stay below the tolerance; not-a-number where all vanish.
+   See hsdsl/engine/integrators/taylor.py. */
+static hs_real proposed_step(const hs_run *run, int n, hs_real tolerance) {
+  const int order = run->method->order;
+  hs_real least = NAN, before = 0.0;
+  for (int m = order; m <= order + 1; m++) {
+    hs_real largest = 0.0;
+    for (int s = 0; s < n; s++)
+      if (tolerance * run->scales[s] > HS_NOTHING) largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * run->scales[s]));
+    if (largest > 0 && (least != least || largest * least > before)) least = smaller(least, root(largest, m));
+    before = largest;
+  }
+  for (int s = 0; s < n; s++)
+    if (!(tolerance * run->scales[s] > HS_NOTHING)) least = smaller(least, from_zero(run, s, tolerance));
+  return least;
+}
+
+static hs_real longest(const hs_run *run, int n) {
+  const hs_control *control = &run->control;
+  if (!(control->tolerance > 0)) return control->h;
+  const hs_real proposed = proposed_step(run, n, hs_max(control->tolerance, HS_UNIT));
+  return proposed != proposed ? control->largest : hs_min(control->largest, proposed);
+}
+
+static int noise_at_end(hs_run *run, int k, hs_real *allowed) {
+  hs_real noise;
+  if (roundoff_bound(run, k, run->span.t1, run->z, 0, &noise)) return RAISED;
+  *allowed = 4 * noise;
+  return 0;
+}
+
+/* Whether the polynomial c gives surface k to round-off in the middle of the step, by its interpolant. */
+static int meets_middle(hs_run *run, const hs_real *c, int n, int k, hs_real noise, int *answer) {
+  if (!run->has_middle && surfaces_along(run, 0.5, run->middle)) return RAISED;
+  run->has_middle = 1;
+  *answer = fabs(value_of(c, n, 0.5) - run->middle[k]) <= noise;
+  return 0;
+}
+
+/* Whether the series of surface k has run out by its last terms, and gives the surface at the end of the step.
+   One of a surface that is linear in the states need not run out: it is known by giving the surface to round-off. */
+static int converges(hs_run *run, const hs_real *c, int n, int k, int *answer) {
+  const hs_real given = run->control.tolerance, end = run->ends[k];
+  const hs_real tolerance = given > 0 ? hs_max(given, HS_UNIT) : hs_max(UNKNOWN_TOLERANCE, HS_UNIT);
+  hs_real most = fabs(c[0]);
+  for (int i = 1; i <= n; i++) most = hs_max(most, fabs(c[i]));
+  *answer = fabs(c[n]) <= LAST_TERM * tolerance * most && fabs(c[n - 1]) <= TERM_BEFORE * tolerance * most;
+  const hs_real off = fabs(value_at_end(c, n) - end);
+  hs_real noise;
+  if (*answer) return settles(run, off, tolerance * most, noise_at_end, k, answer);
+  if (noise_at_end(run, k, &noise)) return RAISED;
+  return off <= noise ? meets_middle(run, c, n, k, noise, answer) : 0;
+}
+
+/* The surfaces' series where they meet the surfaces at the step's end, interpolation for all where one does not. */
+static int series_curves(hs_run *run) {
+  const hs_mode *mode = run->here.table;
+  const int order = run->method->order, length = series_length(run->method);
+  hs_curves *const found = &run->curves;
+  const hs_real h = run->span.h, *p = run->here.p;
+  int known;
+  if (mode->values(p, run->span.t, run->x, run->values)) return RAISED;
+  if (!mode->surfaces) return 0;
+  copy(run->starts, run->values, mode->surfaces);
+  known = !mode->surface_series(p, order, run->lines);
+  run->has_middle = 0;
+  begin_curves(found, mode->surfaces);
+  for (int k = 0; k < mode->surfaces; k++) {
+    hs_real *const c = coefficients_of(found, 0, k), power = 1.0;
+    if (!known || mode->surface_line[k] < 0) return curves_along(run);
+    const hs_real *line = run->lines + mode->surface_line[k] * length;
+    for (int m = 0; m <= order; m++) {
+      c[m] = line[m] * power;
+      power = power * h;
+    }
+    int met;
+    if (converges(run, c, order, k, &met)) return RAISED;
+    if (!met) return curves_along(run);
+    c[0] = run->starts[k];
+    *degree_of(found, 0, k) = degree_without_zeros(c, order);
+    *off_of(found, 0, k) = 0;
+    found->certain[k] = 1;
+  }
+  return 0;
+}
+
+/* Try a step of Taylor's method, or say what is in its way. */
+HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_time t1) {
+  const hs_mode *mode = run->here.table;
+  const hs_real *p = run->here.p, tolerance = run->control.tolerance;
+  begin_span(run, h, t1);
+  taylor_span(run, n, h, &run->span.piece);
+  if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
+  if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
+  if (tolerance > 0) {
+    left_of(run, n, h);
+    if (error_ratio(run, h) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
+  }
+  return mode->values(p, t1, run->z, run->ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
+}
+
+/* Make one step of Taylor's method, as long as the terms left out allow; halved where its end does not solve the
+   equation. */
+HS_INLINE hs_step_failure next_series(hs_run *run, const int n, hs_time limit) {
+  const hs_time t = run->here.t;
+  if (run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines)) return HS_NOT_FINITE;
+  hs_real h = within_reach(run, longest(run, n));
+  hs_time t1;
+  for (int i = 0; i < MOST_HALVINGS; i++) {
+    t1 = end_of_step(t, &h, limit);
+    if (!(t1 > t)) break;
+    run->refused = 0;
+    if (try_series(run, n, h, t1) == HS_CLEAR) return slow_enough(run, h), HS_CLEAR;
+    if (run->refused) too_fast(run, h);
+    h = h / 2;
+  }
+  return HS_NOT_FINITE;
+}
+
+/* Make one step that the error allows, not beyond `limit`; or return what is in the way. */
+HS_INLINE hs_step_failure next_span(hs_run *run, const int n, hs_time limit) {
+  return run->method->kind == HS_TAYLOR ? next_series(run, n, limit) : next_table(run, n, limit);
+}
+
+#define TURNINGS 60
+
+/* Whether a crossing's state is on surface k, within the error of a step, and the flow has no value beyond. */
+static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
+  const hs_mode_state *here = &run->here;
+  const int n = here->dimension;
+  hs_real r, off = 0.0, norm = 0.0;
+  const hs_time time = crossing->time;
+  const hs_real *const q = crossing->state, *const g = run->gradient + 1;
+  if (gradient_of(run, k, time, q)) return RAISED;
+  for (int i = 0; i < n; i++) off = off + fabs(g[i]) * (run->control.tolerance * hs_max(run->scales[i], fabs(q[i])));
+  for (int i = 0; i < n; i++) norm = norm + g[i] * g[i];
+  if (!(norm > 0)) return 0;
+  if (surface(run, k, time, q, &r)) return RAISED;
+  if (r < -off) return 0;
+  for (int i = 0; i < n; i++) run->at[i] = q[i] + 2 * off / norm * g[i];
+  return here->table->flow(here->p, time, run->at, run->source) || !hs_finite(sum(run->source, n));
+}
+
+/* Whether surface k rises from the start of the step, and is followed by one polynomial. */
+HS_INLINE int may_be_touched(const hs_run *run, int k) {
+  return coefficients_of(&run->curves, 0, k)[1] > 0 && run->curves.parts == 1 && run->control.tolerance > 0;
+}
+
+/* Where in [0, 1] a polynomial turns that rises at 0 and falls at 1. */
+static hs_real turning(const hs_real *c, int n) {
+  hs_real low = 0.0, high = 1.0;
+  for (int i = 0; i < TURNINGS; i++) {
+    const hs_real middle = (low + high) / 2;
+    if (slope_of(c, n, middle) > 0)
+      low = middle;
+    else
+      high = middle;
+  }
+  return low;
+}
+
+/* Find where in the step surface k is reached so and its condition holds: 1, 0 or RAISED. */
+static int touched(hs_run *run, int k, hs_crossing *crossing) {
+  const hs_span *span = &run->span;
+  const hs_real *const c = coefficients_of(&run->curves, 0, k);
+  const int n = *degree_of(&run->curves, 0, k);
+  hs_real rate, share = 1.0;
+  if (!may_be_touched(run, k)) return 0;
+  const hs_real slope = slope_at_end(c, n);
+  if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
+  if (run->here.table->rates[k](run->here.p, span->t1, run->z, &rate)) return RAISED;
+  crossing->time = span->t1;
+  copy(crossing->state, run->z, run->here.dimension);
+  if (rate > 0) {
+    if (!(slope < 0)) return 0;
+    share = turning(c, n);
+    crossing->time = span->t + share * span->h;
+    at(run, &span->piece, share, crossing->state);
+  } else {
+    if (!run->weighed && magnitudes_at(run, span->t, run->x, run->begun)) return RAISED;
+    run->weighed = 1;
+    if (!(fabs(run->ends[k]) <= bound_from(run, run->begun, k, span->t, run->x, 0))) return 0;
+  }
+  const int ends = ends_at(run, k, crossing);
+  if (ends != 1) return ends;
+  crossing->theta = share;
+  crossing->edge = k;
+  crossing->depth = 0.0;
+  return k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
+}
 
 #define MOST_CORRECTIONS 8
 

@@ -1,7 +1,5 @@
 /* Rows, arcs and transitions, written to the caller's chunk. See hsdsl/engine/simulate/recorder.py. */
 
-#include "functions.h"
-
 /* Flush a full chunk: whether there is room for one more of each afterwards. */
 static int make_chunk(hs_run *run) {
   if (run->full) return 0;

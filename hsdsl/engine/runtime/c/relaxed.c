@@ -1,10 +1,269 @@
-/* The relaxed scheme: Burden et al. 2013, Fig. 12. See hsdsl/engine/simulate/relaxed.py. */
+/* The relaxed scheme: Burden et al. 2013, Fig. 12; how far a trial step is beyond guards, and where it crossed them.
+   See hsdsl/engine/simulate/relaxed.py. A status is 0, or RAISED where a routine has no value. */
 
-#include "functions.h"
+#define SCAN 8
+#define ROOT_SHARE (1.0 / 16)
 
 #if !defined(HS_NO_CLOCK)
 #define POLL_EVERY (CLOCKS_PER_SEC / 50)
 #endif
+
+static hs_found failure(hs_step_failure kind, int surface) {
+  const hs_found found = {kind, surface, 0};
+  return found;
+}
+
+/* |grad r| in (t, x). */
+static int norm_of(hs_run *run, hs_time t, const hs_real *x, int k, hs_real *norm) {
+  hs_real total = 0.0;
+  const hs_sparse *const row = &run->here.table->gradients[k];
+  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  for (int i = 0; i < row->count; i++) total = total + run->gradient[i] * run->gradient[i];
+  *norm = sqrt(total);
+  return 0;
+}
+
+/* Ask for the flow at a trial's end once; beyond a guard it need not have a value. */
+static int ends(hs_run *run, hs_trial *trial) {
+  if (!trial->looked) {
+    trial->looked = 1;
+    trial->ends = 0;
+    if (!run->here.table->flow(run->here.p, trial->t1, run->z, run->end)) {
+      const hs_real total = sum(run->end, run->here.dimension);
+      trial->ends = total - total == 0;
+    }
+  }
+  return trial->ends;
+}
+
+/* The step's interpolant, to trial->piece. */
+static int piece_of(hs_run *run, hs_trial *trial) {
+  if (trial->has_piece) return 0;
+  if (!ends(run, trial))
+    secant(run, &trial->piece);
+  else if (method_piece(run, trial->t, trial->h, &trial->piece))
+    return RAISED;
+  trial->has_piece = 1;
+  return 0;
+}
+
+/* Whether a step is beyond surface k on the way: at its eighths, and then ever nearer around the highest point. */
+static int beyond_within(hs_run *run, hs_trial *trial, int k) {
+  hs_real top, r, noise, place = 0.0, width = 1.0 / SCAN, shares[SCAN];
+  if (surface(run, k, trial->t, run->x, &top) || surface(run, k, trial->t1, run->z, &r)) return RAISED;
+  if (roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
+  if (top > noise) return 0; /* transparent, and beyond already */
+  if (roundoff_bound(run, k, trial->t1, run->z, 0, &noise)) return RAISED;
+  if (r > noise) return 0; /* crossed */
+  int count = SCAN - 1;
+  for (int i = 1; i < SCAN; i++) shares[i - 1] = (0.0 + i) / SCAN;
+  while (count) {
+    const hs_real crest = top;
+    hs_real least = top;
+    for (int i = 0; i < count; i++) {
+      const hs_real s = shares[i];
+      const hs_time t = trial->t + s * trial->h;
+      if (piece_of(run, trial)) return RAISED;
+      at(run, &trial->piece, s, run->at);
+      if (surface(run, k, t, run->at, &r)) return RAISED;
+      if (r > 0 && roundoff_bound(run, k, t, run->at, 0, &noise)) return RAISED;
+      if (r > 0 && r > noise) return 1;
+      if (r > top)
+        place = s, top = r;
+      else
+        least = r < least ? r : least;
+    }
+    const int within = count == 2 && top == crest;
+    if (!(width * trial->h > run->epsilon) || (within && top + (top - least) <= 0)) break;
+    width = width / 2;
+    count = 0;
+    if (place - width > 0 && place - width < 1) shares[count++] = place - width;
+    if (place + width > 0 && place + width < 1) shares[count++] = place + width;
+  }
+  return 0;
+}
+
+static int rate_along(hs_run *run, int k, hs_time t, const hs_real *x, const hs_real *flow, hs_real *rate) {
+  const hs_sparse *const row = &run->here.table->gradients[k];
+  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  *rate = 0.0;
+  for (int i = 0; i < row->count; i++)
+    *rate = *rate + run->gradient[i] * (row->place[i] ? flow[row->place[i] - 1] : 1.0);
+  return 0;
+}
+
+/* Look for a surface that a step went beyond and came back from, on its interpolant: its failure, or what was found. */
+static hs_found excursion(hs_run *run, hs_trial *trial, hs_found found) {
+  if (!ends(run, trial)) return found;
+  for (int k = 0; k < run->here.table->surfaces; k++) {
+    hs_real out, back;
+    if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
+    if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
+    const int looked = run->active_surfaces[k] || (out > 0 && 0 >= back);
+    if (looked && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
+  }
+  return found;
+}
+
+static int on_piece(hs_run *run, const hs_polynomial *piece, int k, hs_real s, hs_real *r) {
+  at(run, piece, s, run->at);
+  return surface(run, k, run->trial.t + s * run->trial.h, run->at, r);
+}
+
+/* Find the last s in [0, 1] where surface k rises through zero on an interpolant, knowing that it ends above;
+   not-a-number if it never does. */
+static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, hs_real small, hs_real *theta) {
+  hs_real a, fa, b = 1.0, fb;
+  if (on_piece(run, piece, k, b, &fb)) return RAISED;
+  for (int i = SCAN - 1; i >= 0; i--) {
+    a = 1.0 * i / SCAN;
+    if (on_piece(run, piece, k, a, &fa)) return RAISED;
+    if (fa <= 0) return close_bracket(run, on_piece, piece, k, a, fa, b, fb, small, HS_UNIT, theta);
+    b = a, fb = fa;
+  }
+  *theta = NAN;
+  return 0;
+}
+
+/* The round-off of surface k over this step, from the step's own numbers. */
+static int smallest(hs_run *run, int k, hs_real *small) {
+  hs_real *const sizes = run->at;
+  for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
+  if (roundoff_bound(run, k, run->trial.t1, sizes, 0, small)) return RAISED;
+  *small = *small * ROOT_SHARE;
+  return 0;
+}
+
+/* Whether a state may be beyond surface k without having crossed it. */
+static int is_transparent(const hs_run *run, int k) {
+  const hs_mode *mode = run->here.table;
+  return run->emerging[k] || k >= mode->edges || mode->edge[k].conditional;
+}
+
+/* Whether a step was further beyond surface k than `end` between the crossing and its end: that is on another flank. */
+static int deeper_before(hs_run *run, const hs_polynomial *piece, hs_real theta, int k, hs_real end) {
+  for (int i = 1; i < SCAN; i++) {
+    hs_real r;
+    if (on_piece(run, piece, k, theta + (1 - theta) * i / SCAN, &r)) return RAISED;
+    if (r > end) return 1;
+  }
+  return 0;
+}
+
+/* Where surface k was last crossed upwards on an interpolant: 1; 0 if it was beyond all along. */
+static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossing *crossing) {
+  const hs_trial *trial = &run->trial;
+  hs_real small, theta, r, noise;
+  if (smallest(run, k, &small) || last_up_crossing(run, piece, k, small, &theta)) return RAISED;
+  if (theta != theta) {
+    if (is_transparent(run, k)) {
+      at(run, piece, 0.0, run->at);
+      if (surface(run, k, trial->t + 0.0 * trial->h, run->at, &r)) return RAISED;
+      if (roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
+      if (r > noise) return 0;
+    }
+    theta = 0.0; /* on the surface to round-off: it is crossed as the step begins */
+  }
+  crossing->theta = theta;
+  crossing->time = theta == 0 ? trial->t : trial->t + theta * trial->h;
+  if (theta == 0)
+    copy(crossing->state, run->x, run->here.dimension);
+  else
+    at(run, piece, theta, crossing->state);
+  return 1;
+}
+
+/* How far the flow at a crossing would take r back inside over this step; 0 when not beyond round-off. */
+static int inward_of(hs_run *run, int k, const hs_crossing *crossing, hs_real *inward) {
+  hs_real rate;
+  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
+  *inward = -rate * run->trial.h;
+  if (!(*inward > run->noise[k])) *inward = 0.0;
+  return 0;
+}
+
+/* Whether the `if` of edge k holds next, on whose surface the state is, after a hop that round-off hides: where the
+   flow comes back to the surface, which is at `end` at the step's end. */
+static int holds_after_hop(hs_run *run, const hs_polynomial *piece, int k, const hs_crossing *crossing, hs_real end) {
+  const hs_trial *trial = &run->trial;
+  hs_real rate;
+  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
+  const hs_real back = -rate * trial->h;
+  if (!(back > 0)) return holds_next(run, k, crossing->time, crossing->state);
+  const hs_real s = crossing->theta + (1 - crossing->theta) * (back / (back + end));
+  at(run, piece, s, run->near);
+  return holds_next(run, k, trial->t + s * trial->h, run->near);
+}
+
+/* 1 where the trial's end is too deep beyond surface k, or its depth is not defined (`found` says which). */
+static int too_deep(hs_run *run, int k, const hs_real *values, hs_found *found) {
+  hs_real norm;
+  if (norm_of(run, run->trial.t1, run->z, k, &norm)) return RAISED;
+  if (!(norm > 0)) return *found = failure(HS_FLAT, k), 1;
+  if (values[k] <= run->epsilon * norm + run->noise[k]) return 0;
+  return *found = failure(HS_DEEP, k), 1;
+}
+
+/* Find the last up-crossing of surface k: 1 with the crossing, 0 where it is transparent there, or with an failure. */
+static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *crossing, hs_found *found) {
+  hs_trial *trial = &run->trial;
+  const hs_polynomial *piece = &trial->piece;
+  hs_real norm, inward;
+  int status = piece_of(run, trial);
+  if (status) return status;
+  status = crossed_on(run, piece, k, crossing);
+  if (status != 1) return status;
+  if (norm_of(run, trial->t1, run->z, k, &norm) || inward_of(run, k, crossing, &inward)) return RAISED;
+  if (inward != 0 && inward <= run->epsilon * norm) {
+    if (trial->ends) {
+      hermite(run, trial->h, &run->cubic);
+      piece = &run->cubic;
+    }
+    if (crossed_on(run, piece, k, crossing) == RAISED || inward_of(run, k, crossing, &inward)) return RAISED;
+  }
+  if (inward != 0) return *found = failure(HS_INWARD, k), 0;
+  status = condition(run, k, crossing->time, crossing->state);
+  if (!status && (crossing->theta == 0 || run->active_surfaces[k]))
+    status = holds_after_hop(run, piece, k, crossing, values[k]);
+  if (status != 1) return status;
+  status = too_deep(run, k, values, found);
+  if (status) return status == RAISED ? RAISED : 0;
+  status = deeper_before(run, piece, crossing->theta, k, values[k] + run->noise[k]);
+  if (status) return status == RAISED ? RAISED : (*found = failure(HS_DEEP, k), 0);
+  crossing->edge = k;
+  crossing->depth = hs_min(run->epsilon, values[k] / norm);
+  crossing->piece = piece;
+  return 1;
+}
+
+/* Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
+   `values` are those of the surfaces there. */
+static int judge(hs_run *run, const hs_real *values, hs_found *found) {
+  const hs_mode *mode = run->here.table;
+  *found = CLEAR;
+  for (int k = 0, looked = 0; k < mode->surfaces; k++) {
+    if (values[k] <= 0) continue;
+    if (!looked++ && magnitudes_at(run, run->trial.t1, run->z, run->magnitudes)) return RAISED;
+    run->noise[k] = bound_from(run, run->magnitudes, k, run->trial.t1, run->z, 0);
+  }
+  for (int k = 0; k < mode->surfaces; k++) {
+    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
+    if (k >= mode->edges && !run->emerging[k]) return *found = failure(HS_WALL, k), 0;
+    if (is_transparent(run, k)) continue;
+    const int status = too_deep(run, k, values, found);
+    if (status) return status == RAISED ? RAISED : 0;
+  }
+  int count = 0;
+  for (int k = 0; k < mode->edges; k++) {
+    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
+    const int status = crossing_of(run, k, values, &run->crossings[count], found);
+    if (status == RAISED) return RAISED;
+    if (found->failure != HS_CLEAR) return 0;
+    count += status;
+  }
+  found->crossings = count;
+  return 0;
+}
 
 /* Try one step from (here.t, run->x): what it found; its end is run->z, and trial.ends says whether it has a flow. */
 HS_INLINE hs_found attempt(hs_run *run, const int n, hs_real h, hs_time t1) {

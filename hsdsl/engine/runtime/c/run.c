@@ -1,6 +1,32 @@
-/* Entering a mode, choosing among crossings, resets. See hsdsl/engine/simulate/run.py. */
+/* A run under way: the segment of its inputs, its mode and arc, and its stop. See hsdsl/engine/simulate/run.py. */
 
-#include "functions.h"
+/* The segment that time is in; at a boundary the later one. */
+static int64_t segment_at(const hs_timeline *timeline, hs_time t) {
+  int64_t low = 0, high = timeline->segments;
+  while (low < high) {
+    const int64_t middle = (low + high) / 2;
+    if (t < timeline->start[middle])
+      high = middle;
+    else
+      low = middle + 1;
+  }
+  return low > 0 ? low - 1 : 0;
+}
+
+/* Where the segment that the run is in ends, at the latest where it pauses; the last one lasts until then. */
+static hs_time segment_end(const hs_run *run) {
+  const hs_timeline *timeline = run->task->timeline;
+  const int64_t segment = run->here.segment;
+  const int open = segment == timeline->segments - 1 && hs_finite(run->pause);
+  return open ? run->pause : earlier(timeline->end[segment], run->pause);
+}
+
+/* Whether another segment is behind the one that the run is in. */
+static int segment_follows(const hs_run *run) { return run->here.segment + 1 < run->task->timeline->segments; }
+
+static const hs_real *segment_data(const hs_run *run, int64_t segment) {
+  return run->task->timeline->data + segment * run->model->data;
+}
 
 static hs_reason stopped(hs_run *run, hs_reason reason, hs_time t) {
   hs_stop *stop = &run->task->stop;
@@ -57,57 +83,3 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
 }
 
 static int limit_reached(const hs_run *run) { return run->jump >= run->task->settings.max_transitions; }
-
-/* Whether edge `a` goes before edge `b` of those tied: the higher priority, then the file's order. */
-static int goes_before(const hs_mode *mode, int a, int b) {
-  const int p = mode->edge[a].priority, q = mode->edge[b].priority;
-  return p != q ? p > q : a < b;
-}
-
-/* Let no edge be marked. */
-static void untie(hs_run *run) {
-  for (int k = 0; k < run->here.table->edges; k++) run->tied[k] = 0;
-}
-
-/* Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
-   Tied are also guards that the earliest crossing's point stands on. The chosen edge goes from that point. */
-static void choose(hs_run *run, int count) {
-  const hs_mode *mode = run->here.table;
-  hs_crossing *first = &run->crossings[0];
-  for (int i = 1; i < count; i++)
-    if (run->crossings[i].time < first->time) first = &run->crossings[i];
-  const hs_real since = tie(first->time);
-  hs_real depth = first->depth;
-  int chosen = first->edge;
-  untie(run);
-  for (int i = 0; i < count; i++)
-    if (run->crossings[i].time - first->time <= since) run->tied[run->crossings[i].edge] = 2 + i;
-  standing(run, first->time, first->state, since);
-  for (int k = 0; k < mode->edges; k++)
-    if (run->tied[k] && goes_before(mode, k, chosen)) chosen = k;
-  if (run->tied[chosen] >= 2) depth = run->crossings[run->tied[chosen] - 2].depth;
-  run->alternatives_count = 0;
-  for (int k = 0; k < mode->edges; k++)
-    if (run->tied[k] && k != chosen) run->alternatives[run->alternatives_count++] = k;
-  run->chosen = *first;
-  run->chosen.edge = chosen;
-  run->chosen.depth = depth;
-}
-
-/* Apply the chosen crossing's reset to the values before the jump, sizes of their numbers in `scale`: the state behind
-   it to run->after, and to run->both the sizes of the numbers it came from. Not 0 where it has no finite value. */
-static int reset(hs_run *run, const hs_real *scale) {
-  const hs_crossing *crossing = &run->chosen;
-  const hs_edge *edge = &run->here.table->edge[crossing->edge];
-  const int n = run->here.dimension, to = edge->target_dimension;
-  hs_real *const sizes = run->error;
-  if (hs_changed(edge, edge->reset, run->here.p, crossing->time, crossing->state, crossing->state, run->after)) return 1;
-  if (!all_finite(run->after, to)) return 1;
-  HS_MOVE(run, move_reset(run));
-  copy(run->both, crossing->state, n);
-  copy(run->both + n, scale, n);
-  if (hs_changed(edge, edge->spread, run->here.p, crossing->time, run->both, scale, sizes) || !all_finite(sizes, to))
-    for (int s = 0; s < to; s++) sizes[s] = fabs(run->after[s]); /* where it is infinitely steep, no more is known */
-  copy(run->both, sizes, to);
-  return 0;
-}

@@ -3,8 +3,6 @@
    Times in one piece are evaluated together, a block of them at once: one sum waits for its last product, many do not.
    Every value is computed as the Python twin does: x + s (c_1 + s (c_2 + ...)). */
 
-#include "functions.h"
-
 #if defined(__GNUC__) && !defined(__clang__)
 #define HS_UNROLLED __attribute__((optimize("O3")))
 #else

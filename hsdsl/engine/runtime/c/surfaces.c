@@ -1,16 +1,7 @@
-/* Geometry of a trial step against a mode's surfaces: round-off, depth, and where a surface was crossed.
+/* A mode's surfaces at a point, as polynomials along a step, and where polynomials rise.
    See hsdsl/engine/simulate/surfaces.py. A status is 0, or RAISED where a routine has no value. */
 
-#include "functions.h"
-
-#define SCAN 8
 #define ROOT_ITERATIONS 200
-#define ROOT_SHARE (1.0 / 16)
-
-static hs_found failure(hs_step_failure kind, int surface) {
-  const hs_found found = {kind, surface, 0};
-  return found;
-}
 
 /* Evaluate the interpolant of a step at s = theta, to `value`: its states `from` to `to`. */
 HS_INLINE void part_at(const hs_run *run, const hs_polynomial *piece, hs_real theta, int from, int to, hs_real *value) {
@@ -152,16 +143,6 @@ static void leave(hs_run *run, hs_time t, const hs_real *x) {
   }
 }
 
-/* |grad r| in (t, x). */
-static int norm_of(hs_run *run, hs_time t, const hs_real *x, int k, hs_real *norm) {
-  hs_real total = 0.0;
-  const hs_sparse *const row = &run->here.table->gradients[k];
-  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
-  for (int i = 0; i < row->count; i++) total = total + run->gradient[i] * run->gradient[i];
-  *norm = sqrt(total);
-  return 0;
-}
-
 /* Whether the `if` of edge k holds: 1, 0, or RAISED. A part that is false decides, even if another has no value. */
 static int condition(hs_run *run, int k, hs_time t, const hs_real *x) {
   const hs_edge *edge = &run->here.table->edge[k];
@@ -218,93 +199,6 @@ static void standing(hs_run *run, hs_time t, const hs_real *x, hs_real since) {
   }
 }
 
-/* Ask for the flow at a trial's end once; beyond a guard it need not have a value. */
-static int ends(hs_run *run, hs_trial *trial) {
-  if (!trial->looked) {
-    trial->looked = 1;
-    trial->ends = 0;
-    if (!run->here.table->flow(run->here.p, trial->t1, run->z, run->end)) {
-      const hs_real total = sum(run->end, run->here.dimension);
-      trial->ends = total - total == 0;
-    }
-  }
-  return trial->ends;
-}
-
-/* The step's interpolant, to trial->piece. */
-static int piece_of(hs_run *run, hs_trial *trial) {
-  if (trial->has_piece) return 0;
-  if (!ends(run, trial))
-    secant(run, &trial->piece);
-  else if (method_piece(run, trial->t, trial->h, &trial->piece))
-    return RAISED;
-  trial->has_piece = 1;
-  return 0;
-}
-
-/* Whether a step is beyond surface k on the way: at its eighths, and then ever nearer around the highest point. */
-static int beyond_within(hs_run *run, hs_trial *trial, int k) {
-  hs_real top, r, noise, place = 0.0, width = 1.0 / SCAN, shares[SCAN];
-  if (surface(run, k, trial->t, run->x, &top) || surface(run, k, trial->t1, run->z, &r)) return RAISED;
-  if (roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
-  if (top > noise) return 0; /* transparent, and beyond already */
-  if (roundoff_bound(run, k, trial->t1, run->z, 0, &noise)) return RAISED;
-  if (r > noise) return 0; /* crossed */
-  int count = SCAN - 1;
-  for (int i = 1; i < SCAN; i++) shares[i - 1] = (0.0 + i) / SCAN;
-  while (count) {
-    const hs_real crest = top;
-    hs_real least = top;
-    for (int i = 0; i < count; i++) {
-      const hs_real s = shares[i];
-      const hs_time t = trial->t + s * trial->h;
-      if (piece_of(run, trial)) return RAISED;
-      at(run, &trial->piece, s, run->at);
-      if (surface(run, k, t, run->at, &r)) return RAISED;
-      if (r > 0 && roundoff_bound(run, k, t, run->at, 0, &noise)) return RAISED;
-      if (r > 0 && r > noise) return 1;
-      if (r > top)
-        place = s, top = r;
-      else
-        least = r < least ? r : least;
-    }
-    const int within = count == 2 && top == crest;
-    if (!(width * trial->h > run->epsilon) || (within && top + (top - least) <= 0)) break;
-    width = width / 2;
-    count = 0;
-    if (place - width > 0 && place - width < 1) shares[count++] = place - width;
-    if (place + width > 0 && place + width < 1) shares[count++] = place + width;
-  }
-  return 0;
-}
-
-static int rate_along(hs_run *run, int k, hs_time t, const hs_real *x, const hs_real *flow, hs_real *rate) {
-  const hs_sparse *const row = &run->here.table->gradients[k];
-  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
-  *rate = 0.0;
-  for (int i = 0; i < row->count; i++)
-    *rate = *rate + run->gradient[i] * (row->place[i] ? flow[row->place[i] - 1] : 1.0);
-  return 0;
-}
-
-/* Look for a surface that a step went beyond and came back from, on its interpolant: its failure, or what was found. */
-static hs_found excursion(hs_run *run, hs_trial *trial, hs_found found) {
-  if (!ends(run, trial)) return found;
-  for (int k = 0; k < run->here.table->surfaces; k++) {
-    hs_real out, back;
-    if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
-    if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
-    const int looked = run->active_surfaces[k] || (out > 0 && 0 >= back);
-    if (looked && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
-  }
-  return found;
-}
-
-static int on_piece(hs_run *run, const hs_polynomial *piece, int k, hs_real s, hs_real *r) {
-  at(run, piece, s, run->at);
-  return surface(run, k, run->trial.t + s * run->trial.h, run->at, r);
-}
-
 /* Close a bracket value(a) = fa <= 0 < value(b) = fb (Illinois), to where it is below `small` or a few `unit`. */
 HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *piece, int k, hs_real a, hs_real fa,
                             hs_real b, hs_real fb, hs_real small, hs_real unit, hs_real *theta) {
@@ -333,157 +227,456 @@ HS_INLINE int close_bracket(hs_run *run, hs_value *value, const hs_polynomial *p
   return 0;
 }
 
-/* Find the last s in [0, 1] where surface k rises through zero on an interpolant, knowing that it ends above;
-   not-a-number if it never does. */
-static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, hs_real small, hs_real *theta) {
-  hs_real a, fa, b = 1.0, fb;
-  if (on_piece(run, piece, k, b, &fb)) return RAISED;
-  for (int i = SCAN - 1; i >= 0; i--) {
-    a = 1.0 * i / SCAN;
-    if (on_piece(run, piece, k, a, &fa)) return RAISED;
-    if (fa <= 0) return close_bracket(run, on_piece, piece, k, a, fa, b, fb, small, HS_UNIT, theta);
-    b = a, fb = fa;
-  }
-  *theta = NAN;
-  return 0;
+#define MOST_REFINEMENTS 300
+
+/* C(n, 0) to C(n, n). */
+static const hs_real *binomials(const hs_run *run, int n) { return run->binomials + n * (n + 1) / 2; }
+
+static void fill_binomials(hs_real *row, int most) {
+  for (int n = 0; n <= most; n++, row += n)
+    for (int k = 0; k <= n; k++) row[k] = k == 0 || k == n ? 1.0 : (row - n)[k - 1] + (row - n)[k];
 }
 
-/* The round-off of surface k over this step, from the step's own numbers. */
-static int smallest(hs_run *run, int k, hs_real *small) {
-  hs_real *const sizes = run->at;
-  for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
-  if (roundoff_bound(run, k, run->trial.t1, sizes, 0, small)) return RAISED;
-  *small = *small * ROOT_SHARE;
-  return 0;
-}
-
-/* Whether a state may be beyond surface k without having crossed it. */
-static int is_transparent(const hs_run *run, int k) {
-  const hs_mode *mode = run->here.table;
-  return run->emerging[k] || k >= mode->edges || mode->edge[k].conditional;
-}
-
-/* Whether a step was further beyond surface k than `end` between the crossing and its end: that is on another flank. */
-static int deeper_before(hs_run *run, const hs_polynomial *piece, hs_real theta, int k, hs_real end) {
-  for (int i = 1; i < SCAN; i++) {
-    hs_real r;
-    if (on_piece(run, piece, k, theta + (1 - theta) * i / SCAN, &r)) return RAISED;
-    if (r > end) return 1;
-  }
-  return 0;
-}
-
-/* Where surface k was last crossed upwards on an interpolant: 1; 0 if it was beyond all along. */
-static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossing *crossing) {
-  const hs_trial *trial = &run->trial;
-  hs_real small, theta, r, noise;
-  if (smallest(run, k, &small) || last_up_crossing(run, piece, k, small, &theta)) return RAISED;
-  if (theta != theta) {
-    if (is_transparent(run, k)) {
-      at(run, piece, 0.0, run->at);
-      if (surface(run, k, trial->t + 0.0 * trial->h, run->at, &r)) return RAISED;
-      if (roundoff_bound(run, k, trial->t, run->x, 0, &noise)) return RAISED;
-      if (r > noise) return 0;
+/* Bernstein coefficients on [0, 1] of a polynomial: n times each has the one before added to it, of which the first
+   more stay each time. Two such passes are made in one. */
+HS_INLINE void fill_bernstein(const hs_run *run, const hs_real *c, int n, hs_real *b) {
+  const hs_real *choose = binomials(run, n);
+  HS_SIMD for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
+  for (int k = 1; k <= n; k += 2) {
+    hs_real before = b[k], once = before + b[k - 1];
+    b[k] = once;
+    for (int i = k + 1; i <= n; i++) {
+      const hs_real own = b[i], sum = own + before;
+      b[i] = sum + once;
+      before = own, once = sum;
     }
-    theta = 0.0; /* on the surface to round-off: it is crossed as the step begins */
   }
-  crossing->theta = theta;
-  crossing->time = theta == 0 ? trial->t : trial->t + theta * trial->h;
-  if (theta == 0)
-    copy(crossing->state, run->x, run->here.dimension);
-  else
-    at(run, piece, theta, crossing->state);
-  return 1;
 }
 
-/* How far the flow at a crossing would take r back inside over this step; 0 when not beyond round-off. */
-static int inward_of(hs_run *run, int k, const hs_crossing *crossing, hs_real *inward) {
-  hs_real rate;
-  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
-  *inward = -rate * run->trial.h;
-  if (!(*inward > run->noise[k])) *inward = 0.0;
+/* Those of a polynomial of the step's curves, made once for each. */
+HS_INLINE const hs_real *bernstein_of(hs_run *run, const hs_real *c, int n) {
+  if (run->bernstein_of != c) fill_bernstein(run, c, n, run->bernstein);
+  run->bernstein_of = c;
+  return run->bernstein;
+}
+
+HS_INLINE hs_real largest_of(const hs_real *b, int n) {
+  hs_real most = b[0];
+  for (int i = 1; i <= n; i++) most = hs_max(most, b[i]);
+  return most;
+}
+
+/* Whether the polynomial is nowhere above `level` on [0, 1], by bounds that may not see it. */
+static int stays_below(hs_run *run, const hs_real *c, int n, hs_real level) {
+  hs_real bound = c[0];
+  for (int k = 1; k <= n; k++)
+    if (c[k] > 0) bound = bound + c[k];
+  if (bound <= level) return 1;
+  return largest_of(bernstein_of(run, c, n), n) <= level;
+}
+
+/* Cut an interval at the share s: `left` gets the coefficients before it, `b` those behind it (de Casteljau). */
+static void split(hs_real *b, int n, hs_real s, hs_real *left) {
+  const hs_real rest = 1 - s;
+  left[0] = b[0];
+  for (int j = 1; j <= n; j++) {
+    for (int i = 0; i <= n - j; i++) b[i] = rest * b[i] + s * b[i + 1];
+    left[j] = b[0];
+  }
+}
+
+HS_INLINE hs_real value_of(const hs_real *c, int n, hs_real s) {
+  hs_real total = c[n];
+  for (int k = n - 1; k >= 0; k--) total = c[k] + s * total;
+  return total;
+}
+
+/* The same at 1. */
+HS_INLINE hs_real value_at_end(const hs_real *c, int n) {
+  hs_real total = c[n];
+  for (int k = n - 1; k >= 0; k--) total = c[k] + total;
+  return total;
+}
+
+/* Changes of sign, zeros left out. */
+static int changes(const hs_real *b, int n) {
+  int count = 0, before = 0;
+  for (int i = 0; i <= n; i++) {
+    const int sign = (b[i] > 0) - !(b[i] >= 0);
+    count += sign * before < 0;
+    before = sign ? sign : before;
+  }
+  return count;
+}
+
+/* Find a point from `start` on where `sign` times the polynomial is above `level`, not having come back down before
+   it: 1; 0 where it is nowhere above, up to intervals shorter than a unit of round-off. */
+static int rises(hs_run *run, const hs_real *c, int n, hs_real sign, hs_real level, hs_real start, hs_real *point) {
+  hs_cut *const cuts = run->cuts;
+  int open = 1;
+  const hs_real *const own = bernstein_of(run, c, n);
+  for (int i = 0; i <= n; i++) cuts[0].b[i] = sign * own[i] - level;
+  if (start > 0) split(cuts[0].b, n, start, run->left);
+  cuts[0].low = start, cuts[0].high = 1.0;
+  while (open) {
+    hs_cut *const cut = &cuts[--open];
+    hs_real *const b = cut->b;
+    const hs_real low = cut->low, high = cut->high;
+    if (largest_of(b, n) <= 0) continue;
+    if (b[0] > 0) return *point = low, 1;
+    if (b[n] > 0 && (changes(b, n) == 1 || high - low <= HS_UNIT)) return *point = high, 1;
+    if (high - low > HS_UNIT) {
+      const hs_real middle = (low + high) / 2;
+      split(b, n, 0.5, cuts[open + 1].b);
+      cut->low = middle, cut->high = high;
+      cuts[open + 1].low = low, cuts[open + 1].high = middle;
+      open += 2;
+    }
+  }
   return 0;
 }
 
-/* Whether the `if` of edge k holds next, on whose surface the state is, after a hop that round-off hides: where the
-   flow comes back to the surface, which is at `end` at the step's end. */
-static int holds_after_hop(hs_run *run, const hs_polynomial *piece, int k, const hs_crossing *crossing, hs_real end) {
-  const hs_trial *trial = &run->trial;
-  hs_real rate;
-  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
-  const hs_real back = -rate * trial->h;
-  if (!(back > 0)) return holds_next(run, k, crossing->time, crossing->state);
-  const hs_real s = crossing->theta + (1 - crossing->theta) * (back / (back + end));
-  at(run, piece, s, run->near);
-  return holds_next(run, k, trial->t + s * trial->h, run->near);
+/* A polynomial and its derivative (Horner). */
+HS_INLINE hs_real value_and_slope(const hs_real *c, int n, hs_real s, hs_real *slope) {
+  hs_real total = c[n];
+  *slope = total * 0;
+  for (int k = n - 1; k >= 0; k--) {
+    *slope = total + s * *slope;
+    total = c[k] + s * total;
+  }
+  return total;
 }
 
-/* 1 where the trial's end is too deep beyond surface k, or its depth is not defined (`found` says which). */
-static int too_deep(hs_run *run, int k, const hs_real *values, hs_found *found) {
-  hs_real norm;
-  if (norm_of(run, run->trial.t1, run->z, k, &norm)) return RAISED;
-  if (!(norm > 0)) return *found = failure(HS_FLAT, k), 1;
-  if (values[k] <= run->epsilon * norm + run->noise[k]) return 0;
-  return *found = failure(HS_DEEP, k), 1;
-}
-
-/* Find the last up-crossing of surface k: 1 with the crossing, 0 where it is transparent there, or with an failure. */
-static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *crossing, hs_found *found) {
-  hs_trial *trial = &run->trial;
-  const hs_polynomial *piece = &trial->piece;
-  hs_real norm, inward;
-  int status = piece_of(run, trial);
-  if (status) return status;
-  status = crossed_on(run, piece, k, crossing);
-  if (status != 1) return status;
-  if (norm_of(run, trial->t1, run->z, k, &norm) || inward_of(run, k, crossing, &inward)) return RAISED;
-  if (inward != 0 && inward <= run->epsilon * norm) {
-    if (trial->ends) {
-      hermite(run, trial->h, &run->cubic);
-      piece = &run->cubic;
+/* Halve the way to an end of a bracket until the polynomial has the sign; the end itself where it has not. */
+static void towards(const hs_real *c, int n, hs_real *end, hs_real *other, hs_real sign) {
+  for (;;) {
+    const hs_real middle = (*end + *other) / 2;
+    if (middle == *end || middle == *other || fabs(*end - *other) <= HS_UNIT * HS_UNIT) {
+      *other = *end;
+      return;
     }
-    if (crossed_on(run, piece, k, crossing) == RAISED || inward_of(run, k, crossing, &inward)) return RAISED;
+    if (sign * value_of(c, n, middle) > 0) {
+      *end = middle;
+      return;
+    }
+    *other = middle;
   }
-  if (inward != 0) return *found = failure(HS_INWARD, k), 0;
-  status = condition(run, k, crossing->time, crossing->state);
-  if (!status && (crossing->theta == 0 || run->active_surfaces[k]))
-    status = holds_after_hop(run, piece, k, crossing, values[k]);
-  if (status != 1) return status;
-  status = too_deep(run, k, values, found);
-  if (status) return status == RAISED ? RAISED : 0;
-  status = deeper_before(run, piece, crossing->theta, k, values[k] + run->noise[k]);
-  if (status) return status == RAISED ? RAISED : (*found = failure(HS_DEEP, k), 0);
-  crossing->edge = k;
-  crossing->depth = hs_min(run->epsilon, values[k] / norm);
-  crossing->piece = piece;
-  return 1;
 }
 
-/* Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
-   `values` are those of the surfaces there. */
-static int judge(hs_run *run, const hs_real *values, hs_found *found) {
-  const hs_mode *mode = run->here.table;
-  *found = CLEAR;
-  for (int k = 0, looked = 0; k < mode->surfaces; k++) {
-    if (values[k] <= 0) continue;
-    if (!looked++ && magnitudes_at(run, run->trial.t1, run->z, run->magnitudes)) return RAISED;
-    run->noise[k] = bound_from(run, run->magnitudes, k, run->trial.t1, run->z, 0);
+/* Solve for the one root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket). */
+static hs_real refined(const hs_real *c, int n, hs_real a, hs_real b) {
+  hs_real fa = a == 0 ? c[0] : value_of(c, n, a), fb = b == 1 ? value_at_end(c, n) : value_of(c, n, b);
+  hs_real noise = 0.0;
+  for (int k = 0; k <= n; k++) noise = noise + fabs(c[k]);
+  noise = ROUNDING * HS_UNIT * noise;
+  const int falls = !(fa < -noise), stays = !(fb > noise);
+  if (falls) towards(c, n, &a, &b, -1.0);
+  if (stays) towards(c, n, &b, &a, 1.0);
+  if (falls || stays) fa = value_of(c, n, a), fb = value_of(c, n, b);
+  if (a == b || !(fa < 0)) return a;
+  hs_real s = a - fa * (b - a) / (fb - fa);
+  for (int count = 0; count < MOST_REFINEMENTS; count++) {
+    if (!(a < s && s < b)) {
+      s = (a + b) / 2;
+      if (!(a < s && s < b)) return a;
+    }
+    hs_real slope;
+    const hs_real f = value_and_slope(c, n, s, &slope);
+    if (f < 0)
+      a = s;
+    else
+      b = s;
+    const hs_real after = slope > 0 ? s - f / slope : a;
+    if (slope > 0 && a <= after && after <= b && (after - s) * (after - s) <= HS_UNIT * after * after) return after;
+    s = after;
   }
+  return a;
+}
+
+/* Find the last point in [start, end] where a polynomial rises through 0, knowing that it is positive at `end`: 1; 0
+   where it is positive all the way. The polynomial is c, of degree n; where `reduced`, c over its factor s, whose
+   Bernstein coefficients are n / k times those of c behind the first, b_k. They have the signs of these. */
+static int last_root(hs_run *run, const hs_real *c, int n, int reduced, hs_real start, hs_real end, hs_real *root) {
+  hs_cut *const cuts = run->cuts;
+  const hs_real *const own = bernstein_of(run, c, n) + reduced, degree = n; /* of c */
+  int open = 1;
+  c += reduced, n -= reduced;
+  if (start == 0 && end == 1 && own[0] <= 0 && 0 < own[n] && changes(own, n) <= 1)
+    return *root = refined(c, n, start, end), 1;
+  for (int k = 0; k <= n; k++) cuts[0].b[k] = reduced ? own[k] * degree / (k + 1) : own[k];
+  if (end < 1) {
+    split(cuts[0].b, n, end, run->left);
+    copy(cuts[0].b, run->left, n + 1);
+  }
+  if (start > 0) split(cuts[0].b, n, start / end, run->left);
+  cuts[0].low = start, cuts[0].high = end;
+  while (open) {
+    hs_cut *const cut = &cuts[--open];
+    hs_real *const b = cut->b;
+    const hs_real low = cut->low, high = cut->high;
+    hs_real least = b[0];
+    for (int i = 1; i <= n; i++) least = hs_min(least, b[i]);
+    if (least > 0) continue;
+    if (b[0] <= 0 && 0 < b[n] && changes(b, n) <= 1) return *root = refined(c, n, low, high), 1;
+    if (high - low <= HS_UNIT) {
+      if (b[0] > 0) continue; /* what it rose through lies before */
+      return *root = low, 1;
+    }
+    const hs_real middle = (low + high) / 2;
+    copy(cuts[open + 1].b, b, n + 1);
+    split(cuts[open + 1].b, n, 0.5, cut->b);
+    cut->low = low, cut->high = middle;
+    cuts[open + 1].low = middle, cuts[open + 1].high = high;
+    open += 2;
+  }
+  return 0;
+}
+
+#define MOST_FIRST 3
+#define IN_A_STEP 64
+#define SHORTEST 0x1p16
+#define LOST_IN_A_STEP 16
+#define LOST_SHORTEST 0x1p9
+
+static hs_real *coefficients_of(const hs_curves *curves, int part, int k) {
+  return curves->c + ((int64_t)part * curves->count + k) * curves->room;
+}
+
+static hs_real *off_of(const hs_curves *curves, int part, int k) { return &curves->off[part * curves->count + k]; }
+
+static int *degree_of(const hs_curves *curves, int part, int k) { return &curves->degree[part * curves->count + k]; }
+
+static hs_walk begin_walk(int k, hs_real level, int beyond, int risen) {
+  const hs_walk walk = {k, risen, beyond, 0, level, 0.0};
+  return walk;
+}
+
+/* The last root before `end`; a series that begins with zero has it taken out, so that tiny roots stay exact. */
+static hs_real root_of(hs_run *run, const hs_real *c, int n, hs_real start, hs_real end) {
+  const int reduced = start == 0 && c[0] == 0 && n > 0;
+  hs_real root;
+  return last_root(run, c, n, reduced, start, end, &root) ? root : start;
+}
+
+static hs_real slope_of(const hs_real *c, int n, hs_real s) {
+  hs_real slope = s * 0;
+  for (int k = n; k > 0; k--) slope = k * c[k] + s * slope;
+  return slope;
+}
+
+/* The same at 1. */
+static hs_real slope_at_end(const hs_real *c, int n) {
+  hs_real slope = 0.0;
+  for (int k = n; k > 0; k--) slope = k * c[k] + slope;
+  return slope;
+}
+
+/* Give the next point where the surface rises through zero and goes on above its level: 1; 0 where there is none. */
+static int next_rise(hs_run *run, hs_walk *walk, hs_rise *rise) {
+  const hs_curves *curves = &run->curves;
+  for (; walk->part < curves->parts; walk->part++, walk->at = 0.0) {
+    const hs_real *c = coefficients_of(curves, walk->part, walk->k);
+    const int n = *degree_of(curves, walk->part, walk->k);
+    hs_real sizes = 0.0, high;
+    for (int i = 0; i <= n; i++) sizes = sizes + fabs(c[i]);
+    const hs_real least = hs_max(walk->level, ROUNDING * HS_UNIT * sizes);
+    const hs_real above = hs_max(least, *off_of(curves, walk->part, walk->k));
+    if (walk->outside) {
+      if (!rises(run, c, n, -1.0, 0.0, walk->at, &walk->at)) continue;
+      walk->outside = 0;
+    }
+    if (!rises(run, c, n, 1.0, above, walk->at, &high)) {
+      if (!(walk->part == curves->parts - 1 && walk->risen && walk->at < 1)) continue;
+      high = 1.0;
+    }
+    const hs_real root = root_of(run, c, n, walk->at, high), width = curves->width[walk->part];
+    rise->share = curves->start[walk->part] + root * width;
+    rise->slope = slope_of(c, n, root) / width;
+    rise->certain = curves->certain[walk->part * curves->count + walk->k];
+    walk->at = high;
+    walk->outside = 1;
+    return 1;
+  }
+  return 0;
+}
+
+/* How far a polynomial is off the values it should have at some points. */
+static hs_real residual(const hs_real *c, const hs_interpolation *by, const hs_real *values, int every) {
+  hs_real worst = fabs(value_of(c, by->degree, by->tests[0]) - values[0]);
+  for (int i = 1; i < HS_TESTS; i++)
+    worst = hs_max(worst, fabs(value_of(c, by->degree, by->tests[i]) - values[i * every]));
+  return worst;
+}
+
+/* Whether a residual of function k is small enough; `allowed` is evaluated only where that decides. */
+static int settles(hs_run *run, hs_real off, hs_real enough, hs_allowed *allowed, int k, int *answer) {
+  hs_real more;
+  *answer = off <= enough;
+  if (*answer) return 0;
+  if (allowed(run, k, &more)) return RAISED;
+  *answer = off <= more + enough;
+  return 0;
+}
+
+/* Begin curves of `count` surfaces that are one piece each. */
+static void begin_curves(hs_curves *curves, int count) {
+  curves->parts = 1;
+  curves->count = count;
+  curves->start[0] = 0.0, curves->width[0] = 1.0;
+}
+
+/* The degree of a polynomial, at least 1: along a polynomial solution it is low. */
+static int degree_without_zeros(const hs_real *c, int degree) {
+  while (degree > 1 && c[degree] == 0) degree--;
+  return degree;
+}
+
+/* A surface that is affine, with these slopes by time and the states, along a piece over h: the sum of the absolute
+   coefficients. Those of powers 1 and up go to c, c[0] is there. */
+HS_INLINE hs_real affine_curve(const hs_polynomial *piece, int w, hs_real h, const hs_sparse *row,
+                               const hs_real *slopes, hs_real *c, int *degree) {
+  const int timed = row->count && row->place[0] == 0;
+  hs_real sizes = fabs(c[0]);
+  for (int m = 1; m <= piece->degree; m++) {
+    hs_real power = m == 1 && timed ? slopes[0] * h : 0.0;
+    for (int i = timed; i < row->count; i++) power = power + slopes[i] * piece->c[(m - 1) * w + row->place[i] - 1];
+    c[m] = power;
+    sizes = sizes + fabs(power);
+  }
+  *degree = degree_without_zeros(c, piece->degree);
+  return sizes;
+}
+
+/* Interpolate functions on one part of a step; `settled` says whether all of them are close enough. */
+static int interpolate_part(hs_run *run, hs_functions *functions, const hs_interpolation *by, hs_allowed *allowed,
+                            int *settled) {
+  hs_curves *const curves = &run->curves;
+  const int part = curves->parts, count = curves->count, nodes = by->degree + 1;
+  const hs_real start = curves->start[part], width = curves->width[part];
+  hs_real *const rows = run->rows, *const checks = rows + nodes * count;
+  for (int i = 0; i < nodes; i++)
+    if (functions(run, start + width * by->nodes[i], rows + i * count)) return RAISED;
+  for (int i = 0; i < HS_TESTS; i++)
+    if (functions(run, start + width * by->tests[i], checks + i * count)) return RAISED;
+  *settled = 1;
+  for (int k = 0; k < count; k++) {
+    hs_real *const c = coefficients_of(curves, part, k), largest = fabs(rows[k]);
+    for (int j = 0; j < nodes; j++) {
+      hs_real power = 0.0;
+      for (int i = 0; i < nodes; i++) power = power + by->matrix[j * nodes + i] * rows[i * count + k];
+      c[j] = power;
+    }
+    for (int i = 1; i < nodes; i++) largest = hs_max(largest, fabs(rows[i * count + k]));
+    int *const certain = &curves->certain[part * count + k];
+    const hs_real off = *off_of(curves, part, k) = by->share * largest;
+    if (settles(run, residual(c, by, checks + k, count), off, allowed, k, certain)) return RAISED;
+    *settled &= *certain;
+    *degree_of(curves, part, k) = by->degree;
+  }
+  return 0;
+}
+
+/* Take functions that would not settle on the part as straight lines. */
+static void straighten(hs_run *run, int degree) {
+  const hs_curves *curves = &run->curves;
+  const int part = curves->parts, count = curves->count;
+  for (int k = 0; k < count; k++) {
+    if (curves->certain[part * count + k]) continue;
+    hs_real *const c = coefficients_of(curves, part, k);
+    c[0] = run->rows[k];
+    c[1] = run->rows[degree * count + k] - run->rows[k];
+    *degree_of(curves, part, k) = 1;
+    *off_of(curves, part, k) = 0;
+  }
+}
+
+/* Interpolate `count` functions of s in [0, 1] by pieces, with residuals below a share of their largest value, or
+   `allowed` more: to run->curves. Not `far`, only to where the first of them is positive. It may refuse what varies too
+   fast: run->refused says so, and the step is to be shorter. */
+static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
+                        hs_allowed *allowed, int far, int most, int may_refuse) {
+  struct {
+    hs_real start, width;
+    int halvings;
+  } parts[MOST_SPLITS + 2] = {{0.0, 1.0, 0}};
+  hs_curves *const curves = &run->curves;
+  int open = count > 0, settled;
+  curves->parts = 0;
+  curves->count = count;
+  while (open) {
+    const hs_real start = parts[--open].start, width = parts[open].width;
+    const int halvings = parts[open].halvings;
+    curves->start[curves->parts] = start, curves->width[curves->parts] = width;
+    if (interpolate_part(run, functions, by, allowed, &settled)) return RAISED;
+    if (may_refuse && !settled && (curves->parts >= most || (start == 0 && halvings == MOST_FIRST)))
+      return run->refused = 1, RAISED;
+    if (!settled && halvings < MOST_SPLITS && curves->parts < most) {
+      const hs_real half = width / 2;
+      parts[open].start = start + half, parts[open].width = half, parts[open++].halvings = halvings + 1;
+      parts[open].start = start, parts[open].width = half, parts[open++].halvings = halvings + 1;
+      continue;
+    }
+    if (!settled) straighten(run, by->degree);
+    curves->parts++;
+    if (!far && run->rows[by->degree * count] > 0) break;
+  }
+  return 0;
+}
+
+/* The surfaces at the share s of the step, by its interpolant. */
+static int surfaces_along(hs_run *run, hs_real s, hs_real *values) {
+  part_at(run, &run->span.piece, s, 0, run->here.table->own, run->at);
+  return run->here.table->values(run->here.p, run->span.t + s * run->span.h, run->at, values);
+}
+
+static int noise_at_ends(hs_run *run, int k, hs_real *allowed) {
+  const hs_span *span = &run->span;
+  hs_real first, last;
+  if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t + span->h, run->z, 0, &last))
+    return RAISED;
+  *allowed = hs_max(first, last);
+  return 0;
+}
+
+/* All surfaces along the step's interpolant where all of them are affine: polynomials of its own degree. Rises below a
+   share of their size tell nothing. */
+static int affine_curves(hs_run *run, hs_real share) {
+  const hs_mode *mode = run->here.table;
+  const hs_span *span = &run->span;
+  hs_curves *const found = &run->curves;
+  if (mode->values(run->here.p, span->t, run->x, run->values)) return RAISED;
+  begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
-    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
-    if (k >= mode->edges && !run->emerging[k]) return *found = failure(HS_WALL, k), 0;
-    if (is_transparent(run, k)) continue;
-    const int status = too_deep(run, k, values, found);
-    if (status) return status == RAISED ? RAISED : 0;
+    hs_real *const c = coefficients_of(found, 0, k);
+    const hs_sparse *const row = &mode->gradients[k];
+    if (row->values(run->here.p, span->t, run->x, run->gradient)) return RAISED;
+    c[0] = run->values[k];
+    const hs_real sizes =
+        affine_curve(&span->piece, run->width, span->h, row, run->gradient, c, degree_of(found, 0, k));
+    *off_of(found, 0, k) = share * sizes;
+    found->certain[k] = 1;
   }
-  int count = 0;
-  for (int k = 0; k < mode->edges; k++) {
-    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
-    const int status = crossing_of(run, k, values, &run->crossings[count], found);
-    if (status == RAISED) return RAISED;
-    if (found->failure != HS_CLEAR) return 0;
-    count += status;
+  return 0;
+}
+
+/* Give up following a mode's surfaces: visits beyond them may be missed from here on. */
+static void lose(hs_run *run) {
+  const hs_curves *curves = &run->curves;
+  run->lost[run->here.mode] = 1;
+  for (int k = 0; k < curves->count; k++) {
+    int certain = 1;
+    for (int part = 0; part < curves->parts; part++) certain &= curves->certain[part * curves->count + k];
+    if (!certain) note_unsettled(run, k, run->span.t);
   }
-  found->crossings = count;
+}
+
+/* All surfaces along the step's interpolant. */
+static int curves_along(hs_run *run) {
+  const hs_interpolation *by = run->task->interpolation;
+  if (run->here.table->affine) return affine_curves(run, by->share);
+  const int lost = run->lost[run->here.mode], most = lost ? LOST_IN_A_STEP : IN_A_STEP;
+  const int refuse = run->span.h * (lost ? LOST_SHORTEST : SHORTEST) > run->until;
+  if (interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1, most, refuse)) return RAISED;
+  if (!refuse && run->curves.parts >= most) lose(run);
   return 0;
 }

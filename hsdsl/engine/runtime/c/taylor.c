@@ -1,7 +1,5 @@
 /* Steps by Taylor series of any order. See hsdsl/engine/integrators/taylor.py. */
 
-#include "functions.h"
-
 /* Room for the coefficients of one line. */
 static int series_length(const hs_method *method) { return method->order + 2; }
 
