@@ -6,9 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hsdsl.engine.simulate.root_isolation import value
-from hsdsl.engine.simulate.surface_polynomials import affine_curve
-from hsdsl.engine.simulate.surfaces import at
+from hsdsl.engine.simulate.surfaces import affine_curve, at, value
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
 

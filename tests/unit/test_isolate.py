@@ -10,16 +10,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
-from hsdsl.engine.simulate.root_isolation import (
-    ROUNDING,
-    bernstein,
-    changes,
-    last_root,
-    rises,
-    split,
-    value,
-    value_and_slope,
-)
+from hsdsl.engine.simulate.surfaces import ROUNDING, bernstein, changes, last_root, rises, split, value, value_and_slope
 
 TINY = 2.0**-50
 

@@ -15,7 +15,7 @@ from engines import needs_compiler
 
 import hsdsl
 from hsdsl.engine.simulate import verdict
-from hsdsl.engine.simulate.diagnostics import Diagnostics
+from hsdsl.engine.simulate.stops import Diagnostics
 from hsdsl.engine.simulate.verdict import RunView, assess, compiled_verdict, run_view
 from hsdsl.engine.simulate.verdict.screen import Screen, screened
 

@@ -8,7 +8,8 @@ from fractions import Fraction
 import pytest
 
 from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
-from hsdsl.engine.simulate.surfaces import at, close_bracket, last_up_crossing, roundoff, shortened
+from hsdsl.engine.simulate.relaxed import last_up_crossing
+from hsdsl.engine.simulate.surfaces import at, close_bracket, roundoff, shortened
 
 ROOTS = {
     "line": (lambda s: s - 0.3, 0.3),

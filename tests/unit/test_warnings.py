@@ -19,7 +19,7 @@ from hsdsl.analysis.report.summary import summary
 from hsdsl.analysis.report.words import MOST_WORDS, conclusion
 from hsdsl.analysis.store import load
 from hsdsl.base.errors import WARNINGS
-from hsdsl.engine.simulate import remarks
+from hsdsl.engine.simulate import stops
 
 # A foot over ground that swings through it while x < 2 a second in: z = 1 - 4 t**2, and at t = 1 it lands where it may.
 FOOT = """
@@ -89,8 +89,8 @@ def test_a_foot_that_swings_through_the_ground_says_so_before_a_verdict_that_hol
 @pytest.mark.parametrize("text", [FOOT, BALL, SLIDER], ids=["foot", "ball", "slider"])
 def test_the_text_of_a_warning_is_written_when_it_is_read(engine, text, monkeypatch):
     written = []
-    message = remarks._message
-    monkeypatch.setattr(remarks, "_message", lambda group: written.append(group) or message(group))
+    message = stops._message
+    monkeypatch.setattr(stops, "_message", lambda group: written.append(group) or message(group))
     run = hsdsl.loads(text).simulate(engine=engine)
     assert run.verdict.theorem and run.verdict.reasons and run.warnings
     assert len(run.warnings) == len(codes(run)) and not written

@@ -76,7 +76,7 @@ class Execution(Deferred):
         ``assessment(execution, finer) -> Verdict``: the verdict by comparison with a finer run, or, if that is None and
         steps are not fixed, with its own ``finer``. Without this function the verdict does not change.
     repetition : callable or None
-        ``repetition(execution) -> Execution``: the same run with finer steps (`hsdsl.engine.simulate.refinement`).
+        ``repetition(execution) -> Execution``: the same run with finer steps (`hsdsl.engine.simulate.moving`).
     differentiation : callable or None
         ``differentiation(wrt) -> Sensitivity``: the derivatives of the run.
     compiled : CompiledRecord or None

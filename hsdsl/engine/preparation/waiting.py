@@ -12,7 +12,7 @@ from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Array
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.preparation.values import Values
-from hsdsl.engine.simulate.queues import Waits
+from hsdsl.engine.simulate.transitions import Waits
 from hsdsl.mathematics.program import ModeProgram, Program
 
 _NUMBERED = re.compile(r"(.+@.+)\[(\d+)\]")

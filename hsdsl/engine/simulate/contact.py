@@ -1,23 +1,35 @@
-"""Motion along guards: a state that its own resets keep while the flow pushes it out (M11).
+"""Motion along guards that hold a state, and Zeno tails that end in it (M11).
 
-At such a point q the reset is the identity, the target is the same mode, and the flow leaves the domain. The execution
-follows the constrained flow (`completion.overlay`), at rest where that is zero, until the flow no longer pushes
-out. Other surfaces are crossed as along any flow.
+A guard *holds* the state where its own resets keep the state while the flow leads out: at such a point q the reset is
+the identity, the target is the same mode, and the flow leaves the domain. The guard is then an active constraint, as a
+closed contact in mechanics. The *push* on a guard is how fast the flow that the other constraints leave leads into it
+(of a body on a floor the acceleration by which the floor must hold it, or the velocity): the contact ends where the
+push changes sign. The execution follows the constrained flow (`completion.overlay`, the mode with these routines), at
+rest where that is zero, until then. Other surfaces are crossed as along any flow. A guard that holds the state is
+*touched* in `Surfaces`; ``held`` is the place of a run in contact, ``here`` the same in the mode itself.
+
+A *tail* is transitions that follow each other ever faster. Flights T_n of one edge that leads back to its own mode
+shrink by the ratio q at least; what is left is then at most T_n q/(1 - q). Once that is below the relaxation the state
+is taken to the limit, where it rests. Edges may take turns, as those of a body that bounces on one that bounces. The
+state is taken to the limit of all of them once as many transitions as cost no time have fallen within the relaxation,
+if pushes take back within that what is left. Where the state would meet another guard until a tail ends, it is taken to
+the limit at once.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
+from functools import partial, reduce
+from itertools import pairwise
 
-from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.engine.execution import Stop
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Number
+from hsdsl.engine.execution import Stop, Transition
 from hsdsl.engine.integrators.linear import Vector
-from hsdsl.engine.integrators.stepper import State
-from hsdsl.engine.simulate.root_isolation import total
+from hsdsl.engine.integrators.stepper import State, rows_of
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.scales import flow_sizes
-from hsdsl.engine.simulate.surfaces import Surfaces
+from hsdsl.engine.simulate.stops import FREE
+from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS, Surfaces, joined, total
 from hsdsl.mathematics.program import HELD, LOOKED_AT
 
 SAME_UNITS = 4  # of round-off, relative to its scale: how far a reset may move a state that it keeps
@@ -34,6 +46,43 @@ def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
     if holding is None or (len(holding) > 1 and not flows(here, in_contact(run, here, holding))):
         return run.diagnostics.coupled(here.mode.edges[kept[0]].name, here.t)
     return in_contact(run, here, holding) if holding else here
+
+
+def flow_sizes(run: Run, here: ModeState, slope: State) -> Vector:
+    """For each state the size that its flow has had, |f| + sum |df/dx_j| s_j: below round-off of it, it is at rest."""
+    mode, scales = here.flow, here.sizes
+    found: Vector = []
+    rows = rows_of(run.kernel.jacobian(mode, here.segment.data)(here.t, *here.x), len(here.x))
+    for f, row in zip(slope, rows, strict=True):
+        total = abs(f)
+        for d, s in zip(row, scales, strict=True):
+            total = total + abs(d) * s
+        found.append(total)
+    return found
+
+
+def start_sizes(run: Run, mode: int, x: State) -> State:
+    """The sizes that the flow gives the states within the run, from a start at x in a mode with motion along guards.
+
+    A start on a guard is off it by the round-off of these. Elsewhere they are zero.
+    """
+    program, segment, zero = run.program.modes[mode], run.timeline.at(run.arithmetic.zero), run.arithmetic.zero
+    nothing = tuple(zero for _ in x)
+    if program.held is None:
+        return nothing
+    try:
+        slope = run.kernel.bind(mode, segment.data).flow(zero, *x)
+        rows = rows_of(run.kernel.jacobian(mode, segment.data)(zero, *x), len(x))
+    except DOMAIN_ERRORS:
+        return nothing
+    back = zero
+    for i, row in enumerate(rows):
+        back = max(back, total((abs(d) * abs(rows[k][i]) for k, d in enumerate(row)), zero))
+    time = run.settings.until / (1 + run.settings.until * run.arithmetic.sqrt(back))  # in which motion turns back
+    first = tuple(max(abs(a), time * abs(f)) for a, f in zip(x, slope, strict=True))
+    moved = (time * total((abs(d) * s for d, s in zip(row, first, strict=True)), zero) for row in rows)
+    found = tuple(map(max, first, moved))
+    return found if all(map(run.arithmetic.isfinite, found)) else nothing
 
 
 def flows(here: ModeState, held: ModeState) -> bool:
@@ -234,3 +283,368 @@ def behind_end(run: Run, here: ModeState, held: ModeState, k: int, t: Number, x:
             after = after * 2
     except DOMAIN_ERRORS:
         return t, x, True
+
+
+LEAST_FLIGHTS = 3
+
+
+def contraction(made: Sequence[Transition], of_flow: bool = False) -> tuple[Number, Number] | None:
+    """The same of the last few flights, of rounds or of the last edge."""
+    return shrinking(round_flights(made) or last_flights(made, of_flow))
+
+
+def shrinking(flights: Sequence[Number]) -> tuple[Number, Number] | None:
+    """Return the last flight and the largest ratio of some in a row, if they shrink; else None."""
+    if not flights or not min(flights) > 0:
+        return None
+    ratio = max(b / a for a, b in pairwise(flights))
+    return (flights[-1], ratio) if ratio < 1 else None
+
+
+def period(made: Sequence[Transition]) -> int:
+    """After how many transitions those of the last few rounds repeat; 0 where they do not, on entry or in strips."""
+    for n in range(1, (FREE - 1) // LEAST_FLIGHTS + 1):
+        last = made[-LEAST_FLIGHTS * n - 1 :]
+        if len(last) <= LEAST_FLIGHTS * n:
+            return 0
+        if all(a.edge == b.edge and a.source == b.source for a, b in zip(last, last[n:], strict=False)):
+            return 0 if any(one.entry or one.resumed != one.time for one in last) else n
+    return 0
+
+
+def round_flights(made: Sequence[Transition]) -> list[Number]:
+    """How long the last few rounds of edges that take turns lasted, in order; none where fewer than two do."""
+    n = period(made)
+    times = [one.time for one in made[-LEAST_FLIGHTS * n - 1 :: n]] if n > 1 else []
+    return [b - a for a, b in pairwise(times)]
+
+
+def last_flights(made: Sequence[Transition], of_flow: bool = False) -> list[Number]:
+    """The last few flights between transitions of the last edge, in order; none where they are not as many.
+
+    That is the last one that was reached: what it set off is no edge of a tail. Other edges that lead back to the same
+    mode may fire meanwhile, also as entries; :data:`FREE` transitions are looked at. Where they are ``of_flow`` time in
+    strips does not count.
+    """
+    times: list[Number] = []
+    waited = made[-1].time * 0
+    last = next((one for one in reversed(made[-FREE:]) if not one.entry), made[-1])
+    for one in reversed(made[-FREE:]):
+        if one.source != last.source or one.source != one.target or (one.entry and one.edge == last.edge):
+            break
+        if of_flow and times and one.resumed is not None:
+            waited = waited + (one.resumed - one.time)
+        if one.edge == last.edge:
+            times.append(one.time + waited)
+        if len(times) > LEAST_FLIGHTS:
+            break
+    return [a - b for a, b in pairwise(times)][::-1] if len(times) > LEAST_FLIGHTS else []
+
+
+def flown(made: Sequence[Transition], t: Number) -> Number:
+    """The time of flow since the first of some transitions, without that in strips."""
+    found = t - made[0].time
+    for one in made:
+        found = found - (one.resumed - one.time if one.resumed is not None else 0)
+    return found
+
+
+LAST_TIES = 4  # what is tied with the flight of an event that is as short may keep it from being armed again
+MOST_CORRECTIONS_TO_GUARD = 4  # of a point towards a guard
+MOST_ROUNDS = 60  # of acceleration towards a fixed point
+MOST_LEAP = 4096  # times a step: rounds may take back as little as a four-thousandth
+Stage = tuple[ModeState, int]
+
+
+def unresolved(run: Run, here: ModeState, k: int) -> Stop | None:
+    """Stop at the end of a tail of edge k without a limit, where what is left of it is shorter than time can tell.
+
+    Events might not be armed again there: they stop before. The relaxed scheme goes on with all others.
+    """
+    edge, t = here.mode.edges[k], here.t
+    if empties(here, k):
+        return None
+    if run.settings.scheme == "located":
+        follows = edge.contact is not None and run.settings.completion != "none"
+        found = None if follows else contraction(run.recorder.transitions)
+        ends = found is not None and found[0] * found[1] <= run.tie(t) * (1 - found[1])
+        if edge.of_event and not ends and t == run.recorder.transitions[-1].resumed:
+            found = contraction(run.recorder.transitions, of_flow=True)
+            ends = found is not None and found[0] * found[1] <= LAST_TIES * run.tie(t)
+    else:
+        flights = last_flights(run.recorder.transitions, of_flow=True) if edge.of_event else []
+        ends = bool(flights) and max(flights) <= run.tie(t)
+    return run.diagnostics.accumulates(edge.name, t, t) if ends else None
+
+
+def empties(here: ModeState, k: int) -> bool:
+    """Whether edge k makes executions that wait: they end, however close together they are."""
+    changes = here.mode.edges[k].changes
+    return any(queue.waiting in changes and queue.values[0] not in changes for queue in here.mode.queues)
+
+
+def nearly_over(run: Run, here: ModeState, k: int) -> tuple[list[int], Number] | None:
+    """Return the edges of a tail that ends within the relaxation, and a bound of what is left of it; else None."""
+    made = run.recorder.transitions[-FREE:]
+    relaxation = run.settings.relaxation
+    if found := contraction(made):
+        flight, ratio = found
+        left = flight * ratio / (1 - ratio)
+        return ([k], left) if left <= relaxation else None
+    left = flown(made, here.t)
+    if len(made) < FREE or left > relaxation:
+        return None
+    edges = of_contacts(run, here, made)
+    return (edges, left) if len(edges) > 1 else None
+
+
+def of_contacts(run: Run, here: ModeState, made: Sequence[Transition]) -> list[int]:
+    """The edges of some transitions, where each leads back to the present mode and its guard can hold a state."""
+    own = {edge.name: j for j, edge in enumerate(here.mode.edges) if edge.contact is not None}
+    mode = here.mode.name
+    if run.settings.completion == "none":
+        return []
+    if not all(one.source == one.target == mode and one.edge in own and not one.entry for one in made):
+        return []
+    return sorted({own[one.edge] for one in made})
+
+
+def close_tail(run: Run, here: ModeState, k: int) -> ModeState | Stop:
+    """Go to the limit of a tail that is nearly over; stop at one where no motion along the guard goes on.
+
+    What its last transition set off has no limit.
+    """
+    made = run.recorder.transitions
+    found = nearly_over(run, here, k)
+    if found is None or empties(here, k) or here.mode.states != here.arc.states:
+        return here
+    edges, left = found
+    end = min(here.t + left, here.segment.end)
+    instant = len(edges) > 1 and end == here.t
+    if not (end > here.t or instant):
+        return here
+    edge = here.mode.edges[k]
+    try:
+        held = contact_at(run, here)
+        if isinstance(held, Stop):
+            return held
+        touched = in_touch(here, held)
+        if all(j in touched for j in edges):
+            return here
+        q = limit_of(run, here, touched, edges, end)
+        if q is not None and meets_another(here, here.moved(end, q), edges):
+            end, q = here.t, limit_of(run, here, touched, edges, here.t)
+        if q is None or not all(keeps(run, there := here.moved(end, q), j) for j in edges):
+            return here
+        if edge.contact is None or run.settings.completion == "none" or made[-1].entry:
+            possible = is_possible(run, here, k, end, q, touched)
+            return run.diagnostics.accumulates(edge.name, end, here.t) if possible else here
+        if keeping(run, there, edges) != edges:
+            return here
+        if not instant and not {*edges} & {*(pressing(run, there, sorted({*touched, *edges})) or ())}:
+            return here
+        if meets_another(here, there, edges):
+            return here
+    except DOMAIN_ERRORS:
+        return here
+    for j in edges:
+        run.diagnostics.replaced(here.mode.edges[j], len(made) - 1, end, left)
+    if end > here.t:
+        here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
+    rest = run.place(here.index, here.mode.states, end, q, here.surfaces.scale)
+    rest.surfaces.enter(end, q, rest.kernel.surfaces(end, *q))
+    rest.surfaces.active.update(edges)
+    return rest
+
+
+def at_limit(run: Run, here: ModeState) -> Stop | None:
+    """Stop at the limit of a tail of edges that take turns, which is nearly over: no motion is known to go on there.
+
+    A round leads through all of them, through other modes with the same states, too: the limit is on all their guards.
+    """
+    made = run.recorder.transitions
+    flights = round_flights(made)
+    found = shrinking(flights)
+    if found is None:
+        return None
+    left = found[0] * found[1] / (1 - found[1])
+    end = here.t + left
+    if not left <= run.settings.relaxation or not end < here.segment.end:
+        return None
+    stages = stages_of(run, here, made[-period(made) :])
+    if stages is None:
+        return None
+    try:
+        q = end_of_rounds(run, here, stages, made, left / flights[-1], end)
+    except DOMAIN_ERRORS:
+        return None
+    if q is None:
+        return None
+    if end > here.t:
+        here.arc.append(end, q, (tuple(b - a for a, b in zip(here.x, q, strict=True)),))
+    run.diagnostics.turns.extend(one.edge for one in made[-len(stages) :])
+    return run.diagnostics.takes_turns(here.mode.states, q, end)
+
+
+def stages_of(run: Run, here: ModeState, made: Sequence[Transition]) -> list[Stage] | None:
+    """The modes of a round, as places of the run, with their edges.
+
+    None where states differ, for an event, and where a guard can hold the state.
+    """
+    numbers = {mode.name: i for i, mode in enumerate(run.program.modes)}
+    stages, follows = list[Stage](), run.settings.completion != "none"
+    for one in made:
+        number = numbers[one.source]
+        mode, kernel = run.program.modes[number], run.kernel.bind(number, here.segment.data)
+        surfaces = Surfaces(kernel, mode.edges, here.surfaces.scale, run.arithmetic)
+        stage = replace(here, index=number, flow=number, mode=mode, kernel=kernel, surfaces=surfaces)
+        k = next(j for j, edge in enumerate(mode.edges) if edge.name == one.edge)
+        if mode.states != here.arc.states or mode.edges[k].of_event:
+            return None
+        if mode.edges[k].contact is not None and follows:
+            return None
+        stages.append((stage, k))
+    return stages
+
+
+def end_of_rounds(
+    run: Run, here: ModeState, stages: list[Stage], made: Sequence[Transition], share: Number, end: Number
+) -> State | None:
+    """The point that rounds run to: on all guards, and no further than the flow leads within the relaxation.
+
+    What is left of the tail has this ``share`` of each flight of the last round.
+    """
+
+    def around(t: Number, x: State) -> State:
+        for stage, k in stages:
+            x = reset_but_counts(run, stage, k, t, onto_guard(stage, k, t, x))
+        return x
+
+    point = q = limit(partial(around, here.t), here.x)
+    far: State = tuple(map(abs, here.kernel.flow(here.t, *here.x)))
+    for i, (stage, k) in enumerate(stages, -len(stages)):
+        slope, h = stage.kernel.flow(here.t, *point), share * (made[i].time - made[i - 1].time)
+        far = tuple(max(a, abs(f)) for a, f in zip(far, slope, strict=True))
+        q = reset_but_counts(run, stage, k, here.t, tuple(a + h * f for a, f in zip(q, slope, strict=True)))
+        point = reset_but_counts(run, stage, k, here.t, point)
+    q = point = limit(partial(around, end), q)
+    for stage, k in stages:
+        if not abs(stage.kernel.surfaces(end, *point)[k]) <= stage.surfaces.roundoff_bound(k, end, point, entry=True):
+            return None
+        point = reset_but_counts(run, stage, k, end, point)
+    noise = ROUNDOFF_UNITS * run.arithmetic.unit
+    reach = (run.settings.relaxation * f + noise * s for f, s in zip(far, here.sizes, strict=True))
+    return q if all(abs(a - b) <= most for a, b, most in zip(q, here.x, reach, strict=True)) else None
+
+
+def limit_of(run: Run, here: ModeState, touched: list[int], edges: list[int], end: Number) -> State | None:
+    """The point that a tail runs to: kept by resets, moved along the guards to its end, and kept by resets there."""
+    kept, along = partial(fixed_point, run, here), here.mode.edges[edges[0]].contact is not None
+    if along and not is_near(run, here, edges):
+        return None
+    q = in_turn(kept, edges, here.t, here.x)
+    if along:
+        flow, h = in_contact(run, here, sorted({*touched, *edges})).kernel.flow, end - here.t
+        slope = flow(here.t, *q)
+        turned = flow(end, *(a + h * f for a, f in zip(q, slope, strict=True)))
+        q = tuple(a + h * (f + g) / 2 for a, f, g in zip(q, slope, turned, strict=True))
+        q = in_turn(partial(onto_guard, here), edges, end, q)
+    q = in_turn(kept, edges, end, q)
+    bound = here.surfaces.roundoff_bound
+    on = all(abs(here.kernel.surfaces(end, *q)[k]) <= bound(k, end, q, entry=True) for k in edges)
+    return q if on else None
+
+
+def is_near(run: Run, here: ModeState, edges: list[int]) -> bool:
+    """Whether what edges take back, each of its guard or of the rate of that, is no more than pushes make in a while.
+
+    The while is the relaxation: so near is the limit.
+    """
+    t, x = here.t, here.x
+    values, sizes = here.kernel.surfaces(t, *x), in_contact(run, here, (), edges).kernel.magnitudes(t, *x)
+    last = {k: values[k] if here.mode.edges[k].push_order == 1 else here.kernel.rates[k](t, *x)[0] for k in edges}
+    return all(abs(last[k]) <= run.settings.relaxation * sizes[k] for k in edges)
+
+
+def held_exactly(
+    run: Run, here: ModeState, held: ModeState, t: Number, x: State, reached: Sequence[int] = ()
+) -> ModeState:
+    """The mode itself again, the state without what steps along its guards were off by: they may hold it again.
+
+    It stays on those that it has ``reached``. It is off them by the round-off of what it has ever been computed from.
+    """
+    touched, after = in_touch(here, held), after_contact(here, held, t, x)
+    scale = tuple(map(joined, after.surfaces.scale, here.arc.scales))
+    after = replace(after, surfaces=replace(after.surfaces, scale=scale))
+    try:
+        q = in_turn(partial(onto_guard, after), sorted({*touched, *reached}), t, x)
+        q = in_turn(partial(fixed_point, run, after), touched, t, q)
+        return after.moved(t, q) if all(keeps(run, after.moved(t, q), k) for k in touched) else after
+    except DOMAIN_ERRORS:
+        return after
+
+
+def in_turn(taken: Callable[[int, Number, State], State], edges: list[int], t: Number, x: State) -> State:
+    """The point that a state runs to which several edges, in turn, take to what one of them keeps."""
+    if len(edges) == 1:
+        return taken(edges[0], t, x)
+    return limit(lambda x: reduce(lambda q, k: taken(k, t, q), edges, x), x)
+
+
+def onto_guard(here: ModeState, k: int, t: Number, x: State) -> State:
+    """A point near a guard taken to it, as near as numbers are, each state in proportion to its scale."""
+    r = here.kernel.surfaces(t, *x)[k]
+    for _ in range(MOST_CORRECTIONS_TO_GUARD):
+        gradient = here.kernel.gradients[k](t, *x)[1:]
+        weights = [g * s * s for g, s in zip(gradient, here.sizes, strict=True)]
+        across = total((g * w for g, w in zip(gradient, weights, strict=True)), r * 0)
+        if not across > 0:
+            break
+        nearer = tuple(a - r / across * w for a, w in zip(x, weights, strict=True))
+        left = here.kernel.surfaces(t, *nearer)[k]
+        if not abs(left) < abs(r):
+            break
+        x, r = nearer, left
+    return x
+
+
+def meets_another(here: ModeState, there: ModeState, edges: list[int]) -> bool:
+    """Whether a surface other than those of edges is passed on the way to a limit."""
+    surfaces = here.surfaces
+    before, after = here.kernel.surfaces(here.t, *here.x), here.kernel.surfaces(there.t, *there.x)
+    for j, (one, two) in enumerate(zip(before, after, strict=True)):
+        rises = two > surfaces.roundoff_bound(j, there.t, there.x) and not one > surfaces.roundoff_bound(
+            j, here.t, here.x
+        )
+        if j not in edges and rises:
+            return True
+    return False
+
+
+def fixed_point(run: Run, here: ModeState, k: int, t: Number, x: State) -> State:
+    """The point that repeated resets run to."""
+    return limit(lambda x: reset_but_counts(run, here, k, t, x), x)
+
+
+def limit(step: Callable[[State], State], x: State) -> State:
+    """The point that repeated steps run to: by Aitken's acceleration of each state, if the step after it is shorter."""
+    for _ in range(MOST_ROUNDS):
+        one = step(x)
+        if one == x:
+            break
+        two = step(one)
+        leap = tuple(map(_accelerated, x, one, two))
+        after = step(leap)
+        x = after if all(map(_shorter, leap, after, one, two)) else two
+        x = tuple(a if abs(a) > NOTHING else a - a for a in x)
+    return x
+
+
+def _accelerated(a: Number, b: Number, c: Number) -> Number:
+    bend = c - 2 * b + a
+    slow = bend != 0 and abs(c - b) <= abs(b - a) and abs(c - b) <= MOST_LEAP * abs(bend)
+    return a - (b - a) / bend * (b - a) if slow else c
+
+
+def _shorter(a: Number, b: Number, c: Number, d: Number) -> bool:
+    return abs(b - a) <= abs(d - c)

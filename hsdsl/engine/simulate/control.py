@@ -17,16 +17,26 @@ than the least step: the largest one times the tolerance, or times 1e-8 (half th
 A state that has been zero so far has no scale. It is held against its own value at the step's end. Where it begins as
 a power of time that is above the method's order, no step is short enough for that: over the least step a state that has
 been no more than the tolerance times what it is then does not count.
+
+MERGE: write one docstring of these.
+`scales` was: The scales of states along a run: what errors are held against, and what counts as moving.
+
+See `hsdsl.engine.integrators.stepper`. What a flow is computed from is looked at only where a step would be rejected
+for the second time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
-from hsdsl.base.numbers.arithmetic import NOTHING, Arithmetic, Number
-from hsdsl.engine.integrators.stepper import State
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Arithmetic, Number
+from hsdsl.engine.integrators.stepper import State, Stepper, resolved
 from hsdsl.engine.simulate.settings import Settings
+
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.run import ModeState, Run
 
 SAFETY, LEAST, MOST = 0.9, 0.2, 5
 MOST_REJECTIONS = 2_000  # in a stretch
@@ -168,3 +178,25 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     control.first = control.h
     control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest
     return control
+
+
+def error_ratio(
+    run: Run, here: ModeState, method: Stepper, error: State, t: Number, h: Number, x: State, z: State
+) -> Number:
+    """Error ratio of a step from (t, x) to z; at most 1 is acceptable."""
+    control, had = run.control, here.arc.scales
+    scales: Sequence[Number] = had if method.scales is None else method.scales(False)
+    ratio = control.ratio(h, error, z, scales, had)
+    if not ratio > 1 or not control.looks_closer(t):
+        return ratio
+    try:
+        if method.scales is not None:
+            scales = method.scales(True)
+        else:
+            terms = run.kernel.terms(here.flow, here.segment.data)
+            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic, control.tolerance, terms)
+    except DOMAIN_ERRORS:
+        return ratio
+    ratio = control.ratio(h, error, z, scales, had)
+    control.closer = ratio <= 1
+    return ratio

@@ -1,33 +1,75 @@
 """The located scheme: the execution itself, its transitions at the crossings (Burden et al. 2013, Fig. 8, Sec. IV-A).
 
-A step is as long as its error allows. Every crossing of every surface inside it is isolated on the surface's own
-polynomial; the earliest goes, at its own instant, and flow goes on from its reset. A cascade at one instant costs no
-time, unless more than `FREE` transitions fall within the relaxation: then each of the others waits in a strip.
+A step is as long as its error allows (`Stepping`). Every crossing of every surface inside it is isolated on the
+surface's own polynomial (`surfaces`); the earliest goes, at its own instant, and flow goes on from its reset
+(`transitions`). Guards may hold the state, and a Zeno tail is replaced by its limit (`contact`). A cascade at one
+instant costs no time, unless more than `FREE` transitions fall within the relaxation: then each of the others waits in
+a strip.
+
+A guard is only *reached* where the flow has no value beyond it, as that of an empty tank: h' = -sqrt(h) with h <= 0
+(`reaches`). The execution comes to the surface tangentially, in finite time. A step's polynomial ends there, or turns
+back there as the equation does not: at its end the flow still leads towards the surface.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Protocol
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
-from hsdsl.engine.integrators.stepper import State
-from hsdsl.engine.simulate.contact import behind_end, contact_at, holds_next, in_touch, keeps
-from hsdsl.engine.simulate.dense_steps import Span, Stepping, stepping
-from hsdsl.engine.simulate.diagnostics import FREE, slides
-from hsdsl.engine.simulate.entry import enter
-from hsdsl.engine.simulate.flights import contraction, flown
-from hsdsl.engine.simulate.relaxed import Event, go_on, sizes, standing_on
-from hsdsl.engine.simulate.root_isolation import stays_below
-from hsdsl.engine.simulate.run import ModeState, Run, choose, reset
-from hsdsl.engine.simulate.stall_detection import pace
-from hsdsl.engine.simulate.standstill import standstill
-from hsdsl.engine.simulate.stops import LEFT, left_domain, reached, reached_in_strip
-from hsdsl.engine.simulate.surface_polynomials import Rise, deflated, rises_along
-from hsdsl.engine.simulate.surfaces import NONE, Arrival, Crossing, StepFailure, close_bracket, joined
-from hsdsl.engine.simulate.touching import touched
-from hsdsl.engine.simulate.zeno import at_limit, close_tail, held_exactly, of_contacts, unresolved
+from hsdsl.engine.integrators import TaylorMethod
+from hsdsl.engine.integrators.radau import NoConvergence
+from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper
+from hsdsl.engine.integrators.taylor import proposed_step
+from hsdsl.engine.kernel import Series, Taylor
+from hsdsl.engine.simulate.contact import (
+    at_limit,
+    behind_end,
+    close_tail,
+    contact_at,
+    contraction,
+    flown,
+    held_exactly,
+    holds_next,
+    in_touch,
+    keeps,
+    of_contacts,
+    unresolved,
+)
+from hsdsl.engine.simulate.control import error_ratio
+from hsdsl.engine.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED, Event, go_on, sizes, standing_on
+from hsdsl.engine.simulate.run import ModeState, Run
+from hsdsl.engine.simulate.stalls import CREEPING, MOST_CREEPING, Chatter, pace
+from hsdsl.engine.simulate.stops import FREE, LEFT, left_domain, reached, reached_in_strip, slides
+from hsdsl.engine.simulate.surfaces import (
+    NONE,
+    ROUNDOFF_UNITS,
+    UNKNOWN_TOLERANCE,
+    Arrival,
+    Crossing,
+    Curves,
+    Piece,
+    Rise,
+    StepFailure,
+    TooFast,
+    at,
+    close_bracket,
+    curves_along,
+    deflated,
+    joined,
+    rises_along,
+    settles,
+    shortened,
+    slope_of,
+    stays_below,
+    total,
+    value,
+    without_zeros,
+)
+from hsdsl.engine.simulate.transitions import choose, enter, reset
 
 MOST_CORRECTIONS = 8
 
@@ -101,7 +143,7 @@ def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event |
             if event := first_event(run, here, before, span):
                 return event
         except DOMAIN_ERRORS:
-            return standstill(run, here.moved(t, x)).not_finite([(t, x), (span.t1, span.z)])
+            return run.standstill(here.moved(t, x)).not_finite([(t, x), (span.t1, span.z)])
         if here.surfaces.active:
             here.surfaces.leave(span.t1, span.z)
         t, x, before = span.t1, span.z, span
@@ -161,7 +203,7 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
     zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
     pieces = deflated(span.curves[k]) if k in surfaces.active else span.curves[k]
     if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
-        return touched(run, here, span, k, pieces)
+        return reaches(run, here, span, k, pieces)
     first, last = surfaces.roundoff_bound(k, span.t, span.x), surfaces.roundoff_bound(k, span.t1, span.z)
     beyond = pieces[0].coefficients[0] > first
     for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
@@ -171,7 +213,7 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
             if not rise.certain:
                 run.diagnostics.unsettled(here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
-    return touched(run, here, span, k, pieces)
+    return reaches(run, here, span, k, pieces)
 
 
 def with_unseen(run: Run, here: ModeState, span: Span, guards: list[Crossing]) -> list[Crossing]:
@@ -336,5 +378,342 @@ def stuck(run: Run, here: ModeState, failure: StepFailure) -> Event | Stop:
     try:
         slope = here.kernel.flow(here.t, *here.x)
     except DOMAIN_ERRORS:
-        return standstill(run, here).not_finite([(here.t, here.x)])
-    return standstill(run, here).stuck(failure, slope)
+        return run.standstill(here).not_finite([(here.t, here.x)])
+    return run.standstill(here).stuck(failure, slope)
+
+
+TOO_FAST = StepFailure("not finite")  # a surface, for one step
+BLUR = 2  # estimates of a step's error that an implicit method's polynomial may be off inside it
+LAST_TERM, TERM_BEFORE = 4, 32  # tolerances that the last terms of a surface's series may have, relative to the largest
+
+
+@dataclass(frozen=True)
+class Span:
+    """A step from (t, x) to (t1, z).
+
+    ``curves`` has the pieces of each surface and ``ends`` its value at z. ``point(s)`` is the time and state at the
+    share s of the step, ``cut(s)`` the interpolant of the states up to there, over [0, 1], and ``sizes(s)`` the sums of
+    the absolute terms that the state there is computed from.
+    """
+
+    t: Number
+    h: Number
+    t1: Number
+    x: State
+    z: State
+    piece: Polynomial
+    curves: Curves
+    ends: State
+    point: Callable[[Number], tuple[Number, State]]
+    cut: Callable[[Number], Polynomial]
+    sizes: Callable[[Number], State]
+
+
+class Stepping(Protocol):
+    """What makes steps in one mode, on one segment of the inputs."""
+
+    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
+        """Make one step that the error allows, not beyond ``limit``; or return what is in the way."""
+        ...
+
+
+def stepping(run: Run, here: ModeState) -> Stepping:
+    """Choose by the method."""
+    method = run.settings.method
+    if method is not None and method.kind == "taylor":
+        series = run.kernel.taylor(here.flow, here.segment.data)
+        assert series is not None
+        return SeriesSteps(run, here, method, series, run.stepper(here))
+    return TableSteps(run, here, run.stepper(here))
+
+
+@dataclass
+class TableSteps:
+    """Steps of a Runge-Kutta method; surfaces are interpolated on its dense output.
+
+    A crossing's state is that of a step of the method that ends there, which is as accurate as any of its steps.
+    """
+
+    run: Run
+    here: ModeState
+    method: Stepper
+    slope: State | None = None
+    at_time: Number = None
+    _chatter: Chatter = field(default_factory=Chatter)
+
+    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
+        """Make one step: rejected by the error estimate, halved where something has no value."""
+        control, flow, halvings = self.run.control, self.here.kernel.flow, 0
+        try:
+            slope = self.slope if self.slope is not None and self.at_time == t else flow(t, *x)
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+        if self.slope is None:
+            control.begin(self.here.arc.scales, slope)
+        mode = self.here.mode.name
+        h = control.within_reach(mode, control.h)
+        while True:
+            h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
+            tried = self._try(t, h, t1, x, slope) if t1 > t else TOO_WRONG
+            if isinstance(tried, tuple):
+                ratio, span = tried
+                assert self.slope is not None
+                if control.tolerance is not None and self._chatter.across(flow, t, x, slope, t1, span.z, self.slope):
+                    return StepFailure("jump")
+                if control.tolerance is not None and halvings == 0:
+                    control.accept(h, ratio)
+                control.slow_enough(mode, h)
+                self._creeping = self._creeping + 1 if halvings >= CREEPING else 0
+                return span if self._creeping <= MOST_CREEPING else StepFailure("creeping")
+            if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance is not None)):
+                control.reject(h, None if tried is UNSOLVED else self._ratio)
+                h = control.within_reach(mode, control.h)
+            else:
+                if tried is TOO_FAST:
+                    control.too_fast(mode, h)
+                h, halvings = h / 2, halvings + 1
+            if halvings > self.run.arithmetic.most_halvings or not t + h > t or control.struggles:
+                return tried
+
+    _ratio: Number = 1
+    _creeping: int = 0
+
+    def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> tuple[Number, Span] | StepFailure:
+        flow, method, control = self.here.kernel.flow, self.method, self.run.control
+        try:
+            z, stages = method.step(flow, t, h, x, slope)
+            end = flow(t1, *z)
+            if not self.run.arithmetic.isfinite(sum(z) + sum(end)):
+                return NOT_FINITE
+            if control.tolerance is not None and method.error is not None:
+                self._ratio = error_ratio(self.run, self.here, method, method.error(h, stages, end), t, h, x, z)
+                if not self._ratio <= 1:
+                    return TOO_WRONG
+            piece = method.piece(flow, t, h, x, z, stages, slope, end)
+            if not all(self.run.arithmetic.isfinite(c) for power in piece for c in power):
+                return NOT_FINITE  # it may overflow where its end does not
+            curves = curves_along(self.run, self.here, t, h, x, z, piece)
+            ends = self.here.kernel.surfaces(t1, *z)
+            if method.landing is not None and control.tolerance is not None and method.error is not None:
+                curves = self._blurred(curves, t1, z, method.error(h, stages, end), ends)
+        except NoConvergence:
+            return UNSOLVED
+        except TooFast:
+            return TOO_FAST
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+        self.slope, self.at_time = end, t1
+
+        part = method.landing or method.step
+
+        def point(s: Number) -> tuple[Number, State]:
+            return (t1, z) if s == 1 else (t + s * h, part(flow, t, s * h, x, slope)[0] if s > 0 else x)
+
+        def cut(s: Number) -> Polynomial:
+            try:
+                q, shorter = part(flow, t, s * h, x, slope)
+                return method.piece(flow, t, s * h, x, q, shorter, slope, flow(t + s * h, *q))
+            except DOMAIN_ERRORS:
+                return shortened(piece, s)
+
+        def sizes(s: Number) -> State:
+            if method.landing is not None:
+                return sizes_along(x, piece, s)
+            largest = [max(abs(k) for k in column) for column in zip(*stages, strict=True)]
+            return tuple(abs(a) + s * h * self.method.gain * k for a, k in zip(x, largest, strict=True))
+
+        return self._ratio, Span(t, h, t1, x, z, piece, curves, ends, point, cut, sizes)
+
+    def _blurred(self, curves: Curves, t1: Number, z: State, error: State, ends: State) -> Curves:
+        """Let no rise count that is lower than what the step's error moves a surface by.
+
+        A collocation polynomial is off inside the step as it is at its end, its first terms too: where a mode is
+        entered on a surface that the flow leaves slowly, it may rise where the solution falls.
+        """
+        moved = self.here.kernel.surfaces(t1, *(a + BLUR * e for a, e in zip(z, error, strict=True)))
+        off = [abs(a - b) for a, b in zip(moved, ends, strict=True)]
+        return [[replace(piece, off=piece.off + more) for piece in row] for row, more in zip(curves, off, strict=True)]
+
+
+@dataclass
+class SeriesSteps:
+    """Steps of Taylor's method; smooth surfaces have series of their own."""
+
+    run: Run
+    here: ModeState
+    method: TaylorMethod
+    series: Taylor
+    steps: Stepper
+
+    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
+        """Make one step, as long as the terms left out allow; halved where its end does not solve the equation."""
+        run, order, mode = self.run, self.method.order, self.here.mode.name
+        try:
+            lines = self.series.flow(order, t, x)
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+        stages = tuple(tuple(line[m] for line in lines[1 : len(x) + 1]) for m in range(1, order + 2))
+        h = run.control.within_reach(mode, self._longest(stages))
+        for _ in range(run.arithmetic.most_halvings):
+            h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
+            if not t1 > t:
+                break
+            tried = self._try(t, h, t1, x, stages, lines)
+            if isinstance(tried, Span):
+                run.control.slow_enough(mode, h)
+                return tried
+            if tried is TOO_FAST:
+                run.control.too_fast(mode, h)
+            h = h / 2
+        return NOT_FINITE
+
+    def _longest(self, stages: Stages) -> Number:
+        control = self.run.control
+        if control.tolerance is None:
+            return control.h
+        tolerance = max(control.tolerance, self.run.arithmetic.unit)
+        proposed = proposed_step(stages, self.here.arc.scales, tolerance, self.run.arithmetic)
+        return control.largest if proposed is None else min(control.largest, proposed)
+
+    def _try(
+        self, t: Number, h: Number, t1: Number, x: State, stages: Stages, lines: tuple[Series, ...]
+    ) -> Span | StepFailure:
+        run, here, power, parts = self.run, self.here, self.run.arithmetic.zero + 1, list[State]()
+        for c in stages[:-1]:
+            power = power * h
+            parts.append(tuple(a * power for a in c))
+        piece = tuple(parts)
+        z = at(x, piece, run.arithmetic.zero + 1)
+        try:
+            end = here.kernel.flow(t1, *z)
+            if not run.arithmetic.isfinite(sum(z) + sum(end)):
+                return NOT_FINITE
+            tolerance, error = run.control.tolerance, self.steps.error
+            if tolerance is not None and error is not None:
+                ratio = error_ratio(run, here, self.steps, error(h, stages, end), t, h, x, z)
+                if ratio > max(1, 64 * run.arithmetic.unit / tolerance):
+                    return TOO_WRONG
+            ends = here.kernel.surfaces(t1, *z)
+            curves = self._curves(t, h, t1, x, z, piece, lines, ends)
+        except TooFast:
+            return TOO_FAST
+        except DOMAIN_ERRORS:
+            return NOT_FINITE
+
+        def point(s: Number) -> tuple[Number, State]:
+            return (t1, z) if s == 1 else (t + s * h, at(x, piece, s) if s > 0 else x)
+
+        def sizes(s: Number) -> State:
+            return sizes_along(x, piece, s)
+
+        return Span(t, h, t1, x, z, piece, curves, ends, point, lambda s: shortened(piece, s), sizes)
+
+    def _curves(
+        self,
+        t: Number,
+        h: Number,
+        t1: Number,
+        x: State,
+        z: State,
+        piece: Polynomial,
+        lines: tuple[Series, ...],
+        ends: State,
+    ) -> Curves:
+        """The surfaces' series where they meet the surfaces at the step's end, interpolation for the others."""
+        run, here = self.run, self.here
+        starts, zero = here.kernel.surfaces(t, *x), run.arithmetic.zero
+        if not ends:
+            return []
+        try:
+            found = self.series.surfaces(self.method.order, lines)
+        except DOMAIN_ERRORS:
+            found = tuple(None for _ in ends)
+        curves: Curves = []
+        half = (zero + 1) / 2
+
+        @cache
+        def middle() -> State:
+            return here.kernel.surfaces(t + half * h, *at(x, piece, half))
+
+        for k, (row, end) in enumerate(zip(found, ends, strict=True)):
+            scaled, power = list[Number](), zero + 1
+            for c in row or ():
+                scaled.append(c * power)
+                power = power * h
+            if not scaled or not self._converges(
+                scaled, end, lambda k: 4 * here.surfaces.roundoff_bound(k, t1, z), k, middle
+            ):
+                return curves_along(run, here, t, h, x, z, piece)
+            curves.append([Piece(zero, zero + 1, without_zeros([starts[k], *scaled[1:]]))])
+        return curves
+
+    def _converges(
+        self, c: list[Number], end: Number, noise: Callable[[int], Number], k: int, middle: Callable[[], State]
+    ) -> bool:
+        """Whether a surface's series has run out by its last terms, and gives the surface at the end of the step.
+
+        That of a surface linear in the states need not run out: it converges if it gives the surface to round-off.
+        """
+        given, largest = self.run.control.tolerance, max(abs(a) for a in c)
+        tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)
+        tail = abs(c[-1]) <= LAST_TERM * tolerance * largest and abs(c[-2]) <= TERM_BEFORE * tolerance * largest
+        one = end * 0 + 1
+        off = abs(value(c, one) - end)
+        if tail:
+            return settles(off, tolerance * largest, noise, k)
+        return off <= noise(k) and abs(value(c, one / 2) - middle()[k]) <= noise(k)
+
+
+def sizes_along(x: State, piece: Polynomial, s: Number) -> State:
+    """The sums of the absolute terms of an interpolant."""
+    return at(tuple(map(abs, x)), tuple(tuple(map(abs, c)) for c in piece), s)
+
+
+TURNINGS = 60  # halvings of a step
+
+
+def reaches(run: Run, here: ModeState, span: Span, k: int, pieces: list[Piece]) -> Crossing | None:
+    """Return where in a step surface k is reached so and its condition holds, on the step's own polynomial."""
+    c, one = pieces[0].coefficients, run.arithmetic.zero + 1
+    if not c[1] > 0 or len(pieces) > 1 or run.control.tolerance is None:
+        return None
+    share, time, q, slope = one, span.t1, span.z, slope_of(c, one)
+    if slope > ROUNDOFF_UNITS * run.arithmetic.unit * c[1]:
+        return None
+    if here.kernel.rates[k](span.t1, *span.z)[0] > 0:
+        if not slope < 0:
+            return None
+        share = turning(c, one)
+        time, q = span.t + share * span.h, at(span.x, span.piece, share)
+    elif not abs(span.ends[k]) <= here.surfaces.roundoff_bound(k, span.t, span.x):
+        return None
+    if not ends_at(run, here, k, time, q):
+        return None
+    holds = k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]
+    return Crossing(k, share, time, q, run.arithmetic.zero) if holds else None
+
+
+def turning(c: Sequence[Number], one: Number) -> Number:
+    """Where in [0, 1] a polynomial turns that rises at 0 and falls at 1."""
+    low, high = one * 0, one
+    for _ in range(TURNINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if slope_of(c, middle) > 0 else (low, middle)
+    return low
+
+
+def ends_at(run: Run, here: ModeState, k: int, time: Number, q: State) -> bool:
+    """Whether a state is on surface k, within the error of a step, and the flow has no value beyond."""
+    zero, tolerance = run.arithmetic.zero, run.control.tolerance
+    gradient = here.kernel.gradients[k](time, *q)[1:]
+    sizes = zip(gradient, q, here.arc.scales, strict=True)
+    off = total((abs(g) * (tolerance * max(size, abs(a))) for g, a, size in sizes), zero)
+    norm = total((g * g for g in gradient), zero)
+    if not norm > 0 or here.kernel.surfaces(time, *q)[k] < -off:
+        return False
+    beyond = tuple(a + 2 * off / norm * g for a, g in zip(q, gradient, strict=True))
+    try:
+        end = here.kernel.flow(time, *beyond)
+    except DOMAIN_ERRORS:
+        return True
+    return not run.arithmetic.isfinite(total(end, zero))

@@ -8,9 +8,9 @@ from __future__ import annotations
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate import stops
-from hsdsl.engine.simulate.diagnostics import Diagnostics, slides
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.standstill import Standstill
+from hsdsl.engine.simulate.stalls import Standstill
+from hsdsl.engine.simulate.stops import Diagnostics, slides
 from hsdsl.engine.simulate.surfaces import StepFailure
 from hsdsl.engine.simulate.workspace import Workspace
 from hsdsl.mathematics.program import Program

@@ -22,7 +22,6 @@ from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.recorder import Counted
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.standstill import standstill
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Crossing
 
@@ -108,7 +107,7 @@ def step_through(
         try:
             force = routines(t).flow(t, *still)[1 - o.position]
         except DOMAIN_ERRORS:
-            return standstill(run, here).not_finite([(t, still)])
+            return run.standstill(here).not_finite([(t, still)])
         if n == 0:
             z.append(z[0] + h * v + h * h / 2 * (force - 2 * o.damping * v - o.stiffness * z[0]))
         else:

@@ -13,16 +13,16 @@ from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.engine.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.engine.simulate.control import make_control
+from hsdsl.engine.simulate.moving import finer_settings
 from hsdsl.engine.simulate.output_buffers import Sink
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.recorder import OutOfRoom, Overtaken, Progress, Recorder, Room
-from hsdsl.engine.simulate.refinement import finer_settings
 from hsdsl.engine.simulate.result import about, from_recorder, written
 from hsdsl.engine.simulate.review import Judge, Review
 from hsdsl.engine.simulate.run import ModeState, Run
 from hsdsl.engine.simulate.settings import Settings
 from hsdsl.engine.simulate.stops import interrupted, memory
+from hsdsl.engine.simulate.transitions import Tails
 
 
 def _relaxed(run: Run, here: ModeState | Stop) -> Stop:
@@ -155,8 +155,8 @@ class Prepared(Problem):
         return Run(**problem, control=make_control(settings, arithmetic), recorder=recorder, tails=tails)
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
-        from hsdsl.engine.simulate.entry import enter
-        from hsdsl.engine.simulate.scales import start_sizes
+        from hsdsl.engine.simulate.contact import start_sizes
+        from hsdsl.engine.simulate.transitions import enter
 
         if watch is not None:
             watch(run.recorder)

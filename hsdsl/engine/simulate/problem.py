@@ -10,8 +10,8 @@ from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.kernel import Kernel
 from hsdsl.engine.simulate.input_segments import Timeline
 from hsdsl.engine.simulate.moving import Start
-from hsdsl.engine.simulate.queues import Waits
 from hsdsl.engine.simulate.settings import Settings
+from hsdsl.engine.simulate.transitions import Waits
 from hsdsl.mathematics.program import Program
 
 

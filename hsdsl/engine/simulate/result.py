@@ -15,12 +15,11 @@ from hsdsl.engine.execution import Arc, Execution, Point, Stop, Transition, Verd
 from hsdsl.engine.runtime.kernel import Sampler
 from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.compiled import CompiledRun
-from hsdsl.engine.simulate.diagnostics import LEFT_OUT, TWO_STEP, Diagnostics
 from hsdsl.engine.simulate.output_buffers import arcs_of, last_arc, transitions_of
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.remarks import noted, warnings_of
 from hsdsl.engine.simulate.run import Run
 from hsdsl.engine.simulate.settings import Settings
+from hsdsl.engine.simulate.stops import LEFT_OUT, TWO_STEP, Diagnostics, noted, warnings_of
 
 Repetition = Callable[[Execution], Execution]
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
-from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Stop, Transition
 from hsdsl.engine.integrators.implicit import Derivatives
 from hsdsl.engine.integrators.stepper import State, Stepper, stepper
 from hsdsl.engine.integrators.taylor import taylor_stepper
 from hsdsl.engine.kernel import ModeKernel
-from hsdsl.engine.simulate.cascade import Cascade
 from hsdsl.engine.simulate.control import Control
-from hsdsl.engine.simulate.diagnostics import Diagnostics
 from hsdsl.engine.simulate.input_segments import Segment
-from hsdsl.engine.simulate.moving import moved_by_flow, moved_crossing, moved_reset
+from hsdsl.engine.simulate.moving import moved_by_flow, moved_crossing
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.recorder import OpenArc, Recorder
-from hsdsl.engine.simulate.stops import limit, reset_not_finite
+from hsdsl.engine.simulate.stops import Diagnostics, limit
 from hsdsl.engine.simulate.surfaces import Crossing, Surfaces, larger
+from hsdsl.engine.simulate.transitions import Cascade, Tails
 from hsdsl.mathematics.program import ModeProgram
+
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.stalls import Standstill
 
 
 @dataclass(frozen=True)
@@ -139,6 +140,13 @@ class Run(Problem):
         made = self.recorder.transitions
         return not made or made[-1].resumed is None or t > made[-1].resumed
 
+    def standstill(self, here: ModeState) -> Standstill:
+        """Where the run cannot go on, in the mode itself where guards hold the state."""
+        from hsdsl.engine.simulate.stalls import Standstill  # few runs end so
+
+        segment = here.segment if here.flow == here.index else self.timeline.at(here.t)
+        return Standstill(self, here.index, segment, here.t, here.x, here.arc.scales, self.control.h)
+
     def limit_reached(self, t: Number) -> Stop | None:
         """Stop where one more transition would exceed what the run may make."""
         if len(self.recorder.transitions) < self.settings.max_transitions:
@@ -176,38 +184,3 @@ class Run(Problem):
             )
         )
         return after or ()
-
-
-def choose(here: ModeState, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:
-    """Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
-
-    Tied are also guards that the earliest crossing's point is on. The chosen edge goes from that point. Returns the
-    crossing and the names of those tied with it.
-    """
-    edges, first = here.mode.edges, min(crossings, key=lambda c: c.time)
-    since = run.tie(first.time)
-    tied = {c.edge: c for c in crossings if c.time - first.time <= since}
-    tied |= dict.fromkeys(here.surfaces.standing(first.time, first.state, since, known=tied), first)
-    edge = min(tied, key=lambda k: (-edges[k].priority, k))
-    chosen = replace(first, edge=edge, depth=tied[edge].depth)
-    return chosen, tuple(edges[k].name for k in sorted(tied) if k != edge)
-
-
-def reset(here: ModeState, crossing: Crossing, scale: State, run: Run) -> tuple[State, State] | Stop:
-    """Apply a reset to the values before the jump; also the sizes of the numbers the new state came from."""
-    k, t, q = crossing.edge, crossing.time, crossing.state
-    edge, isfinite = here.mode.edges[k], run.arithmetic.isfinite
-    try:
-        after = here.kernel.resets[k](t, *q)
-    except DOMAIN_ERRORS:
-        after = (run.arithmetic.functions["nan"],)
-    if not all(map(isfinite, after)):
-        return reset_not_finite(edge, t)
-    if run.settings.moves:
-        after = moved_reset(run.kernel, here.index, k, here.segment.data, t, q) or after
-    try:
-        spread = here.kernel.spreads[k](t, *q, *scale)
-    except DOMAIN_ERRORS:
-        spread = ()
-    known = bool(spread) and all(map(isfinite, spread))
-    return after, tuple(spread if known else map(abs, after))  # where a reset is infinitely steep, no more is known

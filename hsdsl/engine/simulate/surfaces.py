@@ -1,27 +1,40 @@
-"""Geometry of a trial step against a mode's surfaces: round-off, depth, and where a surface was crossed.
+"""A mode's surfaces: at a point, as polynomials of the share s of a step, and where these rise through zero.
 
-The depth of a point beyond a surface is tau = r / |grad r| with the gradient in (t, x); the crossing is looked for on
-the step's interpolant, never on the flow.
+A surface value counts as zero below its round-off. A state is *on* a surface, which is then ``active``, where it
+entered the mode so; it *stands* on a guard (`Surfaces.standing`) where that is so at a point with the flow leading out.
+A surface is *emerging* where it moved past the state while that waited in a strip, and the flow leads back through it.
+
+With a Taylor method the polynomial is the surface's own series, if it is smooth. Otherwise the surface is interpolated
+on the step's dense output, at equidistant nodes, and held against itself between them: where that residual is too
+large the piece is halved. Roots are isolated in the Bernstein form: its coefficients on an interval enclose the values
+there, and a polynomial has at most as many roots inside as they have changes of sign, and as many up to an even number
+(Descartes' rule). An interval is cut until these decide; no root between two samples can be missed. See R. T. Farouki,
+The Bernstein polynomial basis: a centennial retrospective, Computer Aided Geometric Design 29, 2012
+(doi:10.1016/j.cagd.2012.03.001).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Literal
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+from math import comb
+from typing import TYPE_CHECKING, Literal
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper, hermite
+from hsdsl.engine.integrators.stepper import Polynomial, State
 from hsdsl.engine.kernel import ModeKernel, Vector
+from hsdsl.engine.simulate.settings import Settings
 from hsdsl.mathematics.program import EdgeProgram
 
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.run import ModeState, Run
+
 ROUNDOFF_UNITS = 32
-SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_ITERATIONS = 200
-Condition = Callable[[int, Number, State], bool]
 NONE: Mapping[int, Number] = {}
-ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved
 
 
 @dataclass(frozen=True)
@@ -64,41 +77,6 @@ class StepFailure:
 
     kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump", "slow"]
     surface: int | None = None
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One step as tried, from (t, x) to (t1, z)."""
-
-    t: Number
-    h: Number
-    t1: Number
-    x: State
-    slope: State
-    z: State
-    stages: Stages
-    flow: Callable[..., State]
-    stepper: Stepper
-
-    @cached_property
-    def end_slope(self) -> State | None:
-        """The flow at the step's end; None where it has no finite value (beyond a guard it need not have one)."""
-        try:
-            end = self.flow(self.t1, *self.z)
-        except DOMAIN_ERRORS:
-            return None
-        return end if sum(end) - sum(end) == 0 else None
-
-    @cached_property
-    def piece(self) -> Polynomial:
-        """The step's interpolant."""
-        if self.end_slope is None:
-            return (tuple(b - a for a, b in zip(self.x, self.z, strict=True)),)
-        return self.stepper.piece(self.flow, self.t, self.h, self.x, self.z, self.stages, self.slope, self.end_slope)
-
-    def cubic(self) -> Polynomial:
-        """The cubic Hermite interpolant, for any method."""
-        return self.piece if self.end_slope is None else hermite(self.h, self.x, self.z, self.slope, self.end_slope)
 
 
 def at(x: State, piece: Polynomial, theta: Number) -> State:
@@ -224,13 +202,6 @@ class Surfaces:
         except DOMAIN_ERRORS:
             return True
 
-    def norm(self, t: Number, x: State, surface: int) -> Number:
-        """|grad r| in (t, x)."""
-        total = self.arithmetic.zero
-        for g in self.kernel.gradients[surface](t, *x):
-            total = total + g * g
-        return self.arithmetic.sqrt(total)
-
     def standing(self, t: Number, x: State, since: Number, known: Collection[int] = ()) -> list[int]:
         """Edges on whose guards the state is, with the flow pointing out and `if` true, which are not only touched.
 
@@ -276,181 +247,6 @@ class Surfaces:
             size = size + abs(g) * abs(f)
         return rate > ROUNDOFF_UNITS * self.arithmetic.unit * size
 
-    def excursion(self, trial: Trial, epsilon: Number) -> StepFailure | None:
-        """Look for a surface that a step went beyond and came back from, on its interpolant.
-
-        Only where the step starts on it, or the flow points out of it there and back in at its end; for adaptive
-        steps, whose length nobody chose.
-        """
-        if trial.end_slope is None:
-            return None
-        for k, gradient in enumerate(self.kernel.gradients):
-            try:
-                out = self._rate(gradient(trial.t, *trial.x), trial.slope)
-                back = self._rate(gradient(trial.t1, *trial.z), trial.end_slope)
-                if (k in self.active or out > 0 >= back) and self._beyond_within(trial, k, epsilon):
-                    return StepFailure("deep", k)
-            except DOMAIN_ERRORS:
-                continue
-        return None
-
-    def _rate(self, gradient: Vector, flow: State) -> Number:
-        total = gradient[0]
-        for g, f in zip(gradient[1:], flow, strict=True):
-            total = total + g * f
-        return total
-
-    def _beyond_within(self, trial: Trial, k: int, epsilon: Number) -> bool:
-        """Whether a step is beyond surface k on the way: at its eighths, and then ever nearer around the highest point.
-
-        That ends where a concave surface could not reach zero, or a visit would not last as long as epsilon. Whether an
-        `if` holds where it begins is seen by a step that ends in it.
-        """
-        zero, top = self.arithmetic.zero, self.kernel.surfaces(trial.t, *trial.x)[k]
-        end = self.kernel.surfaces(trial.t1, *trial.z)[k]
-        if top > self.roundoff_bound(k, trial.t, trial.x) or end > self.roundoff_bound(k, trial.t1, trial.z):
-            return False  # transparent, and beyond already, or crossed
-        place, width, middles = zero, (zero + 1) / SCAN, [(zero + i) / SCAN for i in range(1, SCAN)]
-        while middles:
-            crest, least = top, top
-            for s in middles:
-                t, x = trial.t + s * trial.h, at(trial.x, trial.piece, s)
-                r = self.kernel.surfaces(t, *x)[k]
-                if r > 0 and r > self.roundoff_bound(k, t, x):
-                    return True
-                place, top, least = (s, r, least) if r > top else (place, top, min(least, r))
-            within = len(middles) == 2 and top == crest
-            if not width * trial.h > epsilon or (within and top + (top - least) <= 0):
-                break
-            width = width / 2
-            middles = [s for s in (place - width, place + width) if 0 < s < 1]
-        return False
-
-    def judge(self, trial: Trial, values: Vector, epsilon: Number, next_: Condition) -> list[Crossing] | StepFailure:
-        """Say whether a trial's end is in the relaxed domain: inside (no crossing), in strips, or neither.
-
-        ``next_`` says of an edge whether its `if` holds next along the flow, where it does not hold at a point.
-        Raises one of ``DOMAIN_ERRORS`` where a surface or condition has no finite value on the way.
-        """
-        noise = {k: self.roundoff_bound(k, trial.t1, trial.z) for k, r in enumerate(values) if not r <= 0}
-        beyond = [k for k in noise if not values[k] <= noise[k]]
-        for k in beyond:
-            if k >= len(self.edges) and k not in self.emerging:
-                return StepFailure("wall", k)
-            if not self._may_be_beyond(k) and (failure := self._too_deep(trial, values, noise, k, epsilon)):
-                return failure
-        crossings: list[Crossing] = []
-        for k in beyond:
-            if k >= len(self.edges):
-                continue
-            found = self._crossing(trial, values, noise, k, epsilon, next_)
-            if isinstance(found, StepFailure):
-                return found
-            if found is not None:
-                crossings.append(found)
-        return crossings
-
-    def _too_deep(
-        self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number
-    ) -> StepFailure | None:
-        norm = self.norm(trial.t1, trial.z, k)
-        if not norm > 0:
-            return StepFailure("flat", k)
-        return None if values[k] <= epsilon * norm + noise[k] else StepFailure("deep", k)
-
-    def _crossing(
-        self, trial: Trial, values: Vector, noise: dict[int, Number], k: int, epsilon: Number, next_: Condition
-    ) -> Crossing | StepFailure | None:
-        """Find the last up-crossing of surface k on the interpolant; None where the surface is transparent there."""
-        piece = trial.piece
-        found = self._on(trial, piece, k)
-        if found is None:
-            return None
-        norm = self.norm(trial.t1, trial.z, k)
-        inward = self._inward(trial, found, noise[k], k)
-        if inward and inward <= epsilon * norm:
-            piece = trial.cubic()
-            found = self._on(trial, piece, k) or found
-            inward = self._inward(trial, found, noise[k], k)
-        if inward:
-            return StepFailure("inward", k)
-        theta, time, q = found
-        if not self.kernel.conditions[k](time, *q)[0]:
-            on = theta == 0 or k in self.active
-            if not (on and next_(k, *self._after_hop(trial, piece, found, k, values[k]))):
-                return None
-        if failure := self._too_deep(trial, values, noise, k, epsilon):
-            return failure
-        if self._deeper_before(trial, piece, theta, k, values[k] + noise[k]):
-            return StepFailure("deep", k)
-        return Crossing(k, theta, time, q, min(epsilon, values[k] / norm), shortened(piece, theta))
-
-    def _may_be_beyond(self, k: int) -> bool:
-        """Whether a state may be beyond surface k without having crossed it."""
-        return k in self.emerging or k >= len(self.edges) or self.edges[k].conditional
-
-    def _deeper_before(self, trial: Trial, piece: Polynomial, theta: Number, k: int, end: Number) -> bool:
-        """Whether a step was further beyond surface k between the crossing and its end: the end is on another flank."""
-        for i in range(1, SCAN):
-            s = theta + (1 - theta) * i / SCAN
-            if self.kernel.surfaces(trial.t + s * trial.h, *at(trial.x, piece, s))[k] > end:
-                return True
-        return False
-
-    def _inward(self, trial: Trial, found: tuple[Number, Number, State], noise: Number, k: int) -> Number:
-        """How far the flow at q would take r back inside over this step; 0 when not beyond round-off."""
-        _, time, q = found
-        back = -self.kernel.rates[k](time, *q)[0] * trial.h
-        return back if back > noise else self.arithmetic.zero
-
-    def _after_hop(
-        self, trial: Trial, piece: Polynomial, found: tuple[Number, Number, State], k: int, end: Number
-    ) -> tuple[Number, State]:
-        """Where the flow comes back to surface k, which it is on, after a hop that round-off hides; r ends at that."""
-        theta, time, q = found
-        back = -self.kernel.rates[k](time, *q)[0] * trial.h
-        if not back > 0:
-            return time, q
-        s = theta + (1 - theta) * (back / (back + end))
-        return trial.t + s * trial.h, at(trial.x, piece, s)
-
-    def _smallest(self, trial: Trial, k: int) -> Number:
-        """How close to zero a crossing of this step can be located: round-off of its own numbers, no older ones."""
-        sizes = tuple(max(abs(a), abs(b)) for a, b in zip(trial.x, trial.z, strict=True))
-        return self.roundoff_bound(k, trial.t1, sizes) * ROOT_SHARE
-
-    def _on(self, trial: Trial, piece: Polynomial, k: int) -> tuple[Number, Number, State] | None:
-        """Return (theta, time, state) of the last up-crossing on ``piece``; None if r was beyond all along."""
-
-        def value(theta: Number) -> Number:
-            return self.kernel.surfaces(trial.t + theta * trial.h, *at(trial.x, piece, theta))[k]
-
-        theta = last_up_crossing(value, self._smallest(trial, k), self.arithmetic)
-        if theta is None:
-            if self._may_be_beyond(k) and value(self.arithmetic.zero) > self.roundoff_bound(k, trial.t, trial.x):
-                return None
-            theta = self.arithmetic.zero  # on the surface to round-off: it is crossed as the step begins
-        if theta == 0:
-            return theta, trial.t, trial.x
-        return theta, trial.t + theta * trial.h, at(trial.x, piece, theta)
-
-
-def last_up_crossing(value: Callable[[Number], Number], small: Number, arithmetic: Arithmetic) -> Number | None:
-    """Find the last s in [0, 1] where ``value`` rises through zero, knowing value(1) > 0; None if it never does.
-
-    The interval is scanned backwards in `SCAN` pieces, then the bracket is closed by the Illinois variant of regula
-    falsi until |value| <= ``small`` or the bracket is a few units wide.
-    """
-    one = arithmetic.zero + 1
-    b, fb = one, value(one)
-    for i in range(SCAN - 1, -1, -1):
-        a = one * i / SCAN
-        fa = value(a)
-        if fa <= 0:
-            return close_bracket(value, (a, fa), (b, fb), small, arithmetic.unit)
-        b, fb = a, fa
-    return None
-
 
 def close_bracket(
     value: Callable[[Number], Number],
@@ -477,3 +273,431 @@ def close_bracket(
             weight_a = weight_a / 2 if side > 0 else weight_a
             b, fb, weight_b, side = s, f, f, 1
     return a
+
+
+Coefficients = Sequence[Number]  # of 1, s, s**2, ...
+MOST_REFINEMENTS = 300
+ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
+
+
+@cache
+def _binomials(degree: int) -> tuple[int, ...]:
+    return tuple(comb(degree, k) for k in range(degree + 1))
+
+
+def total(terms: Iterable[Number], zero: Number) -> Number:
+    """Sum from left to right (Python's own ``sum`` compensates round-off from 3.12 on, and C does not)."""
+    for term in terms:
+        zero = zero + term
+    return zero
+
+
+def bernstein(c: Coefficients) -> list[Number]:
+    """Return the Bernstein coefficients on [0, 1] of c_0 + c_1 s + ...: b_i = sum_k C(i, k) c_k / C(n, k).
+
+    The sums are made as in Pascal's triangle, without products.
+    """
+    b = [a / n for a, n in zip(c, _binomials(len(c) - 1), strict=True)]
+    for k in range(1, len(b)):
+        for i in range(len(b) - 1, k - 1, -1):
+            b[i] = b[i] + b[i - 1]
+    return b
+
+
+def stays_below(c: Coefficients, level: Number) -> bool:
+    """Whether bounds prove that the polynomial is nowhere above ``level`` on [0, 1]; False proves nothing."""
+    return total((a for a in c[1:] if a > 0), c[0]) <= level or max(bernstein(c)) <= level
+
+
+def split(b: list[Number], s: Number) -> tuple[list[Number], list[Number]]:
+    """Cut an interval at the share s: Bernstein coefficients on both parts (de Casteljau)."""
+    left, right = [b[0]], [b[-1]]
+    row: list[Number] = b
+    rest = 1 - s
+    while len(row) > 1:
+        row = [rest * a + s * c for a, c in pairwise(row)]
+        left.append(row[0])
+        right.append(row[-1])
+    right.reverse()
+    return left, right
+
+
+def value(c: Coefficients, s: Number) -> Number:
+    """Evaluate c_0 + c_1 s + ... (Horner)."""
+    total = c[-1]
+    for k in range(len(c) - 2, -1, -1):
+        total = c[k] + s * total
+    return total
+
+
+def value_and_slope(c: Coefficients, s: Number) -> tuple[Number, Number]:
+    """Evaluate a polynomial and its derivative (Horner)."""
+    total = c[-1]
+    slope = total * 0
+    for k in range(len(c) - 2, -1, -1):
+        slope = total + s * slope
+        total = c[k] + s * total
+    return total, slope
+
+
+def changes(b: list[Number]) -> int:
+    """Count the changes of sign of a list of numbers, zeros left out."""
+    signs = [x > 0 for x in b if x != 0]
+    return sum(one != two for one, two in pairwise(signs))
+
+
+def rises(c: Coefficients, level: Number, start: Number, tiny: Number) -> Number | None:
+    """Find a point from ``start`` on where the polynomial is above ``level``, not having come back down before it.
+
+    None where it is nowhere above, up to intervals shorter than ``tiny``.
+    """
+    b = [x - level for x in bernstein(c)]
+    pieces = [((split(b, start)[1] if start > 0 else b), start, start * 0 + 1)]
+    while pieces:
+        b, low, high = pieces.pop()
+        if max(b) <= 0:
+            continue
+        if b[0] > 0:
+            return low
+        if b[-1] > 0 and (changes(b) == 1 or high - low <= tiny):
+            return high
+        if high - low > tiny:
+            left, right = split(b, (low * 0 + 1) / 2)
+            middle = (low + high) / 2
+            pieces += [(right, middle, high), (left, low, middle)]
+    return None
+
+
+def last_root(c: Coefficients, start: Number, end: Number, tiny: Number, b: list[Number]) -> Number | None:
+    """Find the last point in [start, end] where the polynomial rises through 0, knowing that it is positive at ``end``.
+
+    None where it is positive all the way; ``b`` are the Bernstein coefficients of ``c`` on [0, 1].
+    """
+    one = end * 0 + 1
+    if end < 1:
+        b = split(b, end)[0]
+    if start > 0:
+        b = split(b, start / end)[1]
+    pieces = [(b, start, end)]
+    while pieces:
+        b, low, high = pieces.pop()
+        if min(b) > 0:
+            continue
+        if b[0] <= 0 < b[-1] and changes(b) <= 1:
+            return _refined(c, low, high, tiny)
+        if high - low <= tiny:
+            if b[0] > 0:  # what it rose through lies before
+                continue
+            return low
+        left, right = split(b, one / 2)
+        middle = (low + high) / 2
+        pieces += [(left, low, middle), (right, middle, high)]
+    return None
+
+
+def _towards(c: Coefficients, end: Number, other: Number, sign: int, tiny: Number) -> tuple[Number, Number]:
+    """Halve the way to an end of a bracket until the polynomial has the sign: a smaller bracket, or ``end`` twice.
+
+    An end that is a root up to round-off may be where the polynomial comes back, not where it rises.
+    """
+    while True:
+        middle = (end + other) / 2
+        if middle in (end, other) or abs(end - other) <= tiny * tiny:
+            return end, end
+        if sign * value(c, middle) > 0:
+            return middle, other
+        other = middle
+
+
+def _refined(c: Coefficients, a: Number, b: Number, tiny: Number) -> Number:
+    """Solve for the root in a bracket P(a) <= 0 < P(b) (Newton's method, a bisection where it leaves the bracket)."""
+    fa, fb = value(c, a), value(c, b)
+    noise = ROUNDING * tiny * total(map(abs, c), fa * 0)
+    if not fa < -noise:
+        a, b = _towards(c, a, b, -1, tiny)
+    if not fb > noise:
+        b, a = _towards(c, b, a, 1, tiny)
+    fa, fb = value(c, a), value(c, b)
+    if a == b or not fa < 0:
+        return a
+    s = a - fa * (b - a) / (fb - fa)
+    for _ in range(MOST_REFINEMENTS):
+        if not a < s < b:
+            s = (a + b) / 2
+            if not a < s < b:
+                return a
+        f, slope = value_and_slope(c, s)
+        if f < 0:
+            a = s
+        else:
+            b = s
+        after = s - f / slope if slope > 0 else a
+        if slope > 0 and a <= after <= b and (after - s) * (after - s) <= tiny * after * after:
+            return after
+        s = after
+    return a
+
+
+RESIDUAL_SHARE, LEAST_SHARE = 1e-2, 1e-13  # of the tolerance, and at least: what a surface may be off its polynomial
+UNKNOWN_TOLERANCE = 1e-10  # in its place where steps are fixed
+LEAST_DEGREE = 4  # along a step: also not below that of its dense output
+SERIES_DEGREE = 6  # along a step of Taylor's method, where a surface has no series
+# Where between nodes an interpolation is tested: parts of no simple ratio to them, since what oscillates in step with
+# the nodes, as the guard of a clock may, would else pass for a constant.
+BETWEEN = Fraction(3_819_661, 10**7), Fraction(6_180_339, 10**7), Fraction(4_142_137, 10**7)
+
+
+def along_steps(settings: Settings) -> tuple[int, Number]:
+    """Of which degree surfaces are interpolated along a step, and how far they may be off, relative to their size."""
+    tolerance, method = settings.tolerance, settings.method
+    share = max(LEAST_SHARE, RESIDUAL_SHARE * (UNKNOWN_TOLERANCE if tolerance is None else tolerance))
+    if method is None or method.is_series:
+        return SERIES_DEGREE, share
+    return max(LEAST_DEGREE, method.degree), share
+
+
+@dataclass(frozen=True)
+class Interpolation:
+    """How a function is interpolated on [0, 1].
+
+    Its values at ``nodes``, equidistant, times ``matrix`` are coefficients of powers; they are held against it at
+    ``tests``. ``rounding`` is what round-off in them can amount to, relative to its largest value.
+    """
+
+    nodes: tuple[Number, ...]
+    tests: tuple[Number, ...]
+    matrix: tuple[tuple[Number, ...], ...]
+    rounding: Number
+
+
+@cache
+def interpolation(degree: int, arithmetic: Arithmetic) -> Interpolation:
+    """Make the interpolation of a degree."""
+    nodes = tuple(arithmetic.constant(Fraction(i, degree)) for i in range(degree + 1))
+    parts = 0, degree // 2, degree - 1
+    tests = tuple(arithmetic.constant((i + part) / degree) for i, part in zip(parts, BETWEEN, strict=True))
+    matrix = _to_powers(degree, arithmetic)
+    rounding = arithmetic.unit * total((abs(m) for line in matrix for m in line), arithmetic.zero)
+    return Interpolation(nodes, tests, matrix, rounding)
+
+
+def _to_powers(degree: int, arithmetic: Arithmetic) -> tuple[tuple[Number, ...], ...]:
+    """The matrix from values at i/degree to coefficients of powers, solved in fractions."""
+    columns: list[list[Fraction]] = []
+    for i in range(degree + 1):
+        c = [Fraction(1)]
+        for j in range(degree + 1):
+            if j != i:
+                scale = Fraction(i - j, degree)
+                shifted, kept = [Fraction(0), *c], [*c, Fraction(0)]
+                c = [(a - Fraction(j, degree) * b) / scale for a, b in zip(shifted, kept, strict=True)]
+        columns.append(c)
+    return tuple(tuple(arithmetic.constant(c[k]) for c in columns) for k in range(degree + 1))
+
+
+MOST_SPLITS = 30  # of a step, before a piece that does not settle is taken as a straight line
+MOST_FIRST = 3  # of a step's first piece, before the step is made shorter
+MOST_PIECES = 1000  # before what is left is taken as it is, or it is refused
+IN_A_STEP = 64  # pieces of a surface, at most
+SHORTEST = 2**16  # in a run: steps that are still made shorter where surfaces vary too fast along them
+LOST_IN_A_STEP, LOST_SHORTEST = 16, 2**9  # the same in a mode whose surfaces even such steps cannot follow
+Function = Callable[[Number], Number]
+
+
+class TooFast(ValueError):
+    """Functions vary too fast for one step."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A surface on the part [start, start + width] of a step, by powers of the share of that part.
+
+    ``certain`` is False where the surface would not settle on a polynomial (a kink or jump inside a tiny part). ``off``
+    is how far an interpolation may be off: rises that are lower tell nothing.
+    """
+
+    start: Number
+    width: Number
+    coefficients: Coefficients
+    certain: bool = True
+    off: Number = 0
+
+
+@dataclass(frozen=True)
+class Rise:
+    """Where a surface rises above its level: the root before it, its slope there, by the share of the step."""
+
+    share: Number
+    slope: Number
+    certain: bool
+
+
+def deflated(pieces: list[Piece]) -> list[Piece]:
+    """Take the first piece to begin at zero: the state is on the surface, to round-off."""
+    first = pieces[0]
+    zero = first.coefficients[0] * 0
+    return [replace(first, coefficients=[zero, *first.coefficients[1:]]), *pieces[1:]]
+
+
+def rises_along(pieces: Sequence[Piece], level: Number, beyond: bool, risen: bool, unit: Number) -> Iterator[Rise]:
+    """Give the points, in order, where the surface rises through zero and goes on above its level.
+
+    A surface that begins ``beyond`` round-off is transparent, and counts from where it has come back to zero. Any other
+    that rises without a root crosses where it begins. ``risen`` says that it is beyond round-off at the end of the
+    step: then it has crossed by then, so that the next step may begin beyond it.
+    """
+    outside = beyond
+    for piece in pieces:
+        c, at = piece.coefficients, piece.start * 0
+        zero, above = at, max(level, ROUNDING * unit * total(map(abs, c), at), piece.off)
+        while True:
+            if outside:
+                below = rises([-a for a in c], zero, at, unit)
+                if below is None:
+                    break
+                at, outside = below, False
+            high = rises(c, above, at, unit)
+            if high is None and piece is pieces[-1] and risen and at < 1:
+                high = at * 0 + 1
+            if high is None:
+                break
+            root = _root(c, at, high, unit)
+            yield Rise(piece.start + root * piece.width, slope_of(c, root) / piece.width, piece.certain)
+            at, outside = high, True
+
+
+def _root(c: Coefficients, start: Number, end: Number, unit: Number) -> Number:
+    """The last root before ``end``; a series that begins with zero has it taken out, so that tiny roots stay exact."""
+    if start == 0 and c[0] == 0 and len(c) > 1:
+        degree = len(c) - 1
+        of_rest = [b * degree / k for k, b in enumerate(bernstein(c)) if k]
+        return last_root(c[1:], start, end, unit, of_rest) or start
+    root = last_root(c, start, end, unit, bernstein(c))
+    return start if root is None else root
+
+
+def slope_of(c: Coefficients, s: Number) -> Number:
+    """Evaluate the derivative of a polynomial."""
+    slope = s * 0
+    for k in range(len(c) - 1, 0, -1):
+        slope = k * c[k] + s * slope
+    return slope
+
+
+Curves = list[list[Piece]]  # of each surface
+
+
+def affine_curve(start: Number, slopes: State, h: Number, piece: Polynomial, share: Number) -> list[Piece]:
+    """A surface that is affine, with these slopes by time and the states, along a piece over ``h``.
+
+    It is a polynomial of the piece's degree. Rises below a share of its size tell nothing.
+    """
+    zero = start * 0
+    c = [start]
+    for m, powers in enumerate(piece):
+        first = zero if m else slopes[0] * h
+        c.append(total((slope * power for slope, power in zip(slopes[1:], powers, strict=True)), first))
+    off = share * total(map(abs, c[1:]), abs(start))
+    return [Piece(zero, zero + 1, without_zeros(c), True, off)]
+
+
+def without_zeros(c: Coefficients) -> Coefficients:
+    """Leave out last coefficients that are zero, but for two: along a polynomial solution the degree is low."""
+    length = len(c)
+    while length > 2 and c[length - 1] == 0:
+        length -= 1
+    return c[:length]
+
+
+def interpolated(
+    functions: Callable[[Number], Sequence[Number]],
+    count: int,
+    degree: int,
+    allowed: Callable[[int], Number],
+    share: Number,
+    arithmetic: Arithmetic,
+    far: bool = True,
+    most: int = MOST_PIECES,
+    may_refuse: bool = False,
+) -> list[list[Piece]]:
+    """Interpolate ``count`` functions of s in [0, 1] by pieces of ``degree``, with residuals below ``share`` of
+    their largest value, or ``allowed(k)`` more. Without ``far`` pieces end where the first function is positive.
+
+    Raises TooFast: it ``may_refuse``, and the first piece would be too short, or there are too many.
+    """
+    by, zero = interpolation(degree, arithmetic), arithmetic.zero
+    nodes, tests, matrix, share = by.nodes, by.tests, by.matrix, share + by.rounding
+    parts: list[tuple[Number, Number, int]] = [(zero, zero + 1, 0)]
+    found: list[list[Piece]] = [[] for _ in range(count)]
+    while parts and count:
+        start, width, halvings = parts.pop()
+        rows = list(zip(*(functions(start + width * s) for s in nodes), strict=True))
+        checks = list(zip(*(functions(start + width * s) for s in tests), strict=True))
+        pieces = [[total((m * r for m, r in zip(line, row, strict=True)), zero) for line in matrix] for row in rows]
+        off = [share * max(abs(r) for r in row) for row in rows]
+        settled = [
+            settles(residual(c, tests, check), enough, allowed, k)
+            for k, (c, check, enough) in enumerate(zip(pieces, checks, off, strict=True))
+        ]
+        if may_refuse and not all(settled) and (len(found[0]) >= most or (start == 0 and halvings == MOST_FIRST)):
+            raise TooFast("too fast for one step")
+        if not all(settled) and halvings < MOST_SPLITS and len(found[0]) < most:
+            half = width / 2
+            parts += [(start + half, half, halvings + 1), (start, half, halvings + 1)]
+            continue
+        for k, row in enumerate(rows):
+            c = pieces[k] if settled[k] else [row[0], row[-1] - row[0]]
+            found[k].append(Piece(start, width, c, settled[k], off[k] if settled[k] else 0))
+        if not far and rows[0][-1] > 0:
+            break
+    return found
+
+
+def settles(off: Number, enough: Number, allowed: Callable[[int], Number], k: int) -> bool:
+    """Whether a residual of function k is small enough; ``allowed`` is evaluated only beyond ``enough``."""
+    return off <= enough or off <= allowed(k) + enough
+
+
+def residual(c: Coefficients, tests: Sequence[Number], values: Sequence[Number]) -> Number:
+    """How far a polynomial is off the values it should have at some points."""
+    return max(abs(value(c, s) - w) for s, w in zip(tests, values, strict=True))
+
+
+def curves_along(run: Run, here: ModeState, t: Number, h: Number, x: State, z: State, piece: Polynomial) -> Curves:
+    """Give the pieces of each surface along ``piece``, a step's interpolant from (t, x) to (t + h, z).
+
+    Raises TooFast: a surface varies too fast for one step.
+    Raises ValueError: one has no value.
+    """
+    degree, share = along_steps(run.settings)
+    if here.mode.affine:
+        return _affine_curves(here, t, h, x, piece, share + interpolation(degree, run.arithmetic).rounding)
+    surfaces, count = here.kernel.surfaces, len(here.mode.edges) + len(here.mode.walls)
+
+    def values(s: Number) -> State:
+        return surfaces(t + s * h, *at(x, piece, s))
+
+    def allowed(k: int) -> Number:
+        return max(here.surfaces.roundoff_bound(k, t, x), here.surfaces.roundoff_bound(k, t + h, z))
+
+    lost = here.mode.name in run.control.lost
+    most, shortest = (LOST_IN_A_STEP, LOST_SHORTEST) if lost else (IN_A_STEP, SHORTEST)
+    refuse = h * shortest > run.settings.until
+    curves = interpolated(values, count, degree, allowed, share, run.arithmetic, most=most, may_refuse=refuse)
+    if not refuse and curves and len(curves[0]) >= most:
+        _lose(run, here, t, curves)
+    return curves
+
+
+def _lose(run: Run, here: ModeState, t: Number, curves: Curves) -> None:
+    """Give up following a mode's surfaces: visits beyond them may be missed from here on."""
+    run.control.lost.add(here.mode.name)
+    for k, pieces in enumerate(curves):
+        if not all(piece.certain for piece in pieces):
+            run.diagnostics.unsettled(here.mode.name, k, t)
+
+
+def _affine_curves(here: ModeState, t: Number, h: Number, x: State, piece: Polynomial, share: Number) -> Curves:
+    slopes = [gradient(t, *x) for gradient in here.kernel.gradients]
+    starts = here.kernel.surfaces(t, *x)
+    return [affine_curve(start, row, h, piece, share) for start, row in zip(starts, slopes, strict=True)]

@@ -24,7 +24,7 @@ HS_INLINE hs_real ratio_to(const hs_run *run, hs_real h, const hs_real *scales) 
   return worst;
 }
 
-/* The same with a look at what the flow is computed from; see hsdsl/engine/simulate/scales.py. */
+/* The same with a look at what the flow is computed from; see hsdsl/engine/simulate/control.py. */
 static hs_real ratio_closer(hs_run *run, hs_real h, hs_real ratio) {
   hs_control *const control = &run->control;
   const int again = run->here.t == control->failed_at;

@@ -54,7 +54,7 @@ static void note_transitions(hs_ensemble *e) {
   e->made += chunk->transitions;
 }
 
-/* Whether two times are one as people are shown them: see `in_contact` in hsdsl/engine/simulate/diagnostics.py. */
+/* Whether two times are one as people are shown them: see `in_contact` in hsdsl/engine/simulate/stops.py. */
 static int shown_alike(hs_time a, hs_time b) {
   char one[32], other[32];
   snprintf(one, sizeof one, "%.10g", (double)a);

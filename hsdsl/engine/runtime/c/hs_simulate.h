@@ -114,7 +114,7 @@ typedef enum {
 
 #define HS_SLID (1 << 16) /* beside the bits of notices: the run slid between two modes */
 
-/* A diagnostic: see hsdsl/engine/simulate/diagnostics.py. `surface` is an edge, but for HS_UNSETTLED. */
+/* A diagnostic: see hsdsl/engine/simulate/stops.py. `surface` is an edge, but for HS_UNSETTLED. */
 typedef struct {
   int32_t kind;
   int32_t mode;

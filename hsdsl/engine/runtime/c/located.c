@@ -315,7 +315,7 @@ static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
 }
 
 /* Whether surface k rises from the start of the step, and is followed by one polynomial. */
-HS_INLINE int may_be_touched(const hs_run *run, int k) {
+HS_INLINE int may_be_reached(const hs_run *run, int k) {
   return coefficients_of(&run->curves, 0, k)[1] > 0 && run->curves.parts == 1 && run->control.tolerance > 0;
 }
 
@@ -333,12 +333,12 @@ static hs_real turning(const hs_real *c, int n) {
 }
 
 /* Find where in the step surface k is reached so and its condition holds: 1, 0 or RAISED. */
-static int touched(hs_run *run, int k, hs_crossing *crossing) {
+static int reaches(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   const hs_real *const c = coefficients_of(&run->curves, 0, k);
   const int n = *degree_of(&run->curves, 0, k);
   hs_real rate, share = 1.0;
-  if (!may_be_touched(run, k)) return 0;
+  if (!may_be_reached(run, k)) return 0;
   const hs_real slope = slope_at_end(c, n);
   if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
   if (run->here.table->rates[k](run->here.p, span->t1, run->z, &rate)) return RAISED;
@@ -419,7 +419,7 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
 static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   hs_real first, last;
-  if (is_passed_by(run, k)) return touched(run, k, crossing);
+  if (is_passed_by(run, k)) return reaches(run, k, crossing);
   if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t1, run->z, 0, &last))
     return RAISED;
   const int beyond = coefficients_of(&run->curves, 0, k)[0] > first;
@@ -435,7 +435,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
     crossing->depth = 0.0;
     return 1;
   }
-  return touched(run, k, crossing);
+  return reaches(run, k, crossing);
 }
 
 /* Whether a crossing's state is on a surface that the state was on that it came from, or one holds it: 1, 0 or RAISED. */

@@ -205,7 +205,7 @@ static const hs_real *error_scales(const hs_run *run) {
   return run->method->kind == HS_RADAU ? run->radau.scales : run->scales;
 }
 
-/* The same with a look at what the flow is computed from; 0 where it has no value. See hsdsl/engine/simulate/scales.py. */
+/* The same with a look at what the flow is computed from; 0 where it has no value. See hsdsl/engine/simulate/control.py. */
 static const hs_real *closer_scales(hs_run *run, hs_real h) {
   if (run->method->kind == HS_RADAU) return radau_scales(run, run->here.t, h, 1), run->radau.scales;
   return resolved(run, run->here.t, h, run->x, 0) ? 0 : run->resolved;

@@ -45,7 +45,7 @@ from dataclasses import replace
 import numpy as np
 
 from hsdsl.engine.execution import INCOMPLETE, LEFT, Stop, Verdict
-from hsdsl.engine.simulate.diagnostics import Diagnostics
+from hsdsl.engine.simulate.stops import Diagnostics
 from hsdsl.engine.simulate.verdict.accumulation import accumulations, slidings
 from hsdsl.engine.simulate.verdict.commutation import together
 from hsdsl.engine.simulate.verdict.crossings import summary

@@ -10,8 +10,7 @@ from collections.abc import Iterator
 from itertools import accumulate, pairwise
 
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.simulate.diagnostics import FREE
-from hsdsl.engine.simulate.stops import show
+from hsdsl.engine.simulate.stops import FREE, show
 from hsdsl.engine.simulate.verdict.run_view import RunView
 
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
-from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
+from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.verdict.finding import Finding
 from hsdsl.engine.simulate.verdict.place import Place
 from hsdsl.engine.simulate.verdict.run_view import RunView

@@ -6,7 +6,7 @@ import numpy as np
 
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.stall_detection import SHORT
+from hsdsl.engine.simulate.stalls import SHORT
 from hsdsl.engine.simulate.stops import show
 
 MANY = 10_000  # steps

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Number
 from hsdsl.engine.execution import Arc
-from hsdsl.engine.simulate.remarks import Remark, of_edge
-from hsdsl.engine.simulate.stops import show
+from hsdsl.engine.simulate.stops import Remark, of_edge, show
 from hsdsl.engine.simulate.verdict.agreement import SAFE
 from hsdsl.engine.simulate.verdict.endings import at_its_end, at_the_end
 from hsdsl.engine.simulate.verdict.finding import Finding, times

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.simulate.remarks import wall_of
-from hsdsl.engine.simulate.stops import show
+from hsdsl.engine.simulate.stops import show, wall_of
 from hsdsl.engine.simulate.verdict.agreement import SAFE
 from hsdsl.engine.simulate.verdict.finding import Finding, times
 from hsdsl.engine.simulate.verdict.place import Place

@@ -10,7 +10,7 @@ from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
 from hsdsl.base.numbers.enclosures import Range, Undecided, as_range
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.kernel import ModeKernel
-from hsdsl.engine.simulate.remarks import wall_of
+from hsdsl.engine.simulate.stops import wall_of
 from hsdsl.engine.simulate.surfaces import Surfaces
 from hsdsl.mathematics.program import ModeProgram
 

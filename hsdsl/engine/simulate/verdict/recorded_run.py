@@ -15,8 +15,8 @@ from hsdsl.engine.execution import Arc, Execution, Stop, Transition
 from hsdsl.engine.integrators.stepper import Polynomial, State
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.surfaces import Surfaces, at
+from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.verdict.place import Place
 
 

@@ -12,8 +12,7 @@ from typing import Any
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS
 from hsdsl.engine.execution import Execution
-from hsdsl.engine.simulate.diagnostics import Diagnostics
-from hsdsl.engine.simulate.remarks import Remark, loop_remarks, may_be_passed, wall_of, warnings_of
+from hsdsl.engine.simulate.stops import Diagnostics, Remark, loop_remarks, may_be_passed, wall_of, warnings_of
 from hsdsl.engine.simulate.verdict.accumulation import sliding_spans
 from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.engine.simulate.verdict.run_view import RunView

@@ -11,7 +11,7 @@ import numpy as np
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Arc, Execution, Transition
 from hsdsl.engine.integrators.stepper import State
-from hsdsl.engine.simulate.remarks import Remark
+from hsdsl.engine.simulate.stops import Remark
 from hsdsl.engine.simulate.surfaces import Surfaces
 from hsdsl.engine.simulate.verdict.agreement import SAFE, Errors
 from hsdsl.engine.simulate.verdict.exact_states import exactly_known

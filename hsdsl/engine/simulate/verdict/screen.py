@@ -18,8 +18,7 @@ from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.kernel import runtime
 from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.remarks import wall_of
-from hsdsl.engine.simulate.stops import show
+from hsdsl.engine.simulate.stops import show, wall_of
 from hsdsl.engine.simulate.verdict.correction import INSIDE, POLE, correction
 from hsdsl.engine.simulate.verdict.finding import times
 from hsdsl.engine.simulate.verdict.formula_tables import FormulaTables

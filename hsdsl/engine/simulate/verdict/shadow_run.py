@@ -17,7 +17,7 @@ from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.integrators.taylor import terms
 from hsdsl.engine.simulate.moving import flow_roundoff, moved_reset, surface_roundoff
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.queues import Tails
+from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.verdict.correction import Array, corrected
 
 MOST_CHANGES = 8  # of Newton's method

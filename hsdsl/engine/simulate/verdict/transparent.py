@@ -10,8 +10,7 @@ import numpy as np
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.base.numbers.enclosures import Range
 from hsdsl.engine.execution import Arc
-from hsdsl.engine.simulate.remarks import may_be_passed
-from hsdsl.engine.simulate.stops import show
+from hsdsl.engine.simulate.stops import may_be_passed, show
 from hsdsl.engine.simulate.verdict.agreement import SAFE
 from hsdsl.engine.simulate.verdict.finding import Finding, times
 from hsdsl.engine.simulate.verdict.near_surface import may_hold, passed_over, rising_zero

@@ -1,7 +1,7 @@
 # pyright: basic
 """Executions that wait: the values where one begins to, and the edges that make them.
 
-States have the first that waits; where several can, `hsdsl.engine.simulate.queues` keeps the others.
+States have the first that waits; where several can, `hsdsl.engine.simulate.transitions` keeps the others.
 """
 
 from __future__ import annotations

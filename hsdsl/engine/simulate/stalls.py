@@ -1,4 +1,9 @@
-"""Where and why a run cannot go on: which expression has no finite value, or what no step leads past."""
+"""When no shorter step helps: how that is noticed, and why it is so, in a sentence.
+
+A run that closes in on a surface ends there, one whose steps creep says so. Steps that go to and fro across a jump of
+the flow are counted, and the jump is looked for by halving the way between two states. A *standstill* is the place of a
+run that cannot go on: an expression has no finite value there, or no step leads past it.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +12,133 @@ from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
-from hsdsl.engine.integrators.stepper import State
+from hsdsl.engine.integrators.stepper import Flow, State
 from hsdsl.engine.integrators.tableau import ButcherTableau
 from hsdsl.engine.integrators.taylor import NoSeries, terms
-from hsdsl.engine.simulate.chatter import Flow, jump_between
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stall_detection import MOST_SHORT
 from hsdsl.engine.simulate.stops import LEFT, left_domain, show
 from hsdsl.engine.simulate.surfaces import StepFailure
 from hsdsl.mathematics.program import HELD, ModeProgram
+
+IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
+MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
+CREEPING = 10  # halvings; steps below a thousandth of the full one
+MOST_CREEPING = 2000  # in a row: the run would take a thousand times its length in steps
+SHORT = 1e-6  # of a run
+MOST_SHORT = 100_000  # steps within that, in one flight: so the run would take a hundred billion
+
+
+@dataclass
+class StallCount:
+    """Counts accepted steps in a row that had to be cut short; ``unit`` is the unit round-off."""
+
+    unit: Number
+    reached: Number | None = None  # by the last step counted: another start means that full steps came between
+    idle: int = 0
+    creeping: int = 0
+
+    def ends(
+        self,
+        here: ModeState,
+        halvings: int,
+        full: Number,
+        failure: StepFailure,
+        t: Number,
+        x: State,
+        t1: Number,
+        z: State,
+    ) -> StepFailure | None:
+        """Count a step from (t, x) to (t1, z) that was halved because of ``failure``; say what ends the run, if so."""
+        if t != self.reached:
+            self.idle = self.creeping = 0
+        self.reached = t1
+        small = t1 - t <= IDLE_UNITS * self.unit * max(t, full)
+        still = _still(here, failure, t, x, t1, z)
+        self.idle = self.idle + 1 if small or still else 0
+        self.creeping = self.creeping + 1 if halvings >= CREEPING else 0
+        if self.idle > MOST_IDLE or (small and z == x):
+            return failure
+        return StepFailure("creeping", failure.surface) if self.creeping > MOST_CREEPING else None
+
+
+@dataclass
+class Pace:
+    """Counts the steps of a flight within a millionth of the run: ``short``, 0 for fixed steps, from ``since`` on."""
+
+    short: Number
+    since: Number
+    made: int = 0
+
+    def is_slow(self, t: Number) -> bool:
+        """Count a step from t; whether there were too many."""
+        self.made += 1
+        if t - self.since > self.short:
+            self.since, self.made = t, 0
+        return self.made > MOST_SHORT
+
+
+def pace(run: Run, t: Number) -> Pace:
+    """Begin to count at the start of a flight."""
+    return Pace(run.settings.until * (0 if run.control.tolerance is None else SHORT), t)
+
+
+def _still(here: ModeState, failure: StepFailure, t: Number, x: State, t1: Number, z: State) -> bool:
+    """Whether the surface in the way did not come nearer: its round-off is larger than what the step adds."""
+    k = failure.surface
+    if k is None:
+        return False
+    return here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]
+
+
+MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
+JUMP_HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
+
+
+@dataclass
+class Chatter:
+    """Counts steps at whose end a component of the flow has the other sign than at their start."""
+
+    count: int = 0
+
+    def across(self, flow: Flow, t: Number, x: State, slope: State, t1: Number, z: State, end: State) -> bool:
+        """Count a step; say whether it is one of very many across a jump. Smooth flows that turn around are none."""
+        turns = any(a * b < 0 for a, b in zip(slope, end, strict=True))
+        self.count = self.count + 2 if turns else max(0, self.count - 1)
+        if self.count < MOST_CHATTER:
+            return False
+        self.count = 0
+        return any(a * b < 0 and jumps(flow, k, t, x, t1, z) for k, (a, b) in enumerate(zip(slope, end, strict=True)))
+
+
+def jumps(flow: Flow, k: int, t: Number, x: State, t1: Number, z: State) -> bool:
+    """Whether component k of the flow jumps on the way from (t, x) to (t1, z)."""
+    return jump_between(flow, k, t, x, t1, z) is not None
+
+
+def jump_between(flow: Flow, k: int, t: Number, x: State, t1: Number, z: State) -> tuple[State, Number, Number] | None:
+    """Return the state at which component k of the flow jumps, and its values before and behind that; None if not."""
+
+    def at(s: Number) -> tuple[State, Number]:
+        point = tuple(a + s * (b - a) for a, b in zip(x, z, strict=True))
+        return point, flow(t + s * (t1 - t), *point)[k]
+
+    try:
+        low, high = t * 0, t * 0 + 1
+        (_, before), (point, behind) = at(low), at(high)
+        size = abs(behind - before)
+        for _ in range(JUMP_HALVINGS):
+            middle = (low + high) / 2
+            q, value = at(middle)
+            if abs(value - before) >= abs(behind - value):
+                high, behind, point = middle, value, q
+            else:
+                low, before = middle, value
+    except DOMAIN_ERRORS:
+        return None
+    return (point, before, behind) if size > 0 and 2 * abs(behind - before) >= size else None
+
 
 SHORTEST = 40  # halvings of a step, at which expressions without a value are looked for
 NEAR = 8  # doublings and halvings of a step: how far a jump of the flow is looked for
@@ -192,9 +313,3 @@ class Standstill:
 
     def _state(self, x: State) -> str:
         return ", ".join(f"{name} = {show(value)}" for name, value in zip(self.mode.states, x, strict=True))
-
-
-def standstill(run: Run, here: ModeState) -> Standstill:
-    """The present place of the Python loop, in its own mode where guards hold the state."""
-    segment = here.segment if here.flow == here.index else run.timeline.at(here.t)
-    return Standstill(run, here.index, segment, here.t, here.x, here.arc.scales, run.control.h)

@@ -1,0 +1,229 @@
+"""One transition: which crossing goes, its reset, the executions that wait, the mode that is entered, and cascades.
+
+A mode is entered at the start, after a reset, at a jump of an input. A state that enters beyond a surface without an
+`if` is outside the domain: that transition fires at once, without a strip, and so may the next; the walls are looked at
+when no such transition is left. A *cascade* is transitions that follow each other without any flow between them: where
+it returns to a state, it would go on without end.
+
+Executions of events that wait behind the first of their event are no states, so that any number can wait. A mode's
+states have of each queue how many wait and the first that is made; a *tail* of a queue has the others, in the order in
+which they are made. What a reset does to these states says what happens to the tail: one more waits, which goes where
+its time says, the first was made, or all were dropped.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from hsdsl.base.names import nth_memory
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, TIE, Number
+from hsdsl.engine.execution import Stop
+from hsdsl.engine.integrators.stepper import State
+from hsdsl.engine.simulate.moving import moved_reset
+from hsdsl.engine.simulate.stops import ENTERED, endless, entered_final, left_domain, reset_not_finite, too_many_wait
+from hsdsl.engine.simulate.surfaces import ANY, Arrival, Crossing
+from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Queue
+
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.run import ModeState, Run
+
+Waits = tuple[Number, ...]  # the time at which one is made, and its values
+
+
+class Tails:
+    """The tails of a run; ``full`` names the count of a queue in which more wait than may."""
+
+    def __init__(self, waits: Mapping[str, Iterable[Waits]] | None = None) -> None:
+        self._waits = {name: [*given] for name, given in (waits or {}).items()}
+        self.full: str | None = None
+
+    def copy(self) -> Tails:
+        """The same tails, to go on with otherwise."""
+        return Tails(self._waits)
+
+    def advance(self, before: ModeProgram, x: State, after: ModeProgram, z: State) -> State:
+        """Take part in a reset from x to z; return z with the first executions that wait then."""
+        if before.name != after.name:
+            self._waits.clear()
+            return z
+        for queue in after.queues if len(z) == len(after.states) else ():
+            had, has = x[queue.waiting], z[queue.waiting]
+            if has < 1:
+                self._waits.pop(queue.name, None)
+            elif has < had:
+                z = _with(queue, z, self._waits[queue.name].pop(0))
+            elif 1 <= had < has:
+                z = _with(queue, z, self._joined(queue, _of(queue, x), _of(queue, z)))
+                if has > queue.most:
+                    self.full = queue.name
+        return z
+
+    def _joined(self, queue: Queue, first: Waits, new: Waits) -> Waits:
+        """The first of those that wait, with one more; of tied times, made one, the one that has waited goes first."""
+        waits = self._waits.setdefault(queue.name, [])
+        if new[0] < _not_tied(first):
+            waits.insert(0, first)
+            return new
+        place = bisect_right(waits, new[0], key=_not_tied)
+        ahead = waits[place - 1] if place else first
+        waits.insert(place, (max(ahead[0], new[0]), *new[1:]))
+        return first
+
+    def states(self, modes: Iterable[ModeProgram]) -> dict[str, Number]:
+        """Tails as if they were states: with `run.final.state` a run can go on from there."""
+        queues = {queue.name: (queue, mode) for mode in modes for queue in mode.queues}
+        found: dict[str, Number] = {}
+        for name, waits in self._waits.items():
+            queue, mode = queues[name]
+            names = [mode.states[i] for i in queue.values]
+            for k, one in enumerate(waits, 2):
+                found |= {nth_memory(state, k): value for state, value in zip(names, one, strict=True)}
+        return found
+
+
+def _not_tied(one: Waits) -> Number:
+    """Before when others are made before one."""
+    return one[0] - TIE * abs(one[0])
+
+
+def _of(queue: Queue, x: State) -> Waits:
+    return tuple(x[i] for i in queue.values)
+
+
+def _with(queue: Queue, z: State, first: Waits) -> State:
+    whole = list(z)
+    for i, value in zip(queue.values, first, strict=True):
+        whole[i] = value
+    return tuple(whole)
+
+
+def choose(here: ModeState, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:
+    """Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
+
+    Tied are also guards that the earliest crossing's point is on. The chosen edge goes from that point. Returns the
+    crossing and the names of those tied with it.
+    """
+    edges, first = here.mode.edges, min(crossings, key=lambda c: c.time)
+    since = run.tie(first.time)
+    tied = {c.edge: c for c in crossings if c.time - first.time <= since}
+    tied |= dict.fromkeys(here.surfaces.standing(first.time, first.state, since, known=tied), first)
+    edge = min(tied, key=lambda k: (-edges[k].priority, k))
+    chosen = replace(first, edge=edge, depth=tied[edge].depth)
+    return chosen, tuple(edges[k].name for k in sorted(tied) if k != edge)
+
+
+def reset(here: ModeState, crossing: Crossing, scale: State, run: Run) -> tuple[State, State] | Stop:
+    """Apply a reset to the values before the jump; also the sizes of the numbers the new state came from."""
+    k, t, q = crossing.edge, crossing.time, crossing.state
+    edge, isfinite = here.mode.edges[k], run.arithmetic.isfinite
+    try:
+        after = here.kernel.resets[k](t, *q)
+    except DOMAIN_ERRORS:
+        after = (run.arithmetic.functions["nan"],)
+    if not all(map(isfinite, after)):
+        return reset_not_finite(edge, t)
+    if run.settings.moves:
+        after = moved_reset(run.kernel, here.index, k, here.segment.data, t, q) or after
+    try:
+        spread = here.kernel.spreads[k](t, *q, *scale)
+    except DOMAIN_ERRORS:
+        spread = ()
+    known = bool(spread) and all(map(isfinite, spread))
+    return after, tuple(spread if known else map(abs, after))  # where a reset is infinitely steep, no more is known
+
+
+def enter(
+    run: Run,
+    mode: int,
+    states: tuple[str, ...],
+    t: Number,
+    x: State,
+    scale: State,
+    before: ModeState | None = None,
+    arrival: Arrival = ANY,
+) -> ModeState | Stop:
+    """Enter a mode and make the transitions that fire at once; return the mode entered last, or why the run stops.
+
+    Of ``arrival`` the time ``since`` holds for all of them, the rest for the mode entered first.
+    """
+    visited: set[tuple[int, State]] = set()
+    while True:
+        here = run.place(mode, states, t, x, scale, before)
+        if run.tails.full is not None:
+            return too_many_wait(here.mode, run.tails.full, t)
+        if here.mode.final:
+            return entered_final(here.mode.name, t)
+        decides = mode, decisive(here.mode, x)
+        if decides in visited:
+            return endless(here.mode.name, t)
+        visited.add(decides)
+        try:
+            values = here.kernel.surfaces(t, *x)
+            finite = all(map(run.arithmetic.isfinite, values))
+            outside = here.surfaces.enter(t, x, values, arrival)
+        except DOMAIN_ERRORS:
+            return run.standstill(here).not_finite([(t, x)])
+        if not finite:
+            return run.standstill(here).not_finite([(t, x)])
+        edges = here.mode.edges
+        beyond = [k for k in outside if k < len(edges) and not edges[k].conditional]
+        if not beyond:
+            walls = [k for k in outside if k >= len(edges)]
+            return left_domain(here.mode, walls[0], t, ENTERED) if walls else here
+        if stop := run.limit_reached(t):
+            return stop
+        zero = run.arithmetic.zero
+        chosen, alternatives = choose_entry(edges, [Crossing(k, zero, t, x, zero) for k in beyond])
+        outcome = reset(here, chosen, scale, run)
+        if isinstance(outcome, Stop):
+            return outcome
+        edge, scale = edges[chosen.edge], outcome[1]
+        x = run.record(here, chosen, t, outcome[0], alternatives, entry=True)
+        before, mode, states = here, edge.target, edge.target_states
+        arrival = Arrival(arrival.since)
+
+
+def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tuple[Crossing, tuple[str, ...]]:
+    """Choose among surfaces that the state is beyond: the highest priority, then the file's order."""
+    chosen = min(beyond, key=lambda c: (-edges[c.edge].priority, c.edge))
+    return chosen, tuple(edges[c.edge].name for c in beyond if c is not chosen)
+
+
+PARALLEL = 1e-6  # of a component: flows that differ by less move no state on by more than this share of the way back
+
+
+@dataclass
+class Cascade:
+    """One of the states that such transitions led to, with which those after it are compared (Brent's algorithm)."""
+
+    reference: tuple[int, State] | None = None
+    length: int = 0
+    room: int = 1
+
+    def returns(self, flowed: bool, index: int, mode: ModeProgram, x: State) -> bool:
+        """Count a transition that led to a state; say whether one of the same cascade has led there before."""
+        here = index, decisive(mode, x)
+        if flowed or self.reference is None:
+            self.reference, self.length, self.room = here, 0, 1
+            return False
+        if here == self.reference:
+            return True
+        self.length += 1
+        if self.length == self.room:
+            self.reference, self.length, self.room = here, 0, 2 * self.room
+        return False
+
+
+def decisive(mode: ModeProgram, x: State) -> State:
+    """What of a state decides how a run goes on: a cascade that only counts comes back to it."""
+    return tuple(x[i] for i in mode.deciding) if mode.idle else x
+
+
+def takes_back(slope: State, back: State) -> bool:
+    """Whether one direction is opposite to another that is not zero, in each component."""
+    pairs = list(zip(back, slope, strict=True))
+    share: Number = next((b / f for b, f in pairs if f != 0), 0)
+    return share < 0 and all(abs(b - share * f) <= PARALLEL * abs(share) * abs(f) for b, f in pairs)
