@@ -52,8 +52,8 @@ def test_blocks_solve_the_whole_system(seed: int, is_sparse: bool) -> None:
     right[:, flowing:] = 0
     systems = (known.gamma * np.eye(n) - STEP * jacobian, (known.alpha - 1j * known.beta) * np.eye(n) - STEP * jacobian)
     solved = np.linalg.solve(systems[0], right[0]), np.linalg.solve(systems[1], right[1] + 1j * right[2])
-    found = real.solve(right[0].tolist())
-    both = turning.solve(right[1].tolist(), right[2].tolist())
+    found = real(right[0].tolist())
+    both = turning(right[1].tolist(), right[2].tolist())
     for mine, exact in ((np.array(found), solved[0]), (np.array(both[0]) + 1j * np.array(both[1]), solved[1])):
         assert np.allclose(mine, exact, rtol=1e-9, atol=1e-9 * abs(exact).max())
 
@@ -83,7 +83,7 @@ def test_what_nothing_moves_stays_zero() -> None:
     varied = variation(places, n, 5, COLUMNS, ())
     steps = Steps(Derivatives(lambda t, *x: jacobian.ravel().tolist(), [1.0] * n, varied=varied), 1e-6, FLOAT64)
     steps._derive(0.0, (0.0,) * n)
-    found = steps._factor(STEP)[0].solve([1.0 if i == 9 else 0.0 for i in range(n)])
+    found = steps._factor(STEP)[0]([1.0 if i == 9 else 0.0 for i in range(n)])
     assert found[9] != 0 and not any(found[5:9])
 
 

@@ -122,12 +122,12 @@ def test_sparse_factors_solve_what_dense_ones_do(seed):
         return values
 
     right, other = draw.normal(size=(2, n))
-    found = sparse_factored(of, entries(4.0)).solve(right.tolist())
+    found = sparse_factored(of, entries(4.0))(right.tolist())
     assert np.allclose((matrix + 4 * np.eye(n)) @ found, right)
     turned = [0.0] * of.size
     for at in of.diagonal:
         turned[at] = -3.0
-    a, b = sparse_factored_complex(of, entries(2.0), turned).solve(right.tolist(), other.tolist())
+    a, b = sparse_factored_complex(of, entries(2.0), turned)(right.tolist(), other.tolist())
     assert np.allclose((matrix + (2 - 3j) * np.eye(n)) @ (np.array(a) + 1j * np.array(b)), right + 1j * other)
 
 

@@ -251,9 +251,7 @@ def test_complex_linear_equations(size: int) -> None:
     if size > 1:
         real[0, 0] = imaginary[0, 0] = 0
     right = np.arange(1.0, size + 1) - 1j
-    found = np.array(
-        factored_complex(real.tolist(), imaginary.tolist()).solve(right.real.tolist(), right.imag.tolist())
-    )
+    found = np.array(factored_complex(real.tolist(), imaginary.tolist())(right.real.tolist(), right.imag.tolist()))
     assert np.allclose((real + 1j * imaginary) @ (found[0] + 1j * found[1]), right, rtol=0, atol=1e-11)
 
 
@@ -262,7 +260,7 @@ def test_linear_equations(size: int) -> None:
     matrix = np.random.default_rng(size).normal(size=(size, size))
     matrix[0, 0] = 0 if size > 1 else 1  # a pivot must be looked for
     right = np.arange(1.0, size + 1)
-    found = factored(matrix.tolist()).solve(right.tolist())
+    found = factored(matrix.tolist())(right.tolist())
     assert np.allclose(matrix @ found, right, rtol=0, atol=1e-11)
 
 

@@ -10,45 +10,22 @@ so that every number type has them, and every engine the same.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.base.sparsity import Elimination, Variation
 
 Matrix = list[list[Number]]
 Vector = list[Number]
+Solve = Callable[[Vector], Vector]  # for a right-hand side
+SolveComplex = Callable[[Vector, Vector], tuple[Vector, Vector]]  # the same, real and imaginary parts
 
 
 class Singular(ValueError):
     """A matrix has no inverse."""
 
 
-@dataclass(frozen=True)
-class Factors:
-    """Factors of a matrix with permuted rows: below the diagonal L (its diagonal is 1), above it U.
-
-    The diagonal has the inverse pivots.
-    """
-
-    rows: Matrix
-    order: list[int]
-
-    def solve(self, right: Vector) -> Vector:
-        """Solve for a right-hand side."""
-        found = [right[i] for i in self.order]
-        for i, row in enumerate(self.rows):
-            for j in range(i):
-                found[i] = found[i] - row[j] * found[j]
-        for i in range(len(found) - 1, -1, -1):
-            row = self.rows[i]
-            for j in range(i + 1, len(found)):
-                found[i] = found[i] - row[j] * found[j]
-            found[i] = found[i] * row[i]
-        return found
-
-
-def factored(matrix: Matrix, scales: Sequence[Number] | None = None, groups: Sequence[int] | None = None) -> Factors:
+def factored(matrix: Matrix, scales: Sequence[Number] | None = None, groups: Sequence[int] | None = None) -> Solve:
     """Factor a square matrix; its rows, as its columns, belong to unknowns of these scales, all alike where left out.
 
     Only rows of one of the ``groups`` exchange places; left out, all rows do.
@@ -70,7 +47,20 @@ def factored(matrix: Matrix, scales: Sequence[Number] | None = None, groups: Seq
                 row[k] = row[k] * upper[k]
                 for j in range(k + 1, len(row)):
                     row[j] = row[j] - row[k] * upper[j]
-    return Factors(rows, order)
+
+    def solve(right: Vector) -> Vector:
+        found = [right[i] for i in order]
+        for i, row in enumerate(rows):  # below the diagonal is L (its diagonal is 1), above it U
+            for j in range(i):
+                found[i] = found[i] - row[j] * found[j]
+        for i in range(len(found) - 1, -1, -1):
+            row = rows[i]
+            for j in range(i + 1, len(found)):
+                found[i] = found[i] - row[j] * found[j]
+            found[i] = found[i] * row[i]  # an inverse pivot
+        return found
+
+    return solve
 
 
 def _among(k: int, n: int, groups: Sequence[int] | None) -> Sequence[int]:
@@ -90,37 +80,9 @@ def _pivot(column: Vector, scales: Vector) -> int:
     return pivot
 
 
-@dataclass(frozen=True)
-class ComplexFactors:
-    """The same of a complex matrix, real and imaginary parts apart."""
-
-    real: Matrix
-    imaginary: Matrix
-    order: list[int]
-
-    def solve(self, real: Vector, imaginary: Vector) -> tuple[Vector, Vector]:
-        """Solve for a right-hand side; returns the real and the imaginary parts."""
-        a, b = [real[i] for i in self.order], [imaginary[i] for i in self.order]
-        n = len(a)
-        for i in range(n):
-            self._less(a, b, i, range(i))
-        for i in range(n - 1, -1, -1):
-            self._less(a, b, i, range(i + 1, n))
-            c, d = self.real[i][i], self.imaginary[i][i]
-            a[i], b[i] = c * a[i] - d * b[i], c * b[i] + d * a[i]
-        return a, b
-
-    def _less(self, a: Vector, b: Vector, i: int, others: range) -> None:
-        """Take the products of row i with what is known off its right-hand side."""
-        for j in others:
-            c, d = self.real[i][j], self.imaginary[i][j]
-            a[i] = a[i] - (c * a[j] - d * b[j])
-            b[i] = b[i] - (c * b[j] + d * a[j])
-
-
 def factored_complex(
     real: Matrix, imaginary: Matrix, scales: Sequence[Number] | None = None, groups: Sequence[int] | None = None
-) -> ComplexFactors:
+) -> SolveComplex:
     """Factor a square matrix of complex numbers; the size of a pivot is the sum of its parts' sizes.
 
     Raises Singular: a pivot is zero or not a number.
@@ -146,33 +108,27 @@ def factored_complex(
             for j in range(k + 1, n):
                 re[i][j] = re[i][j] - (p * re[k][j] - q * im[k][j])
                 im[i][j] = im[i][j] - (p * im[k][j] + q * re[k][j])
-    return ComplexFactors(re, im, order)
+
+    def solve(real: Vector, imaginary: Vector) -> tuple[Vector, Vector]:
+        a, b = [real[i] for i in order], [imaginary[i] for i in order]
+        for i in range(n):
+            less(a, b, i, range(i))
+        for i in range(n - 1, -1, -1):
+            less(a, b, i, range(i + 1, n))
+            c, d = re[i][i], im[i][i]
+            a[i], b[i] = c * a[i] - d * b[i], c * b[i] + d * a[i]
+        return a, b
+
+    def less(a: Vector, b: Vector, i: int, others: range) -> None:
+        for j in others:
+            c, d = re[i][j], im[i][j]
+            a[i] = a[i] - (c * a[j] - d * b[j])
+            b[i] = b[i] - (c * b[j] + d * a[j])
+
+    return solve
 
 
-@dataclass(frozen=True)
-class SparseFactors:
-    """Factors in a pattern: below the diagonal L (its diagonal is 1), above it U; the diagonal has inverse pivots."""
-
-    of: Elimination
-    values: Vector
-
-    def solve(self, right: Vector) -> Vector:
-        """Solve for a right-hand side."""
-        of, values = self.of, self.values
-        y = [right[i] for i in of.order]
-        for i in range(len(y)):
-            for at in range(of.start[i], of.diagonal[i]):
-                y[i] = y[i] - values[at] * y[of.column[at]]
-        found = list(y)
-        for i in range(len(y) - 1, -1, -1):
-            for at in range(of.diagonal[i] + 1, of.start[i + 1]):
-                y[i] = y[i] - values[at] * y[of.column[at]]
-            y[i] = y[i] * values[of.diagonal[i]]
-            found[of.order[i]] = y[i]
-        return found
-
-
-def sparse_factored(of: Elimination, entries: Vector) -> SparseFactors:
+def sparse_factored(of: Elimination, entries: Vector) -> Solve:
     """Factor a matrix, given by all entries of the pattern.
 
     Raises Singular: a pivot is zero or not a number.
@@ -192,38 +148,24 @@ def sparse_factored(of: Elimination, entries: Vector) -> SparseFactors:
         if not abs(row[i]) > 0:
             raise Singular("a matrix without a pivot on its diagonal")
         values[of.diagonal[i]] = 1 / row[i]
-    return SparseFactors(of, values)
+
+    def solve(right: Vector) -> Vector:
+        y = [right[i] for i in of.order]
+        for i in range(len(y)):
+            for at in range(of.start[i], of.diagonal[i]):
+                y[i] = y[i] - values[at] * y[of.column[at]]
+        found = list(y)
+        for i in range(len(y) - 1, -1, -1):
+            for at in range(of.diagonal[i] + 1, of.start[i + 1]):
+                y[i] = y[i] - values[at] * y[of.column[at]]
+            y[i] = y[i] * values[of.diagonal[i]]
+            found[of.order[i]] = y[i]
+        return found
+
+    return solve
 
 
-@dataclass(frozen=True)
-class ComplexSparseFactors:
-    """The same of a complex matrix, real and imaginary parts apart."""
-
-    of: Elimination
-    real: Vector
-    imaginary: Vector
-
-    def solve(self, real: Vector, imaginary: Vector) -> tuple[Vector, Vector]:
-        """Solve for a right-hand side; returns the real and the imaginary parts."""
-        of = self.of
-        a, b = [real[i] for i in of.order], [imaginary[i] for i in of.order]
-        for i in range(len(a)):
-            self._less(a, b, i, of.start[i], of.diagonal[i])
-        one, two = list(a), list(b)
-        for i in range(len(a) - 1, -1, -1):
-            self._less(a, b, i, of.diagonal[i] + 1, of.start[i + 1])
-            c, d = self.real[of.diagonal[i]], self.imaginary[of.diagonal[i]]
-            a[i], b[i] = c * a[i] - d * b[i], c * b[i] + d * a[i]
-            one[of.order[i]], two[of.order[i]] = a[i], b[i]
-        return one, two
-
-    def _less(self, a: Vector, b: Vector, i: int, first: int, end: int) -> None:
-        for at in range(first, end):
-            c, d, j = self.real[at], self.imaginary[at], self.of.column[at]
-            a[i], b[i] = a[i] - (c * a[j] - d * b[j]), b[i] - (c * b[j] + d * a[j])
-
-
-def sparse_factored_complex(of: Elimination, real: Vector, imaginary: Vector) -> ComplexSparseFactors:
+def sparse_factored_complex(of: Elimination, real: Vector, imaginary: Vector) -> SolveComplex:
     """Factor a complex matrix, likewise.
 
     Raises Singular: a pivot is zero or not a number.
@@ -248,76 +190,79 @@ def sparse_factored_complex(of: Elimination, real: Vector, imaginary: Vector) ->
         if not size > 0:
             raise Singular("a matrix without a pivot on its diagonal")
         re[of.diagonal[i]], im[of.diagonal[i]] = c[i] / size, -d[i] / size
-    return ComplexSparseFactors(of, re, im)
 
+    def solve(real: Vector, imaginary: Vector) -> tuple[Vector, Vector]:
+        a, b = [real[i] for i in of.order], [imaginary[i] for i in of.order]
+        for i in range(len(a)):
+            less(a, b, i, of.start[i], of.diagonal[i])
+        one, two = list(a), list(b)
+        for i in range(len(a) - 1, -1, -1):
+            less(a, b, i, of.diagonal[i] + 1, of.start[i + 1])
+            c, d = re[of.diagonal[i]], im[of.diagonal[i]]
+            a[i], b[i] = c * a[i] - d * b[i], c * b[i] + d * a[i]
+            one[of.order[i]], two[of.order[i]] = a[i], b[i]
+        return one, two
 
-@dataclass(frozen=True)
-class _Blocks:
-    """What a column's right-hand sides have of the states' changes: h times the derivatives ``of.links``."""
+    def less(a: Vector, b: Vector, i: int, first: int, end: int) -> None:
+        for at in range(first, end):
+            c, d, j = re[at], im[at], of.column[at]
+            a[i], b[i] = a[i] - (c * a[j] - d * b[j]), b[i] - (c * b[j] + d * a[j])
 
-    of: Variation
-    linked: Vector
-
-    def _linked(self, right: Vector, own: Vector) -> Vector:
-        """Right-hand sides with what the changes of the states add."""
-        found = list(right)
-        for i, j, d in zip(self.of.linked, self.of.linking, self.linked, strict=True):
-            found[i] = found[i] + d * own[j]
-        return found
-
-    def _ranges(self) -> Iterable[tuple[range, list[int]]]:
-        """Where each column is, and which states it has derivatives of."""
-        of = self.of
-        for begin, end in zip(of.columns, of.columns[1:], strict=False):
-            yield range(begin, end), of.rows[begin - of.own : end - of.own]
-
-    def _spread(self, values: Vector, rows: list[int]) -> Vector:
-        """The right-hand side of a column, zero for derivatives that it does not have."""
-        spread = [values[0] * 0] * self.of.own
-        for row, value in zip(rows, values, strict=True):
-            spread[row] = value
-        return spread
-
-
-@dataclass(frozen=True)
-class BlockFactors(_Blocks):
-    """A real matrix of this kind."""
-
-    factors: Factors | SparseFactors
-
-    def solve(self, right: Vector) -> Vector:
-        """Solve for a right-hand side."""
-        return self.solve_columns(self.factors.solve(right[: self.of.own]), right)
-
-    def solve_columns(self, own: Vector, right: Vector) -> Vector:
-        """Solve for the columns, where the solution for the states is known."""
-        rest, found = self._linked(right, own), [*own, *(r * 0 for r in right[self.of.own :])]
-        for places, rows in self._ranges():
-            column = self.factors.solve(self._spread([rest[i] for i in places], rows))
-            for i, row in zip(places, rows, strict=True):
-                found[i] = column[row]
-        return found
-
-
-@dataclass(frozen=True)
-class ComplexBlockFactors(_Blocks):
-    """The same of a complex matrix, real and imaginary parts apart."""
-
-    factors: ComplexFactors | ComplexSparseFactors
-
-    def solve(self, real: Vector, imaginary: Vector) -> tuple[Vector, Vector]:
-        """Solve for a right-hand side; returns the real and the imaginary parts."""
-        n = self.of.own
-        own = self.factors.solve(real[:n], imaginary[:n])
-        rest = [self._linked(part, a) for part, a in zip((real, imaginary), own, strict=True)]
-        a, b = ([*known, *(r * 0 for r in real[n:])] for known in own)
-        for places, rows in self._ranges():
-            column = self.factors.solve(*(self._spread([part[i] for i in places], rows) for part in rest))
-            for i, row in zip(places, rows, strict=True):
-                a[i], b[i] = column[0][row], column[1][row]
-        return a, b
+    return solve
 
 
 def linked(of: Variation, h: Number, rows: Matrix) -> Vector:
-    """What a column's right-hand sides have of the changes of the states."""
+    """What right-hand sides of columns have of the changes of the states: h times the derivatives ``of.links``."""
     return [h * rows[i][j] for i, j in zip(of.linked, of.linking, strict=True)]
+
+
+def solve_all(of: Variation, links: Vector, solve: Solve, right: Vector) -> Vector:
+    """Solve for states and columns of derivatives, ``solve`` being that for the states' own matrix."""
+    return solve_columns(of, links, solve, solve(right[: of.own]), right)
+
+
+def solve_columns(of: Variation, links: Vector, solve: Solve, own: Vector, right: Vector) -> Vector:
+    """Solve for the columns, where the solution for the states is known. What does not flow stays as it is."""
+    rest, found = _with_links(of, links, right, own), [*own, *(r * 0 for r in right[of.own :])]
+    for places, rows in _columns(of):
+        column = solve(_whole(of, rest, places, rows))
+        for i, row in zip(places, rows, strict=True):
+            found[i] = column[row]
+    return found
+
+
+def solve_all_complex(
+    of: Variation, links: Vector, solve: SolveComplex, real: Vector, imaginary: Vector
+) -> tuple[Vector, Vector]:
+    """The same of a complex matrix."""
+    n = of.own
+    own = solve(real[:n], imaginary[:n])
+    rest = [_with_links(of, links, part, a) for part, a in zip((real, imaginary), own, strict=True)]
+    a, b = ([*known, *(r * 0 for r in real[n:])] for known in own)
+    for places, rows in _columns(of):
+        column = solve(*(_whole(of, part, places, rows) for part in rest))
+        for i, row in zip(places, rows, strict=True):
+            a[i], b[i] = column[0][row], column[1][row]
+    return a, b
+
+
+def _with_links(of: Variation, links: Vector, right: Vector, own: Vector) -> Vector:
+    """Right-hand sides with what the changes of the states add."""
+    found = list(right)
+    for i, j, d in zip(of.linked, of.linking, links, strict=True):
+        found[i] = found[i] + d * own[j]
+    return found
+
+
+def _columns(of: Variation) -> Iterator[tuple[range, list[int]]]:
+    """Where each column is, and which states it has derivatives of."""
+    for begin, end in zip(of.columns, of.columns[1:], strict=False):
+        yield range(begin, end), of.rows[begin - of.own : end - of.own]
+
+
+def _whole(of: Variation, values: Vector, places: range, rows: list[int]) -> Vector:
+    """The right-hand side of a column, zero for derivatives that it does not have."""
+    found = [values[0] * 0] * of.own
+    for row, i in zip(rows, places, strict=True):
+        found[row] = values[i]
+    return found

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import islice
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
@@ -28,21 +28,20 @@ from hsdsl.base.sparsity import Elimination
 from hsdsl.engine.integrators.implicit import RADAU as RADAU
 from hsdsl.engine.integrators.implicit import Derivatives
 from hsdsl.engine.integrators.linear import (
-    BlockFactors,
-    ComplexBlockFactors,
-    ComplexFactors,
-    ComplexSparseFactors,
-    Factors,
     Matrix,
     Singular,
-    SparseFactors,
+    Solve,
+    SolveComplex,
     Vector,
     factored,
     factored_complex,
     linked,
+    solve_all,
+    solve_all_complex,
+    solve_columns,
     sparse_factored,
     sparse_factored_complex,
-)
+)  # fmt: skip
 from hsdsl.engine.integrators.stepper import Flow, Polynomial, Stages, State, Stepper, resolved, rows_of
 
 
@@ -61,10 +60,6 @@ def radau_stepper(known: Derivatives, tolerance: Number | None, arithmetic: Arit
         landing=steps.landing,
         scales=steps.scales,
     )
-
-
-_Plain = tuple[Factors | SparseFactors, ComplexFactors | ComplexSparseFactors]
-_Both = _Plain | tuple[BlockFactors, ComplexBlockFactors]
 
 
 class Steps:
@@ -88,7 +83,9 @@ class Steps:
         self._rows: Matrix | None = None
         self._derived_at: Number = arithmetic.zero
         self._factored_for: Number = arithmetic.zero
-        self._factors: _Both | None = None
+        self._factors: tuple[Solve, SolveComplex] | None = None
+        self._own: Solve | None = None  # of a system with derivatives: for the states alone
+        self._links = Vector()
         self._last: tuple[Number, Number, Increments] | None = None
         self.derived = self.factorings = self.iterations = 0
 
@@ -170,7 +167,7 @@ class Steps:
         self._lasting = [1 / (1 + self._of.soon * abs(self._rows[i][i])) for i in columns]
         self.derived += 1
 
-    def _factor(self, h: Number) -> _Both:
+    def _factor(self, h: Number) -> tuple[Solve, SolveComplex]:
         """Factor gamma - h J and alpha - i beta - h J, unless that is done."""
         if self._factors is None or self._factored_for != h:
             assert self._rows is not None
@@ -183,17 +180,17 @@ class Steps:
                 raise NoConvergence(str(problem)) from None
         return self._factors
 
-    def _blocks(self, h: Number, rows: Matrix) -> _Both:
+    def _blocks(self, h: Number, rows: Matrix) -> tuple[Solve, SolveComplex]:
         """Factor what the states have, and their derivatives share."""
         of = self._varied
         own = rows if of is None else [row[: of.own] for row in rows[: of.own]]
         real, turning = self._dense(h, own) if self._pattern is None else self._sparse(h, self._pattern)
         if of is None:
             return real, turning
-        links = linked(of, h, rows)
-        return BlockFactors(of, links, real), ComplexBlockFactors(of, links, turning)
+        self._own, self._links = real, linked(of, h, rows)
+        return partial(solve_all, of, self._links, real), partial(solve_all_complex, of, self._links, turning)
 
-    def _dense(self, h: Number, rows: Matrix) -> _Plain:
+    def _dense(self, h: Number, rows: Matrix) -> tuple[Solve, SolveComplex]:
         known, zero, n = self._known, self._arithmetic.zero, len(rows)
         real = [[-h * d for d in row] for row in rows]
         shifted = [list(row) for row in real]
@@ -205,7 +202,7 @@ class Steps:
         groups = self._varied.groups if self._varied else None
         return factored(real, self._largest, groups), factored_complex(shifted, turned, self._largest, groups)
 
-    def _sparse(self, h: Number, pattern: Elimination) -> _Plain:
+    def _sparse(self, h: Number, pattern: Elimination) -> tuple[Solve, SolveComplex]:
         """Factor the same matrices in the pattern of a sparse elimination."""
         assert self._rows is not None
         known, zero = self._known, self._arithmetic.zero
@@ -244,8 +241,8 @@ class Steps:
             self.iterations += 1
             slopes = [flow(t + c * h, *_sum(x, k)) for c, k in zip(known.nodes, z, strict=True)]
             f, g, k = (_weighted(row, slopes) for row in known.unmix)
-            du = real.solve([h * a - known.gamma * b for a, b in zip(f, u, strict=True)])
-            dv, dw = turning.solve(
+            du = real([h * a - known.gamma * b for a, b in zip(f, u, strict=True)])
+            dv, dw = turning(
                 [h * a - (known.alpha * b + known.beta * c) for a, b, c in zip(g, v, w, strict=True)],
                 [h * a - (known.alpha * c - known.beta * b) for a, b, c in zip(k, v, w, strict=True)],
             )
@@ -276,13 +273,14 @@ class Steps:
         real, _ = self._factor(h)
         first = [h * f + e for f, e in zip(slope, _weighted(known.estimate, z), strict=True)]
         second = [h * f - e for f, e in zip(inside, _weighted(known.slope, z), strict=True)]
-        if not isinstance(real, BlockFactors):
-            return tuple(map(_larger, real.solve(first), real.solve(second)))
-        found = list(map(_larger, real.factors.solve(first[:own]), real.factors.solve(second[:own])))
+        if self._varied is None or self._own is None:
+            return tuple(map(_larger, real(first), real(second)))
+        found = list(map(_larger, self._own(first[:own]), self._own(second[:own])))
         counted = (a * share for a, share in zip(first[own:], self._lasting, strict=False))
         last = len(self._lasting) + own
         rest = list(map(_larger, counted, second[own:last]))
-        return tuple(real.solve_columns(found, [*first[:own], *rest, *first[last:]]))
+        right = [*first[:own], *rest, *first[last:]]
+        return tuple(solve_columns(self._varied, self._links, self._own, found, right))
 
 
 def _larger(a: Number, b: Number) -> Number:
@@ -414,9 +412,9 @@ def _eigenvectors(nodes: State, gamma: Number, alpha: Number, beta: Number) -> t
 
 
 def _inverse(matrix: tuple[State, ...]) -> tuple[State, ...]:
-    factors, n = factored([list(row) for row in matrix]), len(matrix)
+    solve, n = factored([list(row) for row in matrix]), len(matrix)
     zero = matrix[0][0] * 0
-    columns: Matrix = [factors.solve([zero + (i == j) for i in range(n)]) for j in range(n)]
+    columns: Matrix = [solve([zero + (i == j) for i in range(n)]) for j in range(n)]
     return tuple(zip(*columns, strict=True))
 
 
