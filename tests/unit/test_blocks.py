@@ -9,8 +9,8 @@ import hsdsl
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.sparsity import variation
 from hsdsl.engine.integrators import radau
-from hsdsl.engine.integrators.implicit import Derivatives
 from hsdsl.engine.integrators.radau import Steps
+from hsdsl.engine.integrators.stepper import Derivatives
 from hsdsl.mathematics.lower.ordering import ordering
 
 STATES, STEP = 5, 0.3

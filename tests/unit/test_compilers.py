@@ -53,7 +53,7 @@ WRONG = {
 def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Nothing is compiled, nothing has been printed, and a compiler has the fifth of a second."""
     kernel.runtime.cache_clear()
-    monkeypatch.setattr(process, "PATIENCE", 0.2)
+    monkeypatch.setattr(process, "FIRST_WAIT", 0.2)
     monkeypatch.setattr(compiler, "TRIAL", 60.0)  # what compiles may take long where much else runs
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
@@ -137,7 +137,7 @@ def test_arguments_and_blanks_in_cc(with_loop, monkeypatch, tmp_path: Path) -> N
 @needs_compiler
 def test_a_compiler_that_is_only_slow_is_waited_for(use, with_loop, monkeypatch) -> None:
     real = compiler.find_compiler().command[0]
-    monkeypatch.setattr(process, "PATIENCE", 0.4)
+    monkeypatch.setattr(process, "FIRST_WAIT", 0.4)
     use(f'case "$*" in *model.c*) sleep 1;; esac\nexec {real} "$@"')
     with_loop()
     assert hsdsl.load(MODEL).simulate(until=0.1).engine == "c"

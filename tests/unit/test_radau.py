@@ -13,9 +13,9 @@ from scipy.linalg import expm
 import hsdsl
 from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
 from hsdsl.engine.backends.python import PythonKernel
-from hsdsl.engine.integrators.implicit import Derivatives
 from hsdsl.engine.integrators.linear import Singular, factored, factored_complex
 from hsdsl.engine.integrators.radau import NoConvergence, coefficients, radau_stepper
+from hsdsl.engine.integrators.stepper import Derivatives
 
 MANY = multiprecision(50)
 

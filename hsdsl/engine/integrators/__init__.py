@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from importlib import import_module
 from typing import TypeVar
 
-from hsdsl.engine.integrators.implicit import RADAU, RadauMethod
+from hsdsl.engine.integrators.stepper import RADAU, RadauMethod
 from hsdsl.engine.integrators.tableau import ButcherTableau
 from hsdsl.engine.integrators.taylor import TaylorMethod
 

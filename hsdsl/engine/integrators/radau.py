@@ -25,8 +25,6 @@ from itertools import islice
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.base.sparsity import Elimination
-from hsdsl.engine.integrators.implicit import RADAU as RADAU
-from hsdsl.engine.integrators.implicit import Derivatives
 from hsdsl.engine.integrators.linear import (
     Matrix,
     Singular,
@@ -42,7 +40,8 @@ from hsdsl.engine.integrators.linear import (
     sparse_factored,
     sparse_factored_complex,
 )  # fmt: skip
-from hsdsl.engine.integrators.stepper import Flow, Polynomial, Stages, State, Stepper, resolved, rows_of
+from hsdsl.engine.integrators.stepper import RADAU as RADAU
+from hsdsl.engine.integrators.stepper import Derivatives, Flow, Polynomial, Stages, State, Stepper, resolved, rows_of
 
 
 def radau_stepper(known: Derivatives, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:

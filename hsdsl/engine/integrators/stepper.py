@@ -1,7 +1,8 @@
-"""From a table to straight-line step functions for one dimension and one number type; and the scales of states.
+"""What makes steps: functions for one dimension and one number type, written from a table; and the scales of states.
 
 The loops over stages and states run once, while the text is written; what remains is a function that a reader (and
-another language) can follow line by line, its sums left to right.
+another language) can follow line by line, its sums left to right. What is known of implicit methods by their names is
+here too; how each steps is in a module that its run imports.
 
 The *scale* of a state is the largest size it has had in a run. No error of a state is held against 1: a state may be a
 current of 1e-12 or a pressure of 1e5. A state whose flow is a small difference of large terms, as the speed of a mass
@@ -16,11 +17,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
+from hsdsl.base.sparsity import Elimination, Variation
 from hsdsl.engine.integrators.linear import Matrix, Vector
 from hsdsl.engine.integrators.tableau import ButcherTableau
+from hsdsl.engine.kernel import Routine
 
 State = tuple[Number, ...]
 Stages = tuple[State, ...]
@@ -254,3 +257,51 @@ def root(x: Number, m: int, arithmetic: Arithmetic) -> Number:
 def rows_of(flat: Sequence[Number], n: int) -> Matrix:
     """Cut n * n derivatives into rows."""
     return [list(flat[i : i + n]) for i in range(0, n * n, n)]
+
+
+@dataclass(frozen=True)
+class Derivatives:
+    """What implicit steps know of a mode's flow besides its values.
+
+    ``scales`` are those of the states, which grow along the run; ``terms`` is that of a mode;
+    ``pattern`` is that of a sparse elimination; ``measured`` is that of a mode; ``varied`` says which states are
+    derivatives of others, whose errors may be larger where they do not last for the time ``soon``.
+    """
+
+    jacobian: Routine
+    scales: Sequence[Number]
+    terms: Routine | None = None
+    pattern: Elimination | None = None
+    measured: Sequence[int] = ()
+    varied: Variation | None = None
+    soon: Number = 0
+
+
+@dataclass(frozen=True)
+class RadauMethod:
+    """The method; its coefficients are made in the number type of a run."""
+
+    name: str = "radau"
+    title: str = "Radau IIA, three stages, for stiff flows"
+    source: str = "Hairer and Wanner 1996, IV.5 and IV.8, doi:10.1007/978-3-642-05221-7"
+    order: int = 5
+    error_order: int = 4
+    adaptive: bool = True
+    digits: int | None = None
+    degree: int = 3
+    kind: ClassVar[Literal["radau"]] = "radau"
+    implicit: ClassVar[bool] = True
+    is_series: ClassVar[bool] = False
+
+    def for_tolerance(self, tolerance: Number | None, arithmetic: Arithmetic) -> RadauMethod:
+        """Return the method for a tolerance: itself."""
+        return self
+
+    def stepper(self, known: Derivatives, tolerance: Number | None, arithmetic: Arithmetic) -> Stepper:
+        """Make its step functions, as `hsdsl.engine.integrators.radau.radau_stepper` does."""
+        from hsdsl.engine.integrators.radau import radau_stepper
+
+        return radau_stepper(known, tolerance, arithmetic)
+
+
+RADAU = RadauMethod()

@@ -142,7 +142,7 @@ def _key(content: str, compiler: Compiler) -> str:
 @cache
 def _our_text() -> bytes:
     """The hand-written C and what writes the rest: closer than a version to what a library was made by."""
-    printers = (BACKENDS / "printer.py", *sorted((BACKENDS / "c").glob("*.py")))
+    printers = (BACKENDS / "printer.py", BACKENDS / "taylor.py", *sorted((BACKENDS / "c").glob("*.py")))
     paths = (*sorted(RUNTIME.glob("*.[ch]")), *printers)
     return b"".join(path.read_bytes() for path in paths)
 

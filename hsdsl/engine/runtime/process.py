@@ -18,8 +18,8 @@ from typing import IO
 
 from hsdsl.base import interrupts
 
-PATIENCE = 5.0  # seconds without a question
-LOOK = 0.5  # seconds in which a command that runs has the processor at least once
+FIRST_WAIT = 5.0  # seconds without a question
+TURN = 0.5  # seconds in which a command that runs has the processor at least once
 MOST_TIMES_LONGER = 20
 TICKS = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100  # of a second of processor time
 MOST_PRINTED = 1 << 16  # bytes that are kept of what a command prints
@@ -44,37 +44,30 @@ def workshop() -> Generator[Path]:
 def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, responds: Callable[[], bool]) -> list[Done]:
     """Run commands at the same time, whose temporary files go to ``folder``; they read nothing.
 
-    After :data:`PATIENCE` they go on only if ``responds``. On Linux seconds in which other programs had the processor
+    After :data:`FIRST_WAIT` they go on only if ``responds``. On Linux seconds in which other programs had the processor
     do not count. All that they started is ended with them where they are ended.
 
     Raises OSError: one cannot be started.
     """
     began = monotonic()
-    begun: list[_Begun] = []
+    begun: list[tuple[subprocess.Popen[bytes], Thread, list[bytes]]] = []  # and who keeps what it says
     try:
         for command in commands:
             begun.append(_begin(command, folder))
-        codes = [_wait(each, _patiences(each.process.pid, began, seconds, responds)) for each in begun]
+        codes = [
+            _wait(process, listener, _waits(process.pid, began, seconds, responds)) for process, listener, _ in begun
+        ]
     finally:
-        for each in begun:
-            _end(each.process)
-            del _running[each.process]
-    for each in begun:
-        each.listener.join(1.0)  # what it left running may hold the stream open
-    printed = [b"".join(each.printed).decode(errors="replace") for each in begun]
+        for process, _, _ in begun:
+            _end(process)
+            del _running[process]
+    for _, listener, _ in begun:
+        listener.join(1.0)  # what it left running may hold the stream open
+    printed = [b"".join(said).decode(errors="replace") for _, _, said in begun]
     return list(map(Done, codes, printed))
 
 
-@dataclass(frozen=True)
-class _Begun:
-    """A command that is under way, and who keeps what it says."""
-
-    process: subprocess.Popen[bytes]
-    listener: Thread
-    printed: list[bytes]
-
-
-def _begin(command: Sequence[str], folder: Path) -> _Begun:
+def _begin(command: Sequence[str], folder: Path) -> tuple[subprocess.Popen[bytes], Thread, list[bytes]]:
     process = subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
@@ -87,30 +80,30 @@ def _begin(command: Sequence[str], folder: Path) -> _Begun:
     printed: list[bytes] = []
     listener = Thread(target=_listen, args=(process.stderr, printed), daemon=True)
     listener.start()
-    return _Begun(process, listener, printed)
+    return process, listener, printed
 
 
-def _wait(begun: _Begun, patiences: Iterator[float]) -> int | None:
+def _wait(process: subprocess.Popen[bytes], listener: Thread, waits: Iterator[float]) -> int | None:
     """Wait for the end of what a command says, which comes at its own end and needs no looking again and again."""
-    for patience in patiences:
-        end = monotonic() + patience
-        begun.listener.join(patience)
+    for seconds in waits:
+        end = monotonic() + seconds
+        listener.join(seconds)
         with suppress(subprocess.TimeoutExpired):
-            return begun.process.wait(max(0.0, end - monotonic()))
+            return process.wait(max(0.0, end - monotonic()))
     return None
 
 
-def _patiences(group: int, began: float, seconds: float, responds: Callable[[], bool]) -> Iterator[float]:
+def _waits(group: int, began: float, seconds: float, responds: Callable[[], bool]) -> Iterator[float]:
     """Give how long to wait for a command each time; where its time is over, as long as it still runs for less."""
-    yield max(0.0, began + min(seconds, PATIENCE) - monotonic())
-    if seconds > PATIENCE and not responds():
+    yield max(0.0, began + min(seconds, FIRST_WAIT) - monotonic())
+    if seconds > FIRST_WAIT and not responds():
         return
     yield max(0.0, began + seconds - monotonic())
     used = processor_time(group)
     for _ in range(MOST_TIMES_LONGER):
         if used >= seconds:
             return
-        yield LOOK
+        yield TURN
         before, used = used, processor_time(group)
         if used <= before:  # it waits for something else, or nobody knows
             return

@@ -10,7 +10,7 @@
 `transitions`           which crossing goes, its reset, the mode entered, cascades, executions that wait
 `contact`               guards that hold the state, motion along them, and Zeno tails that end in it (M11)
 `control`               the step size, and what errors are held against
-`stalls`                when no shorter step helps, and why a run cannot go on
+`stalls`                when no shorter step helps, and why a run cannot go on, also the compiled one
 `stops`                 how runs end and what they remark, in sentences
 `input_segments`        inputs as segments that no step crosses
 `switches`              when floor, sign, abs, min and max of time change, proved where they do not
@@ -18,8 +18,8 @@
 `paoli_schatzman`       the rival: a two-step formula for one mass and one stop
 `recorder`, `review`    rows, arcs and transitions; when the method of a run under way is judged again
 `result`                what was recorded or written, as an execution
-`compiled`, `messages`  the same loop in C: its arguments, and its notes and stops in the same words
-`workspace`             where the C loop works; `output_buffers`, `columns` and `state_layouts` hold its output
+`compiled`              the same loop in C
+`workspace`             where the C loop works; `output_buffers` and `columns` hold its output
 `ensemble`              many instances by the compiled loop
 `verdict`               do the theorem's hypotheses hold for a run?
 ======================  ==========================================================================================

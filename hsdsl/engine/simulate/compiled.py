@@ -20,14 +20,13 @@ from hsdsl.engine.execution import Array, Stop
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.kernel import CompiledModel, Sampled, runtime
 from hsdsl.engine.simulate import stops
-from hsdsl.engine.simulate.columns import Columns, Shape
+from hsdsl.engine.simulate.columns import Columns, Shape, StateLayouts
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.input_segments import Timeline
 from hsdsl.engine.simulate.output_buffers import Sink
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.review import Review
 from hsdsl.engine.simulate.settings import Settings
-from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.engine.simulate.stops import Diagnostics
 from hsdsl.engine.simulate.surfaces import along_steps, interpolation
 from hsdsl.engine.simulate.transitions import Tails
@@ -208,7 +207,7 @@ class CompiledRun:
 
     def _note(self, notes: Array, diagnostics: Diagnostics) -> None:
         if len(notes):
-            from hsdsl.engine.simulate.messages import Note, add_note
+            from hsdsl.engine.simulate.stalls import Note, add_note
 
             listed: list[Note] = notes.tolist()
             for note in listed:
@@ -225,7 +224,7 @@ class CompiledRun:
             return stops.memory(self.plan.memory, self.now)
         if reason == "interrupted":
             return stops.interrupted(self.now)
-        from hsdsl.engine.simulate.messages import stop
+        from hsdsl.engine.simulate.stalls import stop
 
         diagnostics = self.diagnostics  # they may end the run
         if reason == "accumulated" and self._accumulated is not None:

@@ -12,10 +12,10 @@ import numpy as np
 
 from hsdsl.engine.execution import REASONS, Array
 from hsdsl.engine.runtime import structures
+from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.compiled import CompiledPlan, task_settings
 from hsdsl.engine.simulate.input_segments import Timeline
 from hsdsl.engine.simulate.settings import Settings
-from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.engine.simulate.stops import codes_of
 
 TIMELINE = np.dtype([("segments", "i8"), ("start", "u8"), ("end", "u8"), ("jump", "u8"), ("data", "u8")])

@@ -1,6 +1,6 @@
 """The located scheme: the execution itself, its transitions at the crossings (Burden et al. 2013, Fig. 8, Sec. IV-A).
 
-A step is as long as its error allows (`Stepping`). Every crossing of every surface inside it is isolated on the
+A step is as long as its error allows (`Steps`). Every crossing of every surface inside it is isolated on the
 surface's own polynomial (`surfaces`); the earliest goes, at its own instant, and flow goes on from its reset
 (`transitions`). Guards may hold the state, and a Zeno tail is replaced by its limit (`contact`). A cascade at one
 instant costs no time, unless more than `FREE` transitions fall within the relaxation: then each of the others waits in
@@ -14,17 +14,15 @@ back there as the equation does not: at its end the flow still leads towards the
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Protocol
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
-from hsdsl.engine.integrators import TaylorMethod
 from hsdsl.engine.integrators.radau import NoConvergence
-from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper
+from hsdsl.engine.integrators.stepper import Polynomial, Stages, State
 from hsdsl.engine.integrators.taylor import proposed_step
-from hsdsl.engine.kernel import Series, Taylor
+from hsdsl.engine.kernel import Series
 from hsdsl.engine.simulate.contact import (
     at_limit,
     behind_end,
@@ -42,7 +40,7 @@ from hsdsl.engine.simulate.contact import (
 from hsdsl.engine.simulate.control import error_ratio
 from hsdsl.engine.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED, Event, go_on, sizes, standing_on
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stalls import CREEPING, MOST_CREEPING, Chatter, pace
+from hsdsl.engine.simulate.stalls import Stalls
 from hsdsl.engine.simulate.stops import FREE, LEFT, left_domain, reached, reached_in_strip, slides
 from hsdsl.engine.simulate.surfaces import (
     NONE,
@@ -52,7 +50,6 @@ from hsdsl.engine.simulate.surfaces import (
     Crossing,
     Curves,
     Piece,
-    Rise,
     StepFailure,
     TooFast,
     at,
@@ -93,7 +90,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     if isinstance(held, Stop):
         return held
     if held is here:
-        return follow(run, here, stepping(run, here), here.segment.end)
+        return follow(run, here, here.segment.end)
     outcome = along_guards(run, here, held)
     still = here.arc.values[-1] == here.x
     for k in in_touch(here, held):
@@ -104,7 +101,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
 def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeState | Stop:
     """Flow along guards until one lets go of the state."""
     while True:
-        outcome = follow(run, held, stepping(run, held), here.segment.end)
+        outcome = follow(run, held, here.segment.end)
         if isinstance(outcome, ModeState):
             return held_exactly(run, here, held, outcome.t, outcome.x)
         if isinstance(outcome, Stop):
@@ -130,12 +127,12 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
         held = held.moved(t, x)
 
 
-def follow(run: Run, here: ModeState, steps: Stepping, limit: Number) -> Event | ModeState | Stop:
+def follow(run: Run, here: ModeState, limit: Number) -> Event | ModeState | Stop:
     """Step until a surface is crossed, or to a time in the segment."""
     t, x, arc = here.t, here.x, here.arc
-    before: Span | None = None
-    steady = pace(run, t)
-    while t < limit and not steady.is_slow(t):
+    method, before = run.settings.method, None
+    steps = SeriesSteps(run, here) if method is not None and method.is_series else TableSteps(run, here)
+    while t < limit and not steps.stalls.is_slow(t):
         span = steps.next(t, x, limit)
         if isinstance(span, StepFailure):
             return stuck(run, here.moved(t, x), span)
@@ -206,11 +203,11 @@ def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | 
         return reaches(run, here, span, k, pieces)
     first, last = surfaces.roundoff_bound(k, span.t, span.x), surfaces.roundoff_bound(k, span.t1, span.z)
     beyond = pieces[0].coefficients[0] > first
-    for rise in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
-        theta, time, q = settled(here, span, k, rise)
+    for share, slope, certain in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
+        theta, time, q = settled(here, span, k, share, slope)
         holds = k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]
         if holds or (k in surfaces.active and holds_next(run, here, k, time, q)):
-            if not rise.certain:
+            if not certain:
                 run.diagnostics.unsettled(here.mode.name, k, time)
             return Crossing(k, theta, time, q, zero)
     return reaches(run, here, span, k, pieces)
@@ -244,9 +241,9 @@ def with_unseen(run: Run, here: ModeState, span: Span, guards: list[Crossing]) -
     return list(found.values())
 
 
-def settled(here: ModeState, span: Span, k: int, rise: Rise) -> tuple[Number, Number, State]:
+def settled(here: ModeState, span: Span, k: int, s: Number, slope: Number) -> tuple[Number, Number, State]:
     """Correct a crossing on the surface itself to round-off: by Newton's method, else in a bracket."""
-    stands, s, best = k in here.surfaces.active, rise.share, None
+    stands, best = k in here.surfaces.active, None
 
     def residual(s: Number) -> Number:
         time, q = span.point(s)
@@ -258,9 +255,9 @@ def settled(here: ModeState, span: Span, k: int, rise: Rise) -> tuple[Number, Nu
         if best is not None and not abs(r) < best[0]:
             break
         best = (abs(r), s)
-        if rise.slope == 0 or abs(r) <= here.surfaces.roundoff_bound(k, time, q, entry=stands):
+        if slope == 0 or abs(r) <= here.surfaces.roundoff_bound(k, time, q, entry=stands):
             return s, time, q
-        s = min(s * 0 + 1, max(s * 0, s - r / rise.slope))
+        s = min(s * 0 + 1, max(s * 0, s - r / slope))
     assert best is not None
     s = bracketed(residual, best[1], here)
     return s, *span.point(s)
@@ -301,7 +298,9 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     if resumed > t:
         run.wait(here, [(t, run.arithmetic.zero), (resumed, run.settings.relaxation)], q)
     after, scale = outcome
-    since = run.tie(t) if event.alternatives or same_instant(run, t) else run.arithmetic.zero
+    last = run.recorder.transitions[-1].resumed if run.recorder.transitions else None
+    tied = bool(event.alternatives) or (last is not None and t - last <= run.tie(t))
+    since = run.tie(t) if tied else run.arithmetic.zero
     flowed = run.has_flowed(t)
     after = run.record(here, crossing, resumed, after, event.alternatives)
     stood = still_on(here, event) if edge.target == here.index else NONE
@@ -328,12 +327,6 @@ def still_on(here: ModeState, event: Event) -> Mapping[int, Number]:
         return here.surfaces.off(crossing.time, crossing.state, on)
     except DOMAIN_ERRORS:
         return NONE
-
-
-def same_instant(run: Run, t: Number) -> bool:
-    """Whether the transition before this one was made at the same instant."""
-    made = run.recorder.transitions
-    return bool(made) and made[-1].resumed is not None and t - made[-1].resumed <= run.tie(t)
 
 
 def crowded(run: Run, here: ModeState, crossing: Crossing) -> bool:
@@ -409,37 +402,22 @@ class Span:
     sizes: Callable[[Number], State]
 
 
-class Stepping(Protocol):
-    """What makes steps in one mode, on one segment of the inputs."""
+class Steps:
+    """Makes steps in one mode, on one segment of the inputs, that the error allows and that do not pass a limit."""
 
-    def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
-        """Make one step that the error allows, not beyond ``limit``; or return what is in the way."""
-        ...
-
-
-def stepping(run: Run, here: ModeState) -> Stepping:
-    """Choose by the method."""
-    method = run.settings.method
-    if method is not None and method.kind == "taylor":
-        series = run.kernel.taylor(here.flow, here.segment.data)
-        assert series is not None
-        return SeriesSteps(run, here, method, series, run.stepper(here))
-    return TableSteps(run, here, run.stepper(here))
+    def __init__(self, run: Run, here: ModeState) -> None:
+        self.run, self.here, self.method, self.stalls = run, here, run.stepper(here), Stalls(run, here.t)
 
 
-@dataclass
-class TableSteps:
+class TableSteps(Steps):
     """Steps of a Runge-Kutta method; surfaces are interpolated on its dense output.
 
     A crossing's state is that of a step of the method that ends there, which is as accurate as any of its steps.
     """
 
-    run: Run
-    here: ModeState
-    method: Stepper
-    slope: State | None = None
+    slope: State | None = None  # the flow at the end of the last step, which was tried
     at_time: Number = None
-    _chatter: Chatter = field(default_factory=Chatter)
+    _ratio: Number = 1
 
     def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
         """Make one step: rejected by the error estimate, halved where something has no value."""
@@ -455,16 +433,14 @@ class TableSteps:
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
             tried = self._try(t, h, t1, x, slope) if t1 > t else TOO_WRONG
-            if isinstance(tried, tuple):
-                ratio, span = tried
+            if isinstance(tried, Span):
                 assert self.slope is not None
-                if control.tolerance is not None and self._chatter.across(flow, t, x, slope, t1, span.z, self.slope):
+                if control.tolerance is not None and self.stalls.chatters(flow, t, x, slope, t1, tried.z, self.slope):
                     return StepFailure("jump")
                 if control.tolerance is not None and halvings == 0:
-                    control.accept(h, ratio)
+                    control.accept(h, self._ratio)
                 control.slow_enough(mode, h)
-                self._creeping = self._creeping + 1 if halvings >= CREEPING else 0
-                return span if self._creeping <= MOST_CREEPING else StepFailure("creeping")
+                return StepFailure("creeping") if self.stalls.creeps(halvings) else tried
             if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance is not None)):
                 control.reject(h, None if tried is UNSOLVED else self._ratio)
                 h = control.within_reach(mode, control.h)
@@ -475,10 +451,7 @@ class TableSteps:
             if halvings > self.run.arithmetic.most_halvings or not t + h > t or control.struggles:
                 return tried
 
-    _ratio: Number = 1
-    _creeping: int = 0
-
-    def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> tuple[Number, Span] | StepFailure:
+    def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> Span | StepFailure:
         flow, method, control = self.here.kernel.flow, self.method, self.run.control
         try:
             z, stages = method.step(flow, t, h, x, slope)
@@ -522,7 +495,7 @@ class TableSteps:
             largest = [max(abs(k) for k in column) for column in zip(*stages, strict=True)]
             return tuple(abs(a) + s * h * self.method.gain * k for a, k in zip(x, largest, strict=True))
 
-        return self._ratio, Span(t, h, t1, x, z, piece, curves, ends, point, cut, sizes)
+        return Span(t, h, t1, x, z, piece, curves, ends, point, cut, sizes)
 
     def _blurred(self, curves: Curves, t1: Number, z: State, error: State, ends: State) -> Curves:
         """Let no rise count that is lower than what the step's error moves a surface by.
@@ -535,19 +508,18 @@ class TableSteps:
         return [[replace(piece, off=piece.off + more) for piece in row] for row, more in zip(curves, off, strict=True)]
 
 
-@dataclass
-class SeriesSteps:
+class SeriesSteps(Steps):
     """Steps of Taylor's method; smooth surfaces have series of their own."""
 
-    run: Run
-    here: ModeState
-    method: TaylorMethod
-    series: Taylor
-    steps: Stepper
+    def __init__(self, run: Run, here: ModeState) -> None:
+        super().__init__(run, here)
+        method, series = run.settings.method, run.kernel.taylor(here.flow, here.segment.data)
+        assert method is not None and series is not None
+        self.order, self.series = method.order, series
 
     def next(self, t: Number, x: State, limit: Number) -> Span | StepFailure:
         """Make one step, as long as the terms left out allow; halved where its end does not solve the equation."""
-        run, order, mode = self.run, self.method.order, self.here.mode.name
+        run, order, mode = self.run, self.order, self.here.mode.name
         try:
             lines = self.series.flow(order, t, x)
         except DOMAIN_ERRORS:
@@ -588,9 +560,9 @@ class SeriesSteps:
             end = here.kernel.flow(t1, *z)
             if not run.arithmetic.isfinite(sum(z) + sum(end)):
                 return NOT_FINITE
-            tolerance, error = run.control.tolerance, self.steps.error
+            tolerance, error = run.control.tolerance, self.method.error
             if tolerance is not None and error is not None:
-                ratio = error_ratio(run, here, self.steps, error(h, stages, end), t, h, x, z)
+                ratio = error_ratio(run, here, self.method, error(h, stages, end), t, h, x, z)
                 if ratio > max(1, 64 * run.arithmetic.unit / tolerance):
                     return TOO_WRONG
             ends = here.kernel.surfaces(t1, *z)
@@ -625,7 +597,7 @@ class SeriesSteps:
         if not ends:
             return []
         try:
-            found = self.series.surfaces(self.method.order, lines)
+            found = self.series.surfaces(self.order, lines)
         except DOMAIN_ERRORS:
             found = tuple(None for _ in ends)
         curves: Curves = []

@@ -129,13 +129,6 @@ FINER = 10
 LEAST_UNITS = 32  # of round-off: a tolerance that a finer run may still have
 
 
-def longest_steps(execution: Execution) -> list[Number]:
-    """The longest step of each arc of flow."""
-    table = execution.arc_table
-    steps = np.append(np.diff(execution.times), 0)
-    return np.maximum.reduceat(steps, table.first)[table.kind == "flow"].tolist() if len(table.first) else []
-
-
 def finer_settings(settings: Settings, execution: Execution, arithmetic: Arithmetic) -> Settings:
     """Return the settings of the run to compare an execution with."""
     finer = replace(settings, moves=True)
@@ -150,7 +143,11 @@ def finer_settings(settings: Settings, execution: Execution, arithmetic: Arithme
     method = settings.method
     assert method is not None
     share = float(FINER) ** (-1 / method.order)
-    bounds = [share * step for step in longest_steps(execution)]
+    table, steps = execution.arc_table, np.append(np.diff(execution.times), 0)
+    longest: list[Number] = (
+        np.maximum.reduceat(steps, table.first)[table.kind == "flow"].tolist() if len(table.first) else []
+    )
+    bounds: list[Number] = [share * step for step in longest]  # of arcs of flow
     finer = replace(finer, longest_step=max(bounds, default=0) or None)
     if settings.scheme == "located":
         finer = replace(finer, first_steps=bounds)

@@ -11,9 +11,8 @@ import numpy as np
 from hsdsl.base.limits import DEFAULT
 from hsdsl.engine.execution import Arc, Array, Transition
 from hsdsl.engine.runtime import structures
-from hsdsl.engine.simulate.columns import Columns, Counts, Gathered, Packed, Shape
+from hsdsl.engine.simulate.columns import Columns, Counts, Gathered, Packed, Shape, StateLayouts
 from hsdsl.engine.simulate.review import Review
-from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.mathematics.program import Program
 
 LEAST_ROWS, MOST_ROWS = 2048, 2**20

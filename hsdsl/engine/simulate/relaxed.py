@@ -19,7 +19,7 @@ from hsdsl.engine.kernel import Vector
 from hsdsl.engine.simulate.contact import holds_next, unresolved
 from hsdsl.engine.simulate.control import error_ratio
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stalls import Chatter, StallCount, pace
+from hsdsl.engine.simulate.stalls import Stalls
 from hsdsl.engine.simulate.stops import reached, reached_in_strip, slides
 from hsdsl.engine.simulate.surfaces import Arrival, Crossing, StepFailure, at, close_bracket, joined, shortened
 from hsdsl.engine.simulate.transitions import choose, enter, reset, takes_back
@@ -68,14 +68,14 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     attempt = attempts(run, here, method)
     estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
     most_halvings = run.arithmetic.most_halvings
-    t, x, limit, stall, chatter = here.t, here.x, here.segment.end, StallCount(run.arithmetic.unit), Chatter()
-    active, emerging, steady = here.surfaces.active, here.surfaces.emerging, pace(run, t)
+    t, x, limit, stalls = here.t, here.x, here.segment.end, Stalls(run, here.t)
+    active, emerging = here.surfaces.active, here.surfaces.emerging
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return run.standstill(here).not_finite([(t, x)])
     control.begin(arc.scales, slope)
-    while t < limit and not steady.is_slow(t):
+    while t < limit and not stalls.is_slow(t):
         h, halvings, ratio, failure = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
@@ -101,9 +101,9 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
             crossing, alternatives = choose(here, found, run)
             last = z if crossing.theta > 0 else x
             return Event(crossing, alternatives, t1, sizes(x, last, here, crossing.edge in active))
-        if (halvings or not t1 > t) and (given_up := stall.ends(here, halvings, control.h, failure, t, x, t1, z)):
+        if (halvings or not t1 > t) and (given_up := stalls.ends(here, halvings, control.h, failure, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
-        if estimate and chatter.across(here.kernel.flow, t, x, slope, t1, z, end):
+        if estimate and stalls.chatters(here.kernel.flow, t, x, slope, t1, z, end):
             return stuck(run, here.moved(t, x), StepFailure("jump"), slope)
         if active or emerging:
             here.surfaces.leave(t1, z)

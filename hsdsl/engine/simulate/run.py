@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Stop, Transition
-from hsdsl.engine.integrators.implicit import Derivatives
-from hsdsl.engine.integrators.stepper import State, Stepper, stepper
+from hsdsl.engine.integrators.stepper import Derivatives, State, Stepper, stepper
 from hsdsl.engine.integrators.taylor import taylor_stepper
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.control import Control

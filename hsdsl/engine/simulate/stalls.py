@@ -1,8 +1,10 @@
-"""When no shorter step helps: how that is noticed, and why it is so, in a sentence.
+"""When no shorter step helps: how that is noticed, and why it is so, in a sentence; the same of the compiled loop.
 
 A run that closes in on a surface ends there, one whose steps creep says so. Steps that go to and fro across a jump of
 the flow are counted, and the jump is looked for by halving the way between two states. A *standstill* is the place of a
 run that cannot go on: an expression has no finite value there, or no step leads past it.
+
+The compiled loop returns codes: `add_note` and `stop` give its notes and stops the words of the Python loop.
 """
 
 from __future__ import annotations
@@ -15,12 +17,15 @@ from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.stepper import Flow, State
 from hsdsl.engine.integrators.tableau import ButcherTableau
 from hsdsl.engine.integrators.taylor import NoSeries, terms
+from hsdsl.engine.runtime import structures
+from hsdsl.engine.simulate import stops
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stops import LEFT, left_domain, show
+from hsdsl.engine.simulate.stops import LEFT, Diagnostics, left_domain, show, slides
 from hsdsl.engine.simulate.surfaces import StepFailure
-from hsdsl.mathematics.program import HELD, ModeProgram
+from hsdsl.engine.simulate.workspace import Workspace
+from hsdsl.mathematics.program import HELD, ModeProgram, Program
 
 IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
 MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
@@ -28,93 +33,59 @@ CREEPING = 10  # halvings; steps below a thousandth of the full one
 MOST_CREEPING = 2000  # in a row: the run would take a thousand times its length in steps
 SHORT = 1e-6  # of a run
 MOST_SHORT = 100_000  # steps within that, in one flight: so the run would take a hundred billion
-
-
-@dataclass
-class StallCount:
-    """Counts accepted steps in a row that had to be cut short; ``unit`` is the unit round-off."""
-
-    unit: Number
-    reached: Number | None = None  # by the last step counted: another start means that full steps came between
-    idle: int = 0
-    creeping: int = 0
-
-    def ends(
-        self,
-        here: ModeState,
-        halvings: int,
-        full: Number,
-        failure: StepFailure,
-        t: Number,
-        x: State,
-        t1: Number,
-        z: State,
-    ) -> StepFailure | None:
-        """Count a step from (t, x) to (t1, z) that was halved because of ``failure``; say what ends the run, if so."""
-        if t != self.reached:
-            self.idle = self.creeping = 0
-        self.reached = t1
-        small = t1 - t <= IDLE_UNITS * self.unit * max(t, full)
-        still = _still(here, failure, t, x, t1, z)
-        self.idle = self.idle + 1 if small or still else 0
-        self.creeping = self.creeping + 1 if halvings >= CREEPING else 0
-        if self.idle > MOST_IDLE or (small and z == x):
-            return failure
-        return StepFailure("creeping", failure.surface) if self.creeping > MOST_CREEPING else None
-
-
-@dataclass
-class Pace:
-    """Counts the steps of a flight within a millionth of the run: ``short``, 0 for fixed steps, from ``since`` on."""
-
-    short: Number
-    since: Number
-    made: int = 0
-
-    def is_slow(self, t: Number) -> bool:
-        """Count a step from t; whether there were too many."""
-        self.made += 1
-        if t - self.since > self.short:
-            self.since, self.made = t, 0
-        return self.made > MOST_SHORT
-
-
-def pace(run: Run, t: Number) -> Pace:
-    """Begin to count at the start of a flight."""
-    return Pace(run.settings.until * (0 if run.control.tolerance is None else SHORT), t)
-
-
-def _still(here: ModeState, failure: StepFailure, t: Number, x: State, t1: Number, z: State) -> bool:
-    """Whether the surface in the way did not come nearer: its round-off is larger than what the step adds."""
-    k = failure.surface
-    if k is None:
-        return False
-    return here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]
-
-
 MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
 JUMP_HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
 
 
-@dataclass
-class Chatter:
-    """Counts steps at whose end a component of the flow has the other sign than at their start."""
+class Stalls:
+    """Counts the steps of one stretch of flow that do not lead on, from time t."""
 
-    count: int = 0
+    def __init__(self, run: Run, t: Number) -> None:
+        self._unit = run.arithmetic.unit
+        self._reached: Number | None = None  # by the last step cut short: another start means full steps between
+        self._idle = self._creeping = self._turns = self._made = 0
+        self._short = run.settings.until * (0 if run.control.tolerance is None else SHORT)
+        self._since = t
 
-    def across(self, flow: Flow, t: Number, x: State, slope: State, t1: Number, z: State, end: State) -> bool:
-        """Count a step; say whether it is one of very many across a jump. Smooth flows that turn around are none."""
-        turns = any(a * b < 0 for a, b in zip(slope, end, strict=True))
-        self.count = self.count + 2 if turns else max(0, self.count - 1)
-        if self.count < MOST_CHATTER:
+    def ends(
+        self, here: ModeState, halvings: int, full: Number, failure: StepFailure,
+        t: Number, x: State, t1: Number, z: State,
+    ) -> StepFailure | None:  # fmt: skip
+        """Count a step from (t, x) to (t1, z) that was halved because of ``failure``; say what ends the run, if so."""
+        if t != self._reached:
+            self._idle = self._creeping = 0
+        self._reached, k = t1, failure.surface
+        small = t1 - t <= IDLE_UNITS * self._unit * max(t, full)
+        # the surface in the way did not come nearer: its round-off is larger than what the step adds
+        still = k is not None and here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]
+        self._idle = self._idle + 1 if small or still else 0
+        creeps = self.creeps(halvings)
+        if self._idle > MOST_IDLE or (small and z == x):
+            return failure
+        return StepFailure("creeping", k) if creeps else None
+
+    def creeps(self, halvings: int) -> bool:
+        """Count a step that was halved so often; whether too many in a row were far below the full step."""
+        self._creeping = self._creeping + 1 if halvings >= CREEPING else 0
+        return self._creeping > MOST_CREEPING
+
+    def is_slow(self, t: Number) -> bool:
+        """Count a step from t; whether there were too many within a millionth of the run."""
+        self._made += 1
+        if t - self._since > self._short:
+            self._since, self._made = t, 0
+        return self._made > MOST_SHORT
+
+    def chatters(self, flow: Flow, t: Number, x: State, slope: State, t1: Number, z: State, end: State) -> bool:
+        """Count a step, by whether a component of the flow has the other sign at its end; say whether it is one of very
+        many across a jump. Smooth flows that turn around are none.
+        """
+        turned = [k for k, (a, b) in enumerate(zip(slope, end, strict=True)) if a * b < 0]
+        self._turns = self._turns + 2 if turned else max(0, self._turns - 1)
+        if self._turns < MOST_CHATTER:
             return False
-        self.count = 0
-        return any(a * b < 0 and jumps(flow, k, t, x, t1, z) for k, (a, b) in enumerate(zip(slope, end, strict=True)))
-
-
-def jumps(flow: Flow, k: int, t: Number, x: State, t1: Number, z: State) -> bool:
-    """Whether component k of the flow jumps on the way from (t, x) to (t1, z)."""
-    return jump_between(flow, k, t, x, t1, z) is not None
+        self._turns = 0
+        return any(jump_between(flow, k, t, x, t1, z) is not None for k in turned)
 
 
 def jump_between(flow: Flow, k: int, t: Number, x: State, t1: Number, z: State) -> tuple[State, Number, Number] | None:
@@ -313,3 +284,57 @@ class Standstill:
 
     def _state(self, x: State) -> str:
         return ", ".join(f"{name} = {show(value)}" for name, value in zip(self.mode.states, x, strict=True))
+
+
+Note = tuple[int, int, int, int, float, float]  # as in `hs_note`
+
+
+def add_note(diagnostics: Diagnostics, program: Program, note: Note) -> Stop | None:
+    """Add what the loop has noted; returns a stop where that ends the run."""
+    notice, index, k, count, time, other = note
+    mode, kind = program.modes[index], structures.NOTICES[notice]
+    if kind == "unsettled":
+        return diagnostics.unsettled(mode.name, k, time)
+    if kind == "crowded":
+        return diagnostics.crowded(time)
+    if kind == "in contact":
+        return diagnostics.in_contact(mode.edges[k].name, time, other, bool(count))
+    if kind == "replaced":
+        return diagnostics.replaced(mode.edges[k], count, time, other)
+    if kind == "slides":
+        return slides(program.modes[count].edges[k].name, program.modes[count], mode, time)
+    if kind == "takes turn":
+        return diagnostics.turns.append(mode.edges[k].name)
+    if kind == "coupled":
+        return diagnostics.coupled(mode.edges[k].name, time)
+    return diagnostics.accumulates(mode.edges[k].name, time, other)
+
+
+def stop(problem: Problem, workspace: Workspace, reason: str, diagnostics: Diagnostics) -> Stop:
+    """Say why a run stopped."""
+    found = workspace.task.stop
+    number, t = int(found.mode), found.time
+    mode, segment = problem.program.modes[number], problem.timeline.segments[int(found.segment)]
+    if reason in ("until in strip", "until on guard"):
+        return stops.reached_in_strip(t, mode.edges[int(found.edge)].name, reason == "until on guard")
+    if reason == "reset not finite":
+        return stops.reset_not_finite(mode.edges[int(found.edge)], t)
+    if reason == "zeno":
+        return stops.endless(mode.name, t)
+    if reason == "waiting":
+        return stops.too_many_wait(mode, mode.queues[int(found.edge)].name, t)
+    if reason == "limit":
+        return stops.limit(problem.settings.max_transitions, t)
+    if reason in ("entered outside", "left"):
+        return stops.left_domain(mode, found.surface, t, stops.LEFT if reason == "left" else stops.ENTERED)
+    x, slope, scales = (column[: found.dimension].tolist() for column in workspace.stopped)
+    if reason == "accumulated":
+        return diagnostics.takes_turns(mode.states, tuple(x), t)
+    here = Standstill(problem, number, segment, t, tuple(x), scales, found.h)
+    if reason == "here not finite":
+        return here.not_finite([(t, here.x)])
+    if reason == "step not finite":
+        return here.not_finite([(t, here.x), (found.h, tuple(slope))])
+    assert reason == "stuck", reason
+    surface = None if found.surface < 0 else int(found.surface)
+    return here.stuck(StepFailure(structures.FAILURES[int(found.failure)], surface), tuple(slope))

@@ -138,7 +138,11 @@ def warnings_of(remarks: Iterable[Remark], program: Program) -> tuple[RunWarning
     groups: dict[tuple[str, str], list[Remark]] = {}
     for remark in remarks:
         groups.setdefault((remark.kind, remark.of), []).append(remark)
-    found = [_warning(sorted(group, key=_time)) for group in groups.values()]
+    found: list[RunWarning] = []
+    for group in groups.values():
+        group.sort(key=lambda remark: _when(remark.time))
+        first, code = group[0], SENTENCES[group[0].kind][0]
+        found.append(RunWarning.deferred(_LATER, code=code, time=first.time, edge=first.edge, _group=group))
     return tuple(sorted(found, key=lambda warning: (warning.code, _when(warning.time))))
 
 
@@ -178,11 +182,6 @@ def wall_of(mode: ModeProgram, k: int) -> str:
     return f"{mode.walls[k - len(mode.edges)]} of {mode.name}"
 
 
-def _warning(group: Sequence[Remark]) -> RunWarning:
-    first = group[0]
-    return RunWarning.deferred(_LATER, code=SENTENCES[first.kind][0], time=first.time, edge=first.edge, _group=group)
-
-
 def _message(group: Sequence[Remark]) -> str:
     """The text of a warning: most are counted and never read."""
     first, count = group[0], len(group)
@@ -198,10 +197,6 @@ def _message(group: Sequence[Remark]) -> str:
 
 
 _LATER: dict[str, Callable[[Any], Any]] = {"message": lambda warning: _message(warning._group)}
-
-
-def _time(remark: Remark) -> Number:
-    return _when(remark.time)
 
 
 def _when(time: Number | None) -> Number:

@@ -523,20 +523,14 @@ class Piece:
     off: Number = 0
 
 
-@dataclass(frozen=True)
-class Rise:
-    """Where a surface rises above its level: the root before it, its slope there, by the share of the step."""
-
-    share: Number
-    slope: Number
-    certain: bool
-
-
 def deflated(pieces: list[Piece]) -> list[Piece]:
     """Take the first piece to begin at zero: the state is on the surface, to round-off."""
     first = pieces[0]
     zero = first.coefficients[0] * 0
     return [replace(first, coefficients=[zero, *first.coefficients[1:]]), *pieces[1:]]
+
+
+Rise = tuple[Number, Number, bool]  # where, by the share of the step; the slope there; whether it is certain
 
 
 def rises_along(pieces: Sequence[Piece], level: Number, beyond: bool, risen: bool, unit: Number) -> Iterator[Rise]:
@@ -562,7 +556,7 @@ def rises_along(pieces: Sequence[Piece], level: Number, beyond: bool, risen: boo
             if high is None:
                 break
             root = _root(c, at, high, unit)
-            yield Rise(piece.start + root * piece.width, slope_of(c, root) / piece.width, piece.certain)
+            yield piece.start + root * piece.width, slope_of(c, root) / piece.width, piece.certain
             at, outside = high, True
 
 

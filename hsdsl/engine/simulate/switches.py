@@ -231,7 +231,7 @@ def check(left: float) -> None:
 
 def isolated(argument: Changes, parts: Sequence[Segment]) -> tuple[Found, Found]:
     """Intervals on which the argument is monotone and meets a level, and those that nothing is proved of."""
-    enclosed, tie = _Enclosed.of(argument, [part.data for part in parts]), float(argument.tie)
+    enclosed, tie = _Enclosed(argument, [part.data for part in parts]), float(argument.tie)
     low, high = (np.array([float(getattr(part, name)) for part in parts]) for name in ("start", "end"))
     owner, whole, most = np.arange(len(parts)), float(high[-1]), UNDER_WAY * limits.current().switches
     monotone: Found = []
@@ -259,25 +259,20 @@ def isolated(argument: Changes, parts: Sequence[Segment]) -> tuple[Found, Found]
 
 def decided(argument: Changes, places: Sequence[tuple[Segment, Number]]) -> list[bool]:
     """Whether the argument is off its levels by more than round-off at times, or stays on one."""
-    enclosed = _Enclosed.of(argument, [part.data for part, _ in places])
+    enclosed = _Enclosed(argument, [part.data for part, _ in places])
     times = np.array([float(t) for _, t in places])
     meets, still = enclosed.on_level(times, np.arange(len(places)))
     return (~meets | still).tolist()
 
 
-@dataclass(frozen=True)
 class _Enclosed:
     """A switch's argument over ranges; row i of ``below`` and ``above`` encloses the data of part i."""
 
-    argument: Changes
-    below: Array
-    above: Array
-
-    @classmethod
-    def of(cls, argument: Changes, data: Sequence[tuple[Number, ...]]) -> _Enclosed:
+    def __init__(self, argument: Changes, data: Sequence[tuple[Number, ...]]) -> None:
         rows = np.array([[float(a) for a in row] for row in data])
         exact = argument.kernel.arithmetic.digits is None
-        return cls(argument, *((rows, rows) if exact else (np.nextafter(rows, -np.inf), np.nextafter(rows, np.inf))))
+        self.argument = argument
+        self.below, self.above = (rows, rows) if exact else (np.nextafter(rows, -np.inf), np.nextafter(rows, np.inf))
 
     def _at(self, t: Range, owner: Array) -> tuple[Range, Range]:
         columns = [Range(self.below[owner, i], self.above[owner, i]) for i in range(self.below.shape[1])]

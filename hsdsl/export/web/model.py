@@ -27,8 +27,8 @@ from hsdsl.engine.backends.c.routine import literal
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate import Problem
+from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.control import LARGEST_SHARE
-from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.engine.simulate.switches import same
 from hsdsl.export.c.problem import array, function
 from hsdsl.export.source import Source, derived, used_by, with_sources

@@ -22,8 +22,8 @@ from hsdsl.engine.preparation.settings import check_memory, setting_columns, who
 from hsdsl.engine.preparation.values import InstanceTable, evaluate_parameters, initial_columns, start_of_parts
 from hsdsl.engine.preparation.waiting import check_alone
 from hsdsl.engine.simulate import Prepared, Settings
+from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.ensemble import Instances, Kept
-from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.interface.model.ensemble_request import EnsembleRequest
 from hsdsl.interface.model.workers import ArrayRecorder, Progress, run_compiled, run_in_turn
 

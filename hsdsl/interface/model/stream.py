@@ -21,8 +21,8 @@ from hsdsl.engine.execution.samples import split
 from hsdsl.engine.execution.sampling import columns_by_name
 from hsdsl.engine.preparation.options import check_arguments
 from hsdsl.engine.preparation.settings import whole
+from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.plan import Prepared, Watch
-from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.engine.simulate.stops import loop_remarks, warnings_of
 from hsdsl.mathematics.program import Program
 

@@ -4,6 +4,7 @@
 #define SAME_UNITS 4
 #define ZERO_UNITS 16
 #define FURTHER 16
+#define LEAST_FLIGHTS 3
 
 /* The size that a state has had, or that of the numbers that it was computed from on entry. */
 static hs_real state_size(const hs_run *run, int s) { return hs_max(run->scales[s], fabs(run->scale[s])); }

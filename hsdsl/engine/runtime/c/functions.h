@@ -56,8 +56,6 @@ static int releases(const hs_run *run, int j);
 static const hs_made *made_before(const hs_run *run, int back);
 static int unresolved(hs_run *run, int k);
 
-#define LEAST_FLIGHTS 3
-
 /* moving.c */
 #if defined(HS_MOVES)
 HS_APART static void move_reset(hs_run *run);

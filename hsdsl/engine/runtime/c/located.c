@@ -44,19 +44,15 @@ static void span_rest(hs_run *run, hs_real s, hs_real *state) {
   part_at(run, &run->span.piece, s, run->here.table->own, run->here.dimension, state);
 }
 
-static int shorter_piece(hs_run *run, hs_real s, hs_polynomial *piece) {
-  const hs_span *span = &run->span;
-  const hs_real h = s * span->h;
-  return part_of_step(run, run->here.dimension, span->t, h) ||
-         run->here.table->flow(run->here.p, span->t + h, run->z, run->end) || method_piece(run, span->t, h, piece);
-}
-
 /* The interpolant of the states up to the share s of the step, over [0, 1]. */
 static void span_cut(hs_run *run, hs_real s, hs_polynomial *piece) {
   int status = 1;
   if (run->method->kind != HS_TAYLOR) {
     aside(run, &run->q);
-    status = shorter_piece(run, s, piece);
+    const hs_time t = run->span.t;
+    const hs_real h = s * run->span.h;
+    status = part_of_step(run, run->here.dimension, t, h) ||
+             run->here.table->flow(run->here.p, t + h, run->z, run->end) || method_piece(run, t, h, piece);
     aside(run, &run->q);
   }
   if (status) shortened(run, &run->span.piece, s, piece);
@@ -474,13 +470,6 @@ static void write_crossing(hs_run *run, const hs_crossing *crossing) {
   append(run, crossing->time, crossing->state, &run->cubic);
 }
 
-static int walked_out(hs_run *run, const hs_crossing *wall) {
-  write_crossing(run, wall);
-  copy(run->x, wall->state, run->here.dimension);
-  run->task->stop.surface = wall->edge - run->here.table->edges + run->model->mode[run->here.mode].edges;
-  return stopped(run, HS_LEFT, wall->time);
-}
-
 /* A wall is reached before any guard: take the guards that it is reached together with, how many there are. */
 static int guards_at(hs_run *run, const hs_crossing *wall) {
   const hs_time time = wall->time, theta = wall->theta, depth = wall->depth;
@@ -559,7 +548,12 @@ static int first_event(hs_run *run) {
       wall = crossing;
   }
   for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(wall->time);
-  if (wall && !tied && !(guards = guards_at(run, wall))) return walked_out(run, wall);
+  if (wall && !tied && !(guards = guards_at(run, wall))) {
+    write_crossing(run, wall);
+    copy(run->x, wall->state, run->here.dimension);
+    run->task->stop.surface = wall->edge - run->here.table->edges + run->model->mode[run->here.mode].edges;
+    return stopped(run, HS_LEFT, wall->time);
+  }
   if (!guards) return GOES_ON;
   if ((guards = with_unseen(run, guards)) == RAISED) return WITHOUT_VALUE;
   choose(run, guards);
@@ -580,13 +574,6 @@ static int located_stuck(hs_run *run, hs_step_failure kind) {
   run->task->stop.failure = kind;
   run->task->stop.surface = -1;
   return stopped(run, HS_STUCK, run->here.t);
-}
-
-static int step_not_finite(hs_run *run) {
-  copy(run->task->stop.slope, run->z, run->here.dimension);
-  stopped(run, HS_STEP_NOT_FINITE, run->here.t);
-  run->task->stop.h = run->span.t1;
-  return HS_STEP_NOT_FINITE;
 }
 
 /* Go on at the end of the step. */
@@ -615,7 +602,12 @@ static int follow(hs_run *run, hs_time limit) {
     const hs_step_failure failure = next_span(run, n, limit);
     if (failure != HS_CLEAR) return located_stuck(run, failure);
     const int event = first_event(run);
-    if (event == WITHOUT_VALUE) return step_not_finite(run);
+    if (event == WITHOUT_VALUE) {
+      copy(run->task->stop.slope, run->z, run->here.dimension);
+      stopped(run, HS_STEP_NOT_FINITE, here->t);
+      run->task->stop.h = run->span.t1;
+      return HS_STEP_NOT_FINITE;
+    }
     if (event != GOES_ON) return event;
     if (here->standing) leave(run, run->span.t1, run->z);
     HS_MOVE(run, move_along(run, run->span.t1, run->z, run->span.h));
@@ -705,13 +697,6 @@ static int located_flow(hs_run *run) {
   return outcome;
 }
 
-/* Whether the transition before this one was made at the same instant. */
-static int same_instant(const hs_run *run, hs_time t) {
-  if (!run->jump) return 0;
-  const hs_time resumed = made_before(run, 0)->resumed;
-  return resumed == resumed && t - resumed <= tie(t);
-}
-
 /* Whether as many transitions as cost no time have fallen within the relaxation of flow, and run to no limit.
    Those of one instant count only where the edge is one of theirs. Those of contacts that move the state run to one. */
 static int crowded(hs_run *run, const hs_crossing *crossing) {
@@ -757,7 +742,8 @@ static int jump(hs_run *run) {
     hs_time rows[2][2] = {{t, 0.0}, {resumed, run->epsilon}};
     strip(run, 2, rows, crossing->state);
   }
-  const hs_real since = run->alternatives_count || same_instant(run, t) ? tie(t) : 0.0;
+  const hs_time last = run->jump ? made_before(run, 0)->resumed : NAN;
+  const hs_real since = run->alternatives_count || t - last <= tie(t) ? tie(t) : 0.0;
   const int flowed = has_flowed(run, t);
   record(run, crossing, resumed, run->after, 0);
   copy(run->x, run->after, edge->target_dimension);

@@ -125,36 +125,20 @@ static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, hs_r
   return 0;
 }
 
-/* The round-off of surface k over this step, from the step's own numbers. */
-static int smallest(hs_run *run, int k, hs_real *small) {
-  hs_real *const sizes = run->at;
-  for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
-  if (roundoff_bound(run, k, run->trial.t1, sizes, 0, small)) return RAISED;
-  *small = *small * ROOT_SHARE;
-  return 0;
-}
-
 /* Whether a state may be beyond surface k without having crossed it. */
 static int is_transparent(const hs_run *run, int k) {
   const hs_mode *mode = run->here.table;
   return run->emerging[k] || k >= mode->edges || mode->edge[k].conditional;
 }
 
-/* Whether a step was further beyond surface k than `end` between the crossing and its end: that is on another flank. */
-static int deeper_before(hs_run *run, const hs_polynomial *piece, hs_real theta, int k, hs_real end) {
-  for (int i = 1; i < SCAN; i++) {
-    hs_real r;
-    if (on_piece(run, piece, k, theta + (1 - theta) * i / SCAN, &r)) return RAISED;
-    if (r > end) return 1;
-  }
-  return 0;
-}
-
 /* Where surface k was last crossed upwards on an interpolant: 1; 0 if it was beyond all along. */
 static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossing *crossing) {
   const hs_trial *trial = &run->trial;
   hs_real small, theta, r, noise;
-  if (smallest(run, k, &small) || last_up_crossing(run, piece, k, small, &theta)) return RAISED;
+  hs_real *const sizes = run->at; /* it can be located to round-off of the numbers of this step, no older ones */
+  for (int s = 0; s < run->here.dimension; s++) sizes[s] = hs_max(fabs(run->x[s]), fabs(run->z[s]));
+  if (roundoff_bound(run, k, trial->t1, sizes, 0, &small)) return RAISED;
+  if (last_up_crossing(run, piece, k, small * ROOT_SHARE, &theta)) return RAISED;
   if (theta != theta) {
     if (is_transparent(run, k)) {
       at(run, piece, 0.0, run->at);
@@ -173,26 +157,12 @@ static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossin
   return 1;
 }
 
-/* How far the flow at a crossing would take r back inside over this step; 0 when not beyond round-off. */
-static int inward_of(hs_run *run, int k, const hs_crossing *crossing, hs_real *inward) {
+/* How far the flow at a crossing would take surface k back inside over this step. */
+static int back_of(hs_run *run, int k, const hs_crossing *crossing, hs_real *back) {
   hs_real rate;
   if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
-  *inward = -rate * run->trial.h;
-  if (!(*inward > run->noise[k])) *inward = 0.0;
+  *back = -rate * run->trial.h;
   return 0;
-}
-
-/* Whether the `if` of edge k holds next, on whose surface the state is, after a hop that round-off hides: where the
-   flow comes back to the surface, which is at `end` at the step's end. */
-static int holds_after_hop(hs_run *run, const hs_polynomial *piece, int k, const hs_crossing *crossing, hs_real end) {
-  const hs_trial *trial = &run->trial;
-  hs_real rate;
-  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
-  const hs_real back = -rate * trial->h;
-  if (!(back > 0)) return holds_next(run, k, crossing->time, crossing->state);
-  const hs_real s = crossing->theta + (1 - crossing->theta) * (back / (back + end));
-  at(run, piece, s, run->near);
-  return holds_next(run, k, trial->t + s * trial->h, run->near);
 }
 
 /* 1 where the trial's end is too deep beyond surface k, or its depth is not defined (`found` says which). */
@@ -208,28 +178,39 @@ static int too_deep(hs_run *run, int k, const hs_real *values, hs_found *found) 
 static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *crossing, hs_found *found) {
   hs_trial *trial = &run->trial;
   const hs_polynomial *piece = &trial->piece;
-  hs_real norm, inward;
+  const hs_real noise = run->noise[k];
+  hs_real norm, back, r;
   int status = piece_of(run, trial);
   if (status) return status;
   status = crossed_on(run, piece, k, crossing);
   if (status != 1) return status;
-  if (norm_of(run, trial->t1, run->z, k, &norm) || inward_of(run, k, crossing, &inward)) return RAISED;
-  if (inward != 0 && inward <= run->epsilon * norm) {
+  if (norm_of(run, trial->t1, run->z, k, &norm) || back_of(run, k, crossing, &back)) return RAISED;
+  if (back > noise && back <= run->epsilon * norm) { /* where the interpolant was off the flow leads back inside */
     if (trial->ends) {
       hermite(run, trial->h, &run->cubic);
       piece = &run->cubic;
     }
-    if (crossed_on(run, piece, k, crossing) == RAISED || inward_of(run, k, crossing, &inward)) return RAISED;
+    if (crossed_on(run, piece, k, crossing) == RAISED || back_of(run, k, crossing, &back)) return RAISED;
   }
-  if (inward != 0) return *found = failure(HS_INWARD, k), 0;
+  if (back > noise) return *found = failure(HS_INWARD, k), 0;
   status = condition(run, k, crossing->time, crossing->state);
-  if (!status && (crossing->theta == 0 || run->active_surfaces[k]))
-    status = holds_after_hop(run, piece, k, crossing, values[k]);
+  if (!status && (crossing->theta == 0 || run->active_surfaces[k])) {
+    const hs_real *q = crossing->state;
+    hs_time time = crossing->time;
+    if (back > 0) { /* where the flow comes back to the surface after a hop that round-off hides */
+      const hs_real s = crossing->theta + (1 - crossing->theta) * (back / (back + values[k]));
+      at(run, piece, s, run->near);
+      time = trial->t + s * trial->h, q = run->near;
+    }
+    status = holds_next(run, k, time, q);
+  }
   if (status != 1) return status;
   status = too_deep(run, k, values, found);
   if (status) return status == RAISED ? RAISED : 0;
-  status = deeper_before(run, piece, crossing->theta, k, values[k] + run->noise[k]);
-  if (status) return status == RAISED ? RAISED : (*found = failure(HS_DEEP, k), 0);
+  for (int i = 1; i < SCAN; i++) { /* further beyond on the way than at the end: that is on another flank */
+    if (on_piece(run, piece, k, crossing->theta + (1 - crossing->theta) * i / SCAN, &r)) return RAISED;
+    if (r > values[k] + noise) return *found = failure(HS_DEEP, k), 0;
+  }
   crossing->edge = k;
   crossing->depth = hs_min(run->epsilon, values[k] / norm);
   crossing->piece = piece;
