@@ -18,8 +18,7 @@ from fuzz import late, seeds
 from hsdsl.base import limits
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.functions import replaced
-from hsdsl.engine.backends.c import model_source
-from hsdsl.engine.backends.c.source import _HEAD
+from hsdsl.engine.backends.c.source import _HEAD, model_source
 from hsdsl.interface.model import Model
 from hsdsl.language.diagnose import as_json, render
 from hsdsl.language.elaborate import elaborate

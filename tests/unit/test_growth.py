@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hsdsl.engine.backends.c import model_source
+from hsdsl.engine.backends.c.source import model_source
 from hsdsl.language.elaborate import elaborate
 from hsdsl.mathematics.lower import lower
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.engine.backends.c import model_source
+from hsdsl.engine.backends.c.source import model_source
 from hsdsl.engine.runtime.compiler import FLAGS
 from hsdsl.engine.runtime.library import RUNTIME
 

@@ -191,15 +191,7 @@ def _operands(operation: Operation, language: TapeLanguage, name: Callable[[int]
     return named if operation.constant is None else named | {"c": language.constant(operation.constant)}
 
 
-HELPERS: dict[str, Any] = {
-    "behind": behind,
-    "few": few,
-    "power": power,
-    "product": product,
-    "range": range,
-    "root": root,
-    "square": square,
-}
+HELPERS: dict[str, Any] = {f.__name__: f for f in (behind, few, power, product, range, root, square)}
 INVERSE = "    inverse = [zero, *(one/m for m in range(1, order + 2))]"
 PYTHON = TapeLanguage(
     series="l{}".format,

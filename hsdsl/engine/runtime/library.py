@@ -280,6 +280,6 @@ def _longest(program: Program) -> str:
 
 
 def _source(program: Program) -> list[str]:
-    from hsdsl.engine.backends.c import model_parts  # what is compiled already needs none
+    from hsdsl.engine.backends.c.source import model_parts  # what is compiled already needs none
 
     return model_parts(program, limits.cores())

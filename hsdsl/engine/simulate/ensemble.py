@@ -72,18 +72,8 @@ class Kept:
 
 
 BY_INSTANCE = (
-    "reason",
-    "mode",
-    "kind",
-    "notices",
-    "transitions",
-    "ended",
-    "final",
-    "outputs",
-    "crossed",
-    "states",
-    "results",
-)
+    "reason", "mode", "kind", "notices", "transitions", "ended", "final", "outputs", "crossed", "states", "results",
+)  # fmt: skip
 
 
 class CompiledEnsemble:

@@ -16,8 +16,8 @@ from typing import Any
 from hsdsl.base.names import visible
 from hsdsl.base.numbers.arithmetic import FLOAT64, Arithmetic, Number
 from hsdsl.base.parts import layout_of
-from hsdsl.engine.backends.c import constant_bodies, derivatives, factors, initial_bodies, lines, width
 from hsdsl.engine.backends.c.routine import constant, literal
+from hsdsl.engine.backends.c.source import constant_bodies, derivatives, factors, initial_bodies, lines, width
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.structures import METHOD_KINDS, SCHEMES, Row, array_at, method_table
 from hsdsl.engine.simulate import Problem, Settings

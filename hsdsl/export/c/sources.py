@@ -12,7 +12,7 @@ from pathlib import Path
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible
-from hsdsl.engine.backends.c import model_source
+from hsdsl.engine.backends.c.source import model_source
 from hsdsl.engine.runtime.compiler import FLAGS
 from hsdsl.engine.runtime.library import RUNTIME
 from hsdsl.export.c.problem import comment, header, numbers

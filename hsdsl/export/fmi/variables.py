@@ -17,8 +17,8 @@ import numpy as np
 
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import numbered
-from hsdsl.engine.backends.c import constant_bodies, routine_functions
 from hsdsl.engine.backends.c.routine import literal
+from hsdsl.engine.backends.c.source import constant_bodies, routine_functions
 from hsdsl.engine.backends.python import compile_routines
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.simulate import Problem

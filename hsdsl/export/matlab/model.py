@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from hsdsl.base.names import visible
 from hsdsl.base.parts import layout_of
-from hsdsl.engine.backends.c import width
+from hsdsl.engine.backends.c.source import width
 from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text
 from hsdsl.engine.simulate import Problem
 from hsdsl.engine.simulate.control import LARGEST_SHARE

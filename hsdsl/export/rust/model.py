@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import layout_of
-from hsdsl.engine.backends.c import width
+from hsdsl.engine.backends.c.source import width
 from hsdsl.engine.backends.printer import number_text
 from hsdsl.engine.runtime.structures import method_table
 from hsdsl.engine.simulate import Problem

@@ -22,8 +22,8 @@ from hsdsl.base.graphs import closure
 from hsdsl.base.names import visible, without_memory
 from hsdsl.base.numbers.arithmetic import FLOAT64, TIE, Number
 from hsdsl.base.parts import layout_of, numbered
-from hsdsl.engine.backends.c import constant_bodies, switching_bodies, width
 from hsdsl.engine.backends.c.routine import literal
+from hsdsl.engine.backends.c.source import constant_bodies, switching_bodies, width
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate import Problem

@@ -47,44 +47,50 @@ static hs_polynomial polynomial(hs_store *store, const hs_run *run) {
   return piece;
 }
 
+/* Room for so many numbers, or marks, in each of some arrays; the last of them is 0. */
+static void take_each(hs_store *store, int64_t count, hs_real **const *each) {
+  for (; *each; each++) **each = numbers(store, count);
+}
+
+static void take_marks(hs_store *store, int64_t count, int **const *each) {
+  for (; *each; each++) **each = take(store, count, sizeof(int));
+}
+
+/* Stages of steps; those at the ends are arrays of the caller, where it has any. */
+static hs_real **take_stages(hs_store *store, const hs_run *run) {
+  const int all = run->method->stages + 1 + run->method->extra;
+  hs_real **const k = take(store, all, sizeof(hs_real *));
+  for (int i = 1; i < all; i++) {
+    hs_real *stage = numbers(store, run->width);
+    if (store->numbers) k[i] = stage;
+  }
+  return k;
+}
+
 /* Give every array of a run its place. */
 static void lay_out(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces, e = run->model->edges;
-  const int stages = run->method->stages, all = stages + 1 + run->method->extra;
-  hs_real **states[] = {&run->x,      &run->slope,   &run->z,     &run->end,    &run->at,   &run->scale,
-                       &run->entered, &run->after, &run->landed, &run->error, 0};
-  for (hs_real ***state = states; *state; state++) **state = numbers(store, w);
-  hs_real **own[] = {&run->scales, &run->resolved, &run->least, &run->unmoved, &run->near, &run->nearby,
-                    &run->flow_sizes, 0};
-  for (hs_real ***each = own; *each; each++) **each = numbers(store, w);
+  hs_real **const states[] = {
+      &run->x,      &run->slope, &run->z,      &run->end,      &run->at,         &run->scale,     &run->entered,
+      &run->after,  &run->landed, &run->error, &run->scales,   &run->resolved,   &run->least,     &run->unmoved,
+      &run->near,   &run->nearby, &run->flow_sizes, &run->cascade.x, &run->source, 0};
+  take_each(store, w, states);
   run->known = numbers(store, run->model->states);
   run->lifted = take(store, w, sizeof(int));
-  run->k = take(store, all, sizeof(hs_real *));
-  for (int i = 1; i < all; i++) {
-    hs_real *stage = numbers(store, w);
-    if (store->numbers) run->k[i] = stage;
-  }
-  if (store->numbers) run->k[0] = run->slope, run->k[stages] = run->end;
+  run->k = take_stages(store, run);
+  if (store->numbers) run->k[0] = run->slope, run->k[run->method->stages] = run->end;
   lay_out_method(run, store);
-  run->values = numbers(store, m);
-  run->ahead = numbers(store, m);
-  run->magnitudes = numbers(store, m);
-  run->begun = numbers(store, m);
-  run->noise = numbers(store, m);
+  hs_real **const values[] = {&run->values, &run->ahead, &run->magnitudes, &run->begun, &run->noise, &run->stood, 0};
+  take_each(store, m, values);
   run->gradient = numbers(store, w + 1);
   run->both = numbers(store, 2 * (int64_t)w);
-  run->active_surfaces = take(store, m, sizeof(int));
-  run->beyond = take(store, m, sizeof(int));
-  run->emerging = take(store, m, sizeof(int));
-  run->tied = take(store, e, sizeof(int));
-  run->alternatives = take(store, e, sizeof(int));
+  int **const marks[] = {&run->active_surfaces, &run->beyond, &run->emerging, &run->others, 0};
+  take_marks(store, m, marks);
+  int **const of_edges[] = {&run->tied, &run->alternatives, 0};
+  take_marks(store, e, of_edges);
   run->held_p = numbers(store, run->model->data + run->model->contacts);
-  run->others = take(store, m, sizeof(int));
   run->jacobian = numbers(store, run->model->derivatives);
-  run->stood = numbers(store, m);
   for (int i = 0; store->numbers && i < m; i++) run->stood[i] = 0.0;
-  run->cascade.x = numbers(store, w);
-  run->source = numbers(store, w);
   run->trial.piece = polynomial(store, run);
   run->cubic = polynomial(store, run);
   run->crossings = take(store, m, sizeof(hs_crossing));
@@ -110,26 +116,18 @@ static hs_span lay_out_span(const hs_run *run, hs_store *store) {
 
 /* The same for the arrays of the located scheme. */
 static void lay_out_located(hs_run *run, hs_store *store) {
-  const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1;
-  const int most = most_degree(run->method), all = run->method->stages + 1 + run->method->extra;
-  run->kept = take(store, m, sizeof(int));
-  run->held = take(store, m, sizeof(int));
-  run->tail = take(store, m, sizeof(int));
+  const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1, most = most_degree(run->method);
+  int **const marks[] = {&run->kept, &run->held, &run->tail, 0};
+  take_marks(store, m, marks);
   run->turn = numbers(store, 2 * (int64_t)w);
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
-  hs_real **states[] = {&run->q, &run->other_end, 0};
-  for (hs_real ***state = states; *state; state++) **state = numbers(store, w);
-  run->other_k = take(store, all, sizeof(hs_real *));
-  for (int i = 1; i < all; i++) {
-    hs_real *stage = numbers(store, w);
-    if (store->numbers) run->other_k[i] = stage;
-  }
-  run->ends = numbers(store, m);
-  run->starts = numbers(store, m);
-  run->middle = numbers(store, m);
+  hs_real **const states[] = {&run->q, &run->other_end, &run->began, 0};
+  hs_real **const values[] = {&run->ends, &run->starts, &run->middle, 0};
+  take_each(store, w, states);
+  run->other_k = take_stages(store, run);
+  take_each(store, m, values);
   run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
-  run->began = numbers(store, w);
   run->left = numbers(store, most + 1);
   run->bernstein = numbers(store, most + 1);
   run->binomials = numbers(store, (int64_t)(most + 1) * (most + 2) / 2);
