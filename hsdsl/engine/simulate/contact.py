@@ -104,8 +104,10 @@ def keeping(run: Run, here: ModeState, surfaces: Iterable[int]) -> list[int]:
                 continue
             if edges[k].push_order == 2:
                 sizes = sizes or flow_sizes(run, here, here.kernel.flow(here.t, *here.x))
-                if not is_tangent(run, here, k, sizes):
-                    continue
+                gradient = here.kernel.gradients[k](here.t, *here.x)
+                size = total((abs(g) * f for g, f in zip(gradient[1:], sizes, strict=True)), abs(gradient[0]))
+                if not abs(here.kernel.rates[k](here.t, *here.x)[0]) <= ZERO_UNITS * run.arithmetic.unit * size:
+                    continue  # the flow is not tangent to the surface, to round-off
         except DOMAIN_ERRORS:
             continue
         found.append(k)
@@ -217,14 +219,6 @@ def pressed(run: Run, here: ModeState, k: int, t: Number, x: State, touched: Col
             after = max(after, ZERO_UNITS * run.arithmetic.unit * sizes[i] / abs(slope[i]))
     after = after or run.arithmetic.unit * run.settings.until  # where these states have been zero only
     return tuple(a + after * f for a, f in zip(x, slope, strict=True))
-
-
-def is_tangent(run: Run, here: ModeState, k: int, sizes: Vector) -> bool:
-    """Whether the flow, of these sizes, is tangent to surface k, to round-off."""
-    t, x = here.t, here.x
-    gradient = here.kernel.gradients[k](t, *x)
-    size = total((abs(g) * f for g, f in zip(gradient[1:], sizes, strict=True)), abs(gradient[0]))
-    return abs(here.kernel.rates[k](t, *x)[0]) <= ZERO_UNITS * run.arithmetic.unit * size
 
 
 def in_contact(run: Run, here: ModeState, holding: Sequence[int], looked_at: Sequence[int] = ()) -> ModeState:

@@ -112,11 +112,6 @@ class Control:
             worst = max(worst, abs(e) / (tolerance * size) if size > 0 else 1 / tolerance)
         return worst
 
-    def looks_closer(self, t: Number) -> bool:
-        """Whether to look closer at a step from t that is too wrong: at the second, or where that helped before."""
-        again, self.failed_at = t == self.failed_at, t
-        return self.closer or again
-
     def factor(self, ratio: Number) -> Number:
         """Factor from one step to the next."""
         if ratio == 0 or self.power is None:
@@ -187,7 +182,10 @@ def error_ratio(
     control, had = run.control, here.arc.scales
     scales: Sequence[Number] = had if method.scales is None else method.scales(False)
     ratio = control.ratio(h, error, z, scales, had)
-    if not ratio > 1 or not control.looks_closer(t):
+    if not ratio > 1:
+        return ratio
+    again, control.failed_at = t == control.failed_at, t
+    if not (control.closer or again):  # at the second step from t that is too wrong, or where that helped before
         return ratio
     try:
         if method.scales is not None:

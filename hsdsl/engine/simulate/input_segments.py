@@ -9,7 +9,7 @@ the run, a last segment of no length has the values behind the jump.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
@@ -93,16 +93,9 @@ def make_timeline(
         held_before = held
     if program.switches:
         segments = _switched(program, kernel, segments, until)
-    return Timeline(tuple(_ended(segments, until)))
-
-
-def _ended(segments: list[Segment], until: Number) -> Iterator[Segment]:
-    """Let the segments end with the run, at a jump there with one of no length."""
-    for segment in segments:
-        if segment.start < until or until == 0:
-            yield segment
-        elif segment.start == until and segment.jump:
-            yield Segment(until, until, segment.data, jump=True)
+    inside = [segment for segment in segments if segment.start < until or until == 0]
+    jumps_at_end = (segment for segment in segments[len(inside) :] if segment.start == until and segment.jump)
+    return Timeline((*inside, *(Segment(until, until, segment.data, jump=True) for segment in jumps_at_end)))
 
 
 def _switched(program: Program, kernel: Kernel, segments: list[Segment], until: Number) -> list[Segment]:

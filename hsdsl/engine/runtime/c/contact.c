@@ -81,17 +81,6 @@ static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   return still;
 }
 
-/* Whether the flow, of these sizes, is tangent to surface k, to round-off. */
-static int is_tangent(hs_run *run, hs_time t, const hs_real *x, int k) {
-  const hs_mode_state *here = &run->here;
-  const hs_sparse *const row = &here->table->gradients[k];
-  hs_real rate, size = 0.0;
-  if (row->values(here->p, t, x, run->gradient) || here->table->rates[k](here->p, t, x, &rate)) return RAISED;
-  for (int i = 0; i < row->count; i++)
-    size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
-  return fabs(rate) <= ZERO_UNITS * HS_UNIT * size;
-}
-
 /* Number the marks of walls anew where a table has `more` edges than the one before. */
 static void move_walls(int *marks, const hs_mode *from, int more) {
   if (more > 0)
@@ -189,7 +178,12 @@ static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
     if (!marked || edge->contact < 0 || !run->task->settings.contacts || keeps(run, t, x, k) != 1) continue;
     if (edge->push_order == 2) {
       if (!sized) sized = here->table->flow(here->p, t, x, run->end) || flow_sizes(run, t, x, run->end) ? -1 : 1;
-      if (sized < 0 || is_tangent(run, t, x, k) != 1) continue;
+      const hs_sparse *const row = &here->table->gradients[k];
+      hs_real rate, size = 0.0;
+      if (sized < 0 || row->values(here->p, t, x, run->gradient) || here->table->rates[k](here->p, t, x, &rate)) continue;
+      for (int i = 0; i < row->count; i++)
+        size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
+      if (!(fabs(rate) <= ZERO_UNITS * HS_UNIT * size)) continue; /* the flow is not tangent to it, to round-off */
     }
     count += marks[k] = 1;
   }
