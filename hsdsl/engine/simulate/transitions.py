@@ -1,5 +1,8 @@
 """One transition: which crossing goes, its reset, the executions that wait, the mode that is entered, and cascades.
 
+The *spread* of a reset is the sum of the sizes of the terms that each state behind it is computed from: its
+round-off is relative to that.
+
 A mode is entered at the start, after a reset, at a jump of an input. A state that enters beyond a surface without an
 `if` is outside the domain: that transition fires at once, without a strip, and so may the next; the walls are looked at
 when no such transition is left. A *cascade* is transitions that follow each other without any flow between them: where

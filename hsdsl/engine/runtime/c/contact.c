@@ -1,5 +1,6 @@
 /* Guards that hold the state, motion along them, and Zeno tails replaced by their limit there.
-   See hsdsl/engine/simulate/contact.py. A status is 0, or RAISED where a routine has no value. */
+   See hsdsl/engine/simulate/contact.py, which defines holding, pushes and tails.
+   A status is 0, or RAISED where a routine has no value. */
 
 #define SAME_UNITS 4
 #define ZERO_UNITS 16
@@ -92,8 +93,8 @@ static void move_walls(int *marks, const hs_mode *from, int more) {
 
 /* Count the surfaces that the state is on. */
 static void count_active(hs_run *run) {
-  run->here.standing = 0;
-  for (int j = 0; j < run->here.table->surfaces; j++) run->here.standing += run->active_surfaces[j];
+  run->here.active = 0;
+  for (int j = 0; j < run->here.table->surfaces; j++) run->here.active += run->active_surfaces[j];
 }
 
 /* The number of a contact of the state's mode: 0, HS_LOOKED_AT or HS_HELD. */
@@ -275,7 +276,7 @@ static int contact_at(hs_run *run) {
   hs_mode_state *const here = &run->here;
   const hs_mode *const own = here->table;
   int *const kept = run->kept, *const held = run->held, any = 0, first = -1;
-  if (!here->standing || own->held < 0 || here->dimension != own->dimension || !here->dimension) return GOES_ON;
+  if (!here->active || own->held < 0 || here->dimension != own->dimension || !here->dimension) return GOES_ON;
   for (int k = 0; k < own->edges; k++) kept[k] = run->active_surfaces[k];
   const int count = keeping(run, here->t, run->x, kept);
   if (!count) return GOES_ON;
@@ -715,7 +716,7 @@ static int close_tail(hs_run *run, int k) {
   here->table->values(here->p, end, run->x, run->ahead);
   enter_surfaces(run, end, 0.0, 0, end);
   for (int j = 0; j < own->edges; j++)
-    if (run->tail[j] && !run->active_surfaces[j]) run->active_surfaces[j] = 1, here->standing++;
+    if (run->tail[j] && !run->active_surfaces[j]) run->active_surfaces[j] = 1, here->active++;
   return GOES_ON;
 }
 

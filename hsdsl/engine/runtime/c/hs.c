@@ -248,7 +248,7 @@ static void save(hs_run *run, hs_pause *pause, int outcome) {
   const hs_mode_state *here = &run->here;
   pause->ended = outcome != PAUSED;
   pause->mode = here->mode, pause->dimension = here->dimension;
-  pause->standing = here->standing, pause->emerging = here->emerging;
+  pause->active = here->active, pause->emerging = here->emerging;
   pause->time = here->t;
   pause->control = run->control;
   pause->placed = run->placed, pause->jump = run->jump, pause->row = run->row;
@@ -266,7 +266,7 @@ static void restore(hs_run *run, hs_pause *pause) {
   here->mode = pause->mode, here->dimension = pause->dimension;
   here->table = &run->model->mode[pause->mode];
   here->p = pause->data;
-  here->standing = pause->standing, here->emerging = pause->emerging;
+  here->active = pause->active, here->emerging = pause->emerging;
   here->t = pause->time;
   run->control = pause->control;
   run->placed = pause->placed, run->jump = pause->jump, run->row = pause->row;

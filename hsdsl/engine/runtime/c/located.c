@@ -437,7 +437,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
 /* Whether a crossing's state is on a surface that the state was on that it came from, or one holds it: 1, 0 or RAISED. */
 static int stands(hs_run *run, const hs_crossing *crossing) {
   int stood = run->here.p == run->held_p;
-  for (int k = 0; run->here.standing && k < run->here.table->surfaces && !stood; k++) {
+  for (int k = 0; run->here.active && k < run->here.table->surfaces && !stood; k++) {
     hs_real r, noise;
     if (!run->active_surfaces[k]) continue;
     if (surface(run, k, crossing->time, crossing->state, &r)) return RAISED;
@@ -609,7 +609,7 @@ static int follow(hs_run *run, hs_time limit) {
       return HS_STEP_NOT_FINITE;
     }
     if (event != GOES_ON) return event;
-    if (here->standing) leave(run, run->span.t1, run->z);
+    if (here->active) leave(run, run->span.t1, run->z);
     HS_MOVE(run, move_along(run, run->span.t1, run->z, run->span.h));
     append(run, run->span.t1, run->z, &run->span.piece);
     go_to_end(run);
@@ -630,11 +630,11 @@ static void drop_releases(hs_run *run) {
 static int released(hs_run *run, hs_time t, int at_once) {
   hs_mode_state *const here = &run->here;
   be_held_exactly(run, t, run->x, -1);
-  if (at_once >= 0 && run->active_surfaces[at_once]) run->active_surfaces[at_once] = 0, here->standing--;
-  const int standing_before = here->standing;
+  if (at_once >= 0 && run->active_surfaces[at_once]) run->active_surfaces[at_once] = 0, here->active--;
+  const int standing_before = here->active;
   copy(run->scale, run->landed, here->dimension);
   place(run, here->mode, here->dimension, t, 0);
-  here->standing = standing_before;
+  here->active = standing_before;
   return GOES_ON;
 }
 
@@ -720,7 +720,7 @@ static int jump(hs_run *run) {
   const int mode = run->here.mode;
   hs_time resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
-  if (crossing->theta == 0 && run->here.standing) stand(run, run->active_surfaces, run->here.table->surfaces);
+  if (crossing->theta == 0 && run->here.active) stand(run, run->active_surfaces, run->here.table->surfaces);
   if (edge->target != mode)
     for (int j = 0; j < run->model->surfaces; j++) run->stood[j] = 0.0;
   HS_MOVE(run, move_crossing(run));

@@ -396,7 +396,7 @@ static int flow(hs_run *run) {
       if (given_up != HS_CLEAR) return stuck(run, given_up, last.surface);
     }
     if (adaptive && chatters(run, n, t1)) return stuck(run, HS_JUMP, -1);
-    if (here->standing || here->emerging) leave(run, t1, run->z);
+    if (here->active || here->emerging) leave(run, t1, run->z);
     const hs_polynomial *const piece = curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0;
     HS_MOVE(run, move_along(run, t1, run->z, h));
     append(run, t1, run->z, piece);
@@ -470,7 +470,7 @@ static int continued(hs_run *run, int jumped) {
     return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1, t);
   }
   place(run, run->here.mode, run->here.dimension, t, 0);
-  run->here.standing = before.standing, run->here.emerging = before.emerging;
+  run->here.active = before.active, run->here.emerging = before.emerging;
   return GOES_ON;
 }
 

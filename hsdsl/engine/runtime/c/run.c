@@ -71,7 +71,7 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
     here.outputs = before->table->outputs;
     here.outputs_p = before->p;
   }
-  here.standing = here.emerging = 0;
+  here.active = here.emerging = 0;
   here.t = t;
   hand_on_scales(run, run->here.table, here.table);
   run->here = here;

@@ -68,7 +68,7 @@ typedef struct {
   const hs_real *p;
   hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
   const hs_real *outputs_p;
-  int standing, emerging;  /* numbers of surfaces in active_surfaces and in run->emerging */
+  int active, emerging;    /* numbers of surfaces in active_surfaces and in run->emerging */
   hs_time t;
 } hs_mode_state;
 
@@ -271,7 +271,7 @@ typedef struct {
    HS_PAUSE_NUMBERS and HS_PAUSE_INTEGERS of the others (workspace.h). `ended` says that it does not go on: see the
    task's stop. Its time is behind the pause where it waits in a strip. */
 typedef struct {
-  int ended, mode, dimension, standing, emerging, noted_crowded, cascade_mode;
+  int ended, mode, dimension, active, emerging, noted_crowded, cascade_mode;
   long cascade_length, cascade_room;
   int64_t placed, jump, row;
   hs_time time;

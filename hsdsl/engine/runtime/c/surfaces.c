@@ -1,5 +1,6 @@
 /* A mode's surfaces at a point, as polynomials along a step, and where polynomials rise.
-   See hsdsl/engine/simulate/surfaces.py. A status is 0, or RAISED where a routine has no value. */
+   See hsdsl/engine/simulate/surfaces.py, which defines when a surface is active or emerging.
+   A status is 0, or RAISED where a routine has no value. */
 
 #define ROOT_ITERATIONS 200
 
@@ -100,13 +101,13 @@ static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_
       noise = hs_max(noise, fabs(rate) * since);
     }
     if (values[k] > noise && !(then[k] > noise)) {
-      run->active_surfaces[k] = 1, run->here.standing++;
+      run->active_surfaces[k] = 1, run->here.active++;
       if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
       if (rate < 0) run->emerging[k] = 1, run->here.emerging++;
     } else if (values[k] > noise || (inside && values[k] >= -noise))
       beyond[k] = 1;
     else if (values[k] >= -noise)
-      run->active_surfaces[k] = 1, run->here.standing++;
+      run->active_surfaces[k] = 1, run->here.active++;
   }
   return 0;
 }
@@ -133,7 +134,7 @@ static void leave(hs_run *run, hs_time t, const hs_real *x) {
   for (int k = 0; !raised && k < mode->surfaces; k++) {
     if (!run->active_surfaces[k]) continue;
     if (fabs(run->values[k]) > bound_from(run, run->magnitudes, k, t, x, 0))
-      run->active_surfaces[k] = 0, run->here.standing--;
+      run->active_surfaces[k] = 0, run->here.active--;
   }
   for (int k = 0; run->here.emerging && k < mode->surfaces; k++) {
     hs_real rate = 0.0;

@@ -1,5 +1,6 @@
 /* One transition: which crossing goes, its reset, executions of events that wait, the mode that is entered, and cascades
-   of transitions without flow between them. See hsdsl/engine/simulate/transitions.py. */
+   of transitions without flow between them. See hsdsl/engine/simulate/transitions.py.
+   The spread of a reset is the sum of the sizes of the terms that each state behind it is computed from. */
 
 /* Whether edge `a` goes before edge `b` of those tied: the higher priority, then the file's order. */
 static int goes_before(const hs_mode *mode, int a, int b) {
