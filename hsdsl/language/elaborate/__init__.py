@@ -45,11 +45,10 @@ from hsdsl.language.elaborate.scene import elaborate_scene, scene_of
 from hsdsl.language.elaborate.symbols import SymbolTable
 from hsdsl.language.elaborate.timers import with_timers
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
-from hsdsl.language.expression.stack import deep_stack
 from hsdsl.language.expression.syntax import ExpressionError
-from hsdsl.language.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
 from hsdsl.language.files import ModelFiles
-from hsdsl.language.schema import AutomatonDocument, ModelDocument, SystemDocument, read
+from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, SystemDocument, read
 from hsdsl.language.source import Node, Text, compose, decode
 from hsdsl.language.system import HybridSystem, switch_parameter
 
@@ -100,23 +99,46 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
 
     Raises ModelError: the model has errors; all of them are carried, in source order.
     """
+    findings = Findings(files.path)
     with limits.applied(files.limits):
-        findings = Findings(files.path)
         text = decode(files.path, files.text)
         root = compose(text, findings)
         data = read_automata(root, files, findings)
+        known = dict(findings.diagnostics)
         document = read(root, findings)
-        symbols = SymbolTable(document, ExpressionResolver(findings), files, data=data, drivable=drivable)
+        whole = known == findings.diagnostics
         try:
-            with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
-                system = with_events(_system(symbols))
-                system = with_timers(system) if symbols.timed else system
-        except OutOfTime:
-            _report_timeout(symbols.resolver)
-        except ValueError as error:  # a check at birth that no diagnostic foresaw
-            raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
-        top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
-        return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
+            symbols = SymbolTable(document, ExpressionResolver(findings), files, data=data, drivable=drivable)
+            return _elaborated(symbols, root, text)
+        except ModelError:
+            renamed = Findings(files.path, known)
+            if not (whole and _with_states_renamed(root, renamed)):
+                raise
+            document = read(root, renamed)
+            symbols = SymbolTable(document, ExpressionResolver(renamed), files, data=data, drivable=drivable)
+            return _elaborated(symbols, root, text)
+
+
+def _with_states_renamed(root: Node, findings: Findings) -> bool:
+    """Whether states are misspelt; these are reported, and renamed in the nodes."""
+    from hsdsl.language.diagnosis.corrections import rename_states
+
+    before = len(findings.diagnostics)
+    rename_states(root, findings)
+    return len(findings.diagnostics) > before
+
+
+def _elaborated(symbols: SymbolTable, root: Node, text: Text) -> Elaboration:
+    try:
+        with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
+            system = with_events(_system(symbols))
+            system = with_timers(system) if symbols.timed else system
+    except OutOfTime:
+        _report_timeout(symbols.resolver)
+    except ValueError as error:  # a check at birth that no diagnostic foresaw
+        raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
+    top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
+    return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
 
 
 def _report_timeout(resolver: ExpressionResolver) -> NoReturn:

@@ -10,7 +10,7 @@ from hsdsl.base.names import did_you_mean, shown
 from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.language.expression.scope import Scope, Value, symbol
-from hsdsl.language.schema import AutomatonDocument, ModelDocument, ParameterEntry
+from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, ParameterEntry
 from hsdsl.language.source import Scalar
 from hsdsl.language.system import Definition, Parameter
 

@@ -14,10 +14,10 @@ from hsdsl.base.names import SINCE, did_you_mean, shown
 from hsdsl.base.parts import numbers_of
 from hsdsl.language.elaborate.resolver import ExpressionResolver
 from hsdsl.language.elaborate.symbols import SymbolTable
+from hsdsl.language.expression.algebra import by_constants
+from hsdsl.language.expression.conditions import Trigger, comparisons
 from hsdsl.language.expression.scope import Scope, symbol
-from hsdsl.language.expression.selection import by_constants
-from hsdsl.language.expression.trigger import Trigger, comparisons
-from hsdsl.language.schema import ModeDocument, TransitionDocument
+from hsdsl.language.schema.documents import ModeDocument, TransitionDocument
 from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import ZERO, Edge, Event, Surface
 

@@ -13,7 +13,7 @@ from hsdsl.language.elaborate.edges import known_mode
 from hsdsl.language.elaborate.symbols import SymbolTable
 from hsdsl.language.expression.scope import Scope, Value, state
 from hsdsl.language.expression.syntax import Name, walk
-from hsdsl.language.schema import MultiplesDocument
+from hsdsl.language.schema.documents import MultiplesDocument
 from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import Experiment, Initial, started
 

@@ -11,7 +11,7 @@ from hsdsl.base.graphs import cycle
 from hsdsl.language.elaborate.symbols import KINDS, Meanings, SymbolTable
 from hsdsl.language.expression import parse
 from hsdsl.language.expression.scope import Function, Meaning, Refusal, Scope, Value, functions_called, symbol
-from hsdsl.language.schema import FunctionDocument
+from hsdsl.language.schema.documents import FunctionDocument
 from hsdsl.language.source import ABSENT, Key
 from hsdsl.language.system import FunctionText
 

@@ -19,7 +19,7 @@ from hsdsl.base.samples import Hold, in_order
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable
 from hsdsl.language.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.language.files import DataRefused
-from hsdsl.language.schema import InputFile, InputSamples
+from hsdsl.language.schema.documents import InputFile, InputSamples
 from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import SampledInput
 

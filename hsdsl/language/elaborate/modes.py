@@ -15,7 +15,7 @@ from hsdsl.language.elaborate.resolver import all_of
 from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.language.elaborate.symbols import KINDS, Meanings, SymbolTable, definition_order
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state
-from hsdsl.language.schema import ModeDocument
+from hsdsl.language.schema.documents import ModeDocument
 from hsdsl.language.source import Key, Scalar
 from hsdsl.language.system import Mode
 

@@ -12,8 +12,8 @@ from typing import Any
 
 from hsdsl.base.functions import replaced
 from hsdsl.base.parts import numbered, numbers_of, present, product_name
+from hsdsl.language.expression.algebra import ONE, is_number, whole
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import ONE, is_number, whole
 from hsdsl.language.system import Edge, HybridSystem, Initial, Mode, Surface
 
 

@@ -7,7 +7,7 @@ from hsdsl.base.names import did_you_mean, shown
 from hsdsl.language.elaborate.edges import known_mode
 from hsdsl.language.elaborate.symbols import SymbolTable
 from hsdsl.language.expression.scope import Scope
-from hsdsl.language.schema import (
+from hsdsl.language.schema.documents import (
     ExperimentDocument,
     ReferenceDocument,
     ReferenceStateDocument,

@@ -10,11 +10,10 @@ from typing import Any, TypeVar
 from hsdsl.base.errors import Findings
 from hsdsl.base.names import shown
 from hsdsl.language.expression import Expected, ExpressionError, numeric, parse, symbolic
-from hsdsl.language.expression.inequality import Inequality, equation, inequality, the_comparison
+from hsdsl.language.expression.conditions import Inequality, Trigger, equation, inequality, the_comparison, trigger_of
 from hsdsl.language.expression.scope import Scope, Value
 from hsdsl.language.expression.syntax import Call, Tree
 from hsdsl.language.expression.timebox import Box
-from hsdsl.language.expression.trigger import Trigger, trigger_of
 from hsdsl.language.source import ABSENT, Scalar, SourceRange
 
 T = TypeVar("T")

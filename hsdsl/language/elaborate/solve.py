@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from hsdsl.base.names import counted
 from hsdsl.language.elaborate.symbols import KINDS, Meanings, SymbolTable
-from hsdsl.language.expression.equations import Solved, linear_solutions
+from hsdsl.language.expression.algebra import Solved, linear_solutions
 from hsdsl.language.expression.scope import Scope, Value, symbol
-from hsdsl.language.schema import SolveDocument
+from hsdsl.language.schema.documents import SolveDocument
 
 
 def placeholders(document: SolveDocument | None, mode: str = "") -> Meanings:

@@ -12,7 +12,7 @@ from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.resolver import ExpressionResolver, all_of
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, state
 from hsdsl.language.files import ModelFiles
-from hsdsl.language.schema import ModeDocument, ModelDocument
+from hsdsl.language.schema.documents import ModeDocument, ModelDocument
 from hsdsl.language.source import ABSENT, Key, Scalar, SourceRange
 from hsdsl.language.system import TIME
 

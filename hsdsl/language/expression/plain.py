@@ -8,7 +8,7 @@ from typing import Any
 
 from hsdsl.base.functions import CONSTANTS
 from hsdsl.language.expression import symbolic
-from hsdsl.language.expression.inequality import the_comparison
+from hsdsl.language.expression.conditions import the_comparison
 from hsdsl.language.expression.parse import parse
 from hsdsl.language.expression.scope import Function, Scope, state
 from hsdsl.language.expression.syntax import Call, Expected, Name, Tree, mapped, walk

@@ -11,9 +11,8 @@ from hsdsl.base import functions
 from hsdsl.base.functions import CONSTANTS, FUNCTIONS
 from hsdsl.base.names import shown
 from hsdsl.language.expression import bounds, numeric, syntax
-from hsdsl.language.expression.expression_hints import CASES
+from hsdsl.language.expression.algebra import chosen
 from hsdsl.language.expression.scope import Function, Scope, Value
-from hsdsl.language.expression.selection import chosen
 from hsdsl.language.expression.syntax import CONDITIONS, ExpressionError, Tree, children
 
 _RELATIONS = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge, "==": sp.Eq, "!=": sp.Ne}
@@ -70,10 +69,11 @@ class _Builder:
     def number(self, tree: Tree) -> Value:
         """The value of a node that must be a number."""
         if isinstance(tree, CONDITIONS):
+            from hsdsl.language.diagnosis.expressions import CASES
+
             hint = f"write {int(tree.value)}" if isinstance(tree, syntax.Truth) else CASES
-            raise ExpressionError.at(
-                tree, "HS114", f"expected a number, got the condition `{self.text_of(tree)}`", hint
-            )
+            message = f"expected a number, got the condition `{self.text_of(tree)}`"
+            raise ExpressionError.at(tree, "HS114", message, hint)
         match tree:
             case syntax.Number():
                 expr: Any = sp.Rational(tree.value.numerator, tree.value.denominator)

@@ -16,7 +16,7 @@ from sympy.core.relational import Relational
 
 from hsdsl.base.functions import sign
 from hsdsl.base.names import memory, without_memory
-from hsdsl.language.expression.derivatives import derivative, lie_derivative
+from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.system import TIME, Edge, Mode, Surface
 from hsdsl.mathematics.completion.branches import branched
 from hsdsl.mathematics.completion.counts import counts_of

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import sympy as sp
 
-from hsdsl.language.expression.derivatives import derivative
+from hsdsl.language.expression.algebra import derivative
 from hsdsl.language.system import TIME
 from hsdsl.mathematics.completion.contact import Contact
 from hsdsl.mathematics.completion.nearby import MOST_NODES, cancelled, size

@@ -14,7 +14,7 @@ import sympy as sp
 
 from hsdsl.base.functions import below
 from hsdsl.base.numbers.arithmetic import Number, multiprecision
-from hsdsl.language.expression.derivatives import derivative, lie_derivative
+from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.scope import slope_symbol, symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 

@@ -14,7 +14,7 @@ import sympy as sp
 
 from hsdsl.base.functions import absolute, below
 from hsdsl.base.parts import numbered
-from hsdsl.language.expression.derivatives import lie_derivative
+from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
 from hsdsl.mathematics.completion.contact import Contact, contact

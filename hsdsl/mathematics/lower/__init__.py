@@ -21,8 +21,7 @@ import sympy as sp
 from hsdsl.base import limits
 from hsdsl.base.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.language.expression.scope import slope_symbol
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.timebox import OutOfTime, timebox
+from hsdsl.language.expression.timebox import OutOfTime, deep_stack, timebox
 from hsdsl.language.system import HybridSystem, SampledInput
 from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.completion import Overlay, overlays

@@ -7,7 +7,7 @@ import sympy as sp
 
 from hsdsl.base.functions import replaced
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import HybridSystem
 from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.lower.names import Names, number

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import TIME, HybridSystem
 from hsdsl.mathematics.completion import overlays
 from hsdsl.mathematics.lower.mode import LoweredMode, lowered_overlay

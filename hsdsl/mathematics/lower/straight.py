@@ -14,7 +14,7 @@ from itertools import accumulate
 import sympy as sp
 
 from hsdsl.base.functions import rebuilt, solution
-from hsdsl.language.expression.derivatives import derivative, moving
+from hsdsl.language.expression.algebra import derivative, moving
 from hsdsl.mathematics.lower.elimination import solved
 from hsdsl.mathematics.lower.printer import LARGEST_PRODUCT
 from hsdsl.mathematics.lower.sharing import Statement, shared

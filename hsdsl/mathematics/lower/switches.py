@@ -16,8 +16,8 @@ from typing import Any
 import sympy as sp
 
 from hsdsl.base.functions import absolute, atan2, floor, maximum, minimum, replaced, rewritten, sign
+from hsdsl.language.expression.algebra import by_constants
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import by_constants
 from hsdsl.language.system import TIME, HybridSystem, Mode
 from hsdsl.mathematics.lower.routines import Definition
 from hsdsl.mathematics.lower.straight import Gradient

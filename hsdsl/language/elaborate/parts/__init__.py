@@ -23,9 +23,9 @@ from hsdsl.language.elaborate.parts.starts import Starts
 from hsdsl.language.elaborate.scene import elaborate_scene
 from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, definition_order
+from hsdsl.language.expression.algebra import NO_VALUE, ZERO, whole
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state
-from hsdsl.language.expression.selection import NO_VALUE, ZERO, whole
-from hsdsl.language.schema import PartModeDocument, SystemDocument
+from hsdsl.language.schema.documents import PartModeDocument, SystemDocument
 from hsdsl.language.source import Key
 from hsdsl.language.system import Initial, Mode, Parameter, Shape, started
 

@@ -11,8 +11,8 @@ from typing import Any
 from hsdsl.base.names import SINCE
 from hsdsl.language.elaborate.parts.names import Board
 from hsdsl.language.elaborate.parts.transitions import Event, PartTransition
+from hsdsl.language.expression.algebra import ONE, ZERO, either, is_mode, select, total, truth_of, whole
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import ONE, ZERO, either, is_mode, select, total, truth_of, whole
 
 
 @dataclass

@@ -18,8 +18,8 @@ from hsdsl.language.elaborate.parts.broadcast import Broadcast
 from hsdsl.language.elaborate.parts.instances import Instance
 from hsdsl.language.elaborate.parts.names import Board, Names
 from hsdsl.language.elaborate.parts.transitions import PartTransition, transitions_of
+from hsdsl.language.expression.algebra import ONE, ZERO, pick
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import ONE, ZERO, pick
 from hsdsl.language.system import Edge, Mode, Surface
 
 MODE, FINAL = "system", "final"

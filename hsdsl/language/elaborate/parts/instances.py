@@ -10,7 +10,7 @@ from functools import cached_property
 from hsdsl.base.names import closest, did_you_mean, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.symbols import KINDS, SymbolTable
-from hsdsl.language.schema import AutomatonDocument, InstanceDocument, PartModeDocument, SystemDocument
+from hsdsl.language.schema.documents import AutomatonDocument, InstanceDocument, PartModeDocument, SystemDocument
 from hsdsl.language.source import ABSENT, Key
 
 MOST = 10_000  # of one name

@@ -18,11 +18,11 @@ from hsdsl.language.elaborate.parts.instances import Instance, Roster
 from hsdsl.language.elaborate.resolver import resolved_expression
 from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable
-from hsdsl.language.expression import ExpressionError, parse, selection, syntax
+from hsdsl.language.expression import ExpressionError, algebra, parse, syntax
 from hsdsl.language.expression.plain import RANGES
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.language.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
-from hsdsl.language.schema import PartModeDocument
+from hsdsl.language.schema.documents import PartModeDocument
 from hsdsl.language.source import Key, Scalar
 
 MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
@@ -233,7 +233,7 @@ class Board:
             if lacks and not lenient:
                 message = f"'{attribute}' has no value in the mode '{mode}' of '{one.automaton}'"
                 return Refusal("HS354", message, f"define it there, too, under `let`: {{{attribute}: ...}}")
-            values.append(Value(selection.NO_VALUE) if lacks else value)  # pyright: ignore[reportArgumentType]
+            values.append(Value(algebra.NO_VALUE) if lacks else value)  # pyright: ignore[reportArgumentType]
         return self.picked(one, values)
 
     def lacks(self, scalar: Scalar, names: Names) -> bool:
@@ -255,7 +255,7 @@ class Board:
         """One value of several, by the mode of an instance; in modes without one it is that of another."""
         known = [value for value in given if value is not None] or [whole_value(0)]
         values = [value or known[0] for value in given]
-        expr = selection.pick(symbol(one.name), [value.expr for value in values], self.constants)
+        expr = algebra.pick(symbol(one.name), [value.expr for value in values], self.constants)
         size, depth = sum(value.size for value in values), max(value.depth for value in values)
         return Value(expr, size=size, depth=depth, bits=max(value.bits for value in values))
 

@@ -12,7 +12,7 @@ from hsdsl.language.elaborate.edges import event_of, of_events, surface, unnamed
 from hsdsl.language.elaborate.parts.instances import Instance
 from hsdsl.language.elaborate.parts.names import MEMBER, Board, Names
 from hsdsl.language.expression.scope import Refusal
-from hsdsl.language.schema import PartModeDocument, PartTransitionDocument
+from hsdsl.language.schema.documents import PartModeDocument, PartTransitionDocument
 from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import Event as Rising
 from hsdsl.language.system import Surface
