@@ -13,7 +13,7 @@ from hsdsl.export.latex.escaping import escaped
 from hsdsl.export.latex.layout import equations, stacked
 from hsdsl.export.latex.mathematics import Mathematics
 from hsdsl.export.source import Source
-from hsdsl.language.elaborate.functions import named_functions
+from hsdsl.language.elaborate.definitions import named_functions
 from hsdsl.language.expression.plain import names_in
 from hsdsl.language.expression.scope import state
 from hsdsl.language.schema.documents import ModeDocument, ModelDocument, TransitionDocument

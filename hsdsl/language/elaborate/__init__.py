@@ -27,25 +27,23 @@ from hsdsl.base.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageE
 from hsdsl.base.names import SINCE
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.definitions import (
+    define_functions,
     define_lets,
     define_parameters,
     elaborate_units,
+    named_functions,
     substituted_definitions,
 )
+from hsdsl.language.elaborate.derived import with_timers
 from hsdsl.language.elaborate.events import with_events
-from hsdsl.language.elaborate.experiment import elaborate_experiment, elaborate_initial
-from hsdsl.language.elaborate.functions import define_functions, named_functions
+from hsdsl.language.elaborate.experiment import elaborate_experiment, elaborate_initial, elaborate_reference
 from hsdsl.language.elaborate.inputs import define_inputs, switch_name
-from hsdsl.language.elaborate.modes import elaborate_modes, elaborate_outputs
+from hsdsl.language.elaborate.modes import elaborate_modes, elaborate_outputs, elaborate_scene, scene_of
 from hsdsl.language.elaborate.parts import Parts
-from hsdsl.language.elaborate.parts.files import read_automata
-from hsdsl.language.elaborate.reference import elaborate_reference
-from hsdsl.language.elaborate.resolver import ExpressionResolver, resolved_expression
-from hsdsl.language.elaborate.scene import elaborate_scene, scene_of
-from hsdsl.language.elaborate.symbols import SymbolTable
-from hsdsl.language.elaborate.timers import with_timers
+from hsdsl.language.elaborate.parts.instances import read_automata
+from hsdsl.language.elaborate.symbols import ExpressionResolver, SymbolTable, resolved_expression
+from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
-from hsdsl.language.expression.syntax import ExpressionError
 from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
 from hsdsl.language.files import ModelFiles
 from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, SystemDocument, read

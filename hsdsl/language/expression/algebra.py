@@ -1,14 +1,8 @@
-# pyright: basic
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false, reportReturnType=false
-# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportReturnType=false
-"""Selections: one of several expressions, by the number of a mode or by a truth.
+"""What SymPy expressions are made of besides sums and products: choices, derivatives, solutions of linear equations.
 
-A truth is a number, 1 or 0. All expressions of a selection are computed, so each gets arguments that have a value where
-it is not selected.
-
-MERGE: write one docstring of these.
-`derivatives` was: Derivatives of expressions by symbols, almost everywhere.
-`equations` was: Systems of linear equations: their solutions, as functions of all coefficients.
+A choice is by the number of a mode or by a truth, a number that is 1 or 0. All its expressions are computed, so each
+gets arguments that have a value where it is not chosen.
 """
 
 from __future__ import annotations

@@ -1,4 +1,3 @@
-# pyright: basic
 # pyright: basic, reportOperatorIssue=false
 """Inequalities of guards and walls, and the conditions of events.
 
@@ -17,8 +16,8 @@ from hsdsl.base.functions import absolute, below
 from hsdsl.base.names import shown
 from hsdsl.language.expression import symbolic
 from hsdsl.language.expression.algebra import either
+from hsdsl.language.expression.parse import Comparison, ExpressionError, Logic, Not, Tree, Truth
 from hsdsl.language.expression.scope import Scope, Value
-from hsdsl.language.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
 
 
 @dataclass(frozen=True)

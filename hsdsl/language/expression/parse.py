@@ -3,16 +3,197 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, Protocol
 
 from hsdsl.base.names import LOOKALIKES, normalised, shown
-from hsdsl.language.expression import syntax
-from hsdsl.language.expression.syntax import Expected, ExpressionError, Tree
 from hsdsl.language.expression.timebox import deep_stack
+
+Expected = Literal["number", "condition", "inequality"]
+
+
+class Ranged(Protocol):
+    """A token or a node: it has a range of characters."""
+
+    @property
+    def start(self) -> int: ...
+    @property
+    def end(self) -> int: ...
+
+
+class ExpressionError(Exception):
+    """A fault at the characters ``start`` to ``end`` of an expression."""
+
+    def __init__(self, code: str, message: str, start: int, end: int, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+        self.start = start
+        self.end = end
+        self.hint = hint
+
+    @classmethod
+    def at(cls, node: Ranged, code: str, message: str, hint: str | None = None) -> ExpressionError:
+        """A fault at a token or a node."""
+        return cls(code, message, node.start, node.end, hint)
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number, exactly as written."""
+
+    value: Fraction
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A name."""
+
+    name: str
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Negative:
+    """``-operand``."""
+
+    operand: Tree
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """Terms added (False) or subtracted (True), from left to right."""
+
+    terms: tuple[tuple[bool, Tree], ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """Factors multiplied (False) or divided by (True), from left to right."""
+
+    factors: tuple[tuple[bool, Tree], ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Power:
+    """``base**exponent``."""
+
+    base: Tree
+    exponent: Tree
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """``function(argument, ...)``."""
+
+    function: str
+    arguments: tuple[Tree, ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """``a < b <= c``: one operator fewer than operands."""
+
+    operands: tuple[Tree, ...]
+    operators: tuple[str, ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Logic:
+    """Conditions joined by `and` or by `or`."""
+
+    operator: Literal["and", "or"]
+    operands: tuple[Tree, ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """``not operand``."""
+
+    operand: Tree
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """`true` or `false`."""
+
+    value: bool
+    start: int
+    end: int
+
+
+Tree = Number | Name | Negative | Sum | Product | Power | Call | Comparison | Logic | Not | Truth
+CONDITIONS = (Comparison, Logic, Not, Truth)
+
+
+def children(tree: Tree) -> tuple[Tree, ...]:
+    """The nodes directly below one."""
+    match tree:
+        case Number() | Name() | Truth():
+            return ()
+        case Negative() | Not():
+            return (tree.operand,)
+        case Sum():
+            return tuple(term for _, term in tree.terms)
+        case Product():
+            return tuple(factor for _, factor in tree.factors)
+        case Power():
+            return (tree.base, tree.exponent)
+        case Call():
+            return tree.arguments
+        case Comparison() | Logic():
+            return tree.operands
+
+
+def walk(tree: Tree) -> Iterator[Tree]:
+    """Every node, in the order of the text."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting.extend(reversed(children(node)))
+
+
+def mapped(tree: Tree, change: Callable[[Tree], Tree]) -> Tree:
+    """A node with other nodes directly below it."""
+    match tree:
+        case Number() | Name() | Truth():
+            return tree
+        case Negative() | Not():
+            return replace(tree, operand=change(tree.operand))
+        case Sum():
+            return replace(tree, terms=tuple((minus, change(term)) for minus, term in tree.terms))
+        case Product():
+            return replace(tree, factors=tuple((below, change(factor)) for below, factor in tree.factors))
+        case Power():
+            return replace(tree, base=change(tree.base), exponent=change(tree.exponent))
+        case Call():
+            return replace(tree, arguments=tuple(map(change, tree.arguments)))
+        case Comparison() | Logic():
+            return replace(tree, operands=tuple(map(change, tree.operands)))
+
 
 LONGEST = 10_000  # characters
 LARGEST_INTEGER = 10**18
@@ -163,7 +344,7 @@ class _Parser:
             self.at += 1
             with self.deeper():
                 exponent = self.expression(_POWER)
-            return syntax.Power(left, exponent, begin, self.tokens[self.at - 1].end)
+            return Power(left, exponent, begin, self.tokens[self.at - 1].end)
         operators: list[str] = []
         operands = [left]
         while _BINDING.get(self.tokens[self.at].text, 0) == binding:
@@ -178,12 +359,12 @@ class _Parser:
         if first.text in ("-", "+"):
             negative = self.skipped(("-", "+")).count("-") % 2 == 1
             operand = self.expression(_POWER)
-            return syntax.Negative(operand, first.start, self.tokens[self.at - 1].end) if negative else operand
+            return Negative(operand, first.start, self.tokens[self.at - 1].end) if negative else operand
         if first.text == "not":
             denied = len(self.skipped(("not",))) % 2 == 1
             operand = self.expression(_COMPARE)
-            inner = syntax.Not(operand, first.start, self.tokens[self.at - 1].end)
-            return inner if denied else syntax.Not(inner, inner.start, inner.end)
+            inner = Not(operand, first.start, self.tokens[self.at - 1].end)
+            return inner if denied else Not(inner, inner.start, inner.end)
         return self.operand()
 
     def skipped(self, texts: tuple[str, ...]) -> list[str]:
@@ -198,15 +379,15 @@ class _Parser:
         token = self.tokens[self.at]
         if token.kind == "number":
             self.at += 1
-            return syntax.Number(token.value, token.start, token.end)
+            return Number(token.value, token.start, token.end)
         if token.kind == "name" and token.text in ("true", "false"):
             self.at += 1
-            return syntax.Truth(token.text == "true", token.start, token.end)
+            return Truth(token.text == "true", token.start, token.end)
         if token.kind == "name" and token.text not in ("and", "or"):
             self.at += 1
             if self.tokens[self.at].text == "(":
                 return self.call(token)
-            return syntax.Name(token.text, token.start, token.end)
+            return Name(token.text, token.start, token.end)
         if token.text == "(":
             self.at += 1
             with self.deeper():
@@ -229,7 +410,7 @@ class _Parser:
                     break
                 self.at += 1
         end = self.close(opened)
-        return syntax.Call(function.text, tuple(arguments), function.start, end)
+        return Call(function.text, tuple(arguments), function.start, end)
 
     def close(self, opened: Token) -> int:
         """Take the closing parenthesis of ``opened``."""
@@ -262,9 +443,9 @@ class _Parser:
 def _chain(binding: int, operators: list[str], operands: list[Tree], start: int, end: int) -> Tree:
     if binding in (_OR, _AND):
         word: Literal["and", "or"] = "or" if binding == _OR else "and"
-        return syntax.Logic(word, tuple(operands), start, end)
+        return Logic(word, tuple(operands), start, end)
     if binding == _COMPARE:
-        return syntax.Comparison(tuple(operands), tuple(operators), start, end)
+        return Comparison(tuple(operands), tuple(operators), start, end)
     inverted = [False, *(operator in ("-", "/") for operator in operators)]
     pairs = tuple(zip(inverted, operands, strict=True))
-    return syntax.Sum(pairs, start, end) if binding == _ADD else syntax.Product(pairs, start, end)
+    return Sum(pairs, start, end) if binding == _ADD else Product(pairs, start, end)

@@ -14,7 +14,7 @@ import sympy as sp
 
 from hsdsl.base.functions import CONSTANTS, FUNCTIONS
 from hsdsl.base.names import SINCE, WORDS, did_you_mean, shown
-from hsdsl.language.expression.syntax import Call, ExpressionError, Name, Number, Product, Tree, walk
+from hsdsl.language.expression.parse import Call, ExpressionError, Name, Number, Product, Tree, walk
 
 TIME = sp.Symbol("t", real=True)
 RESERVED = (TIME.name, *CONSTANTS, *FUNCTIONS, *WORDS)

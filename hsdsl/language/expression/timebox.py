@@ -1,10 +1,7 @@
-"""A bound on the time of symbolic work, which SymPy cannot be made to leave by itself.
+"""Bounds on symbolic work, which SymPy cannot be made to keep by itself: its time, and the depth of the stack.
 
 A second thread watches the processor time of the process and raises :class:`OutOfTime` in the one that works, at its
 next Python instruction. Unlike a signal that does not need the main thread.
-
-MERGE: write one docstring of these.
-`stack` was: Room on Python's stack for expressions as deep as the language allows.
 """
 
 from __future__ import annotations

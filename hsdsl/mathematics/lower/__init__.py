@@ -27,16 +27,16 @@ from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.completion import Overlay, overlays
 from hsdsl.mathematics.completion.nearby import slopes_of_inputs
 from hsdsl.mathematics.lower.constants import (
+    Names,
     constants,
     initial_order,
     initial_values,
     lower_constants,
     lower_expressions,
+    number,
 )
-from hsdsl.mathematics.lower.deciding import idle_states
-from hsdsl.mathematics.lower.mode import LoweredMode, lowered_overlay
-from hsdsl.mathematics.lower.names import Names, number
-from hsdsl.mathematics.lower.routines import print_routines
+from hsdsl.mathematics.lower.mode import LoweredMode, idle_states, lowered_overlay
+from hsdsl.mathematics.lower.straight import print_routines
 from hsdsl.mathematics.lower.switches import switch_programs, switch_routines, with_switches
 
 __all__ = ["in_turn", "lower", "lower_constants", "lower_expressions"]

@@ -19,8 +19,7 @@ from hsdsl.base.functions import absolute, atan2, floor, maximum, minimum, repla
 from hsdsl.language.expression.algebra import by_constants
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, HybridSystem, Mode
-from hsdsl.mathematics.lower.routines import Definition
-from hsdsl.mathematics.lower.straight import Gradient
+from hsdsl.mathematics.lower.straight import Definition, Gradient
 from hsdsl.mathematics.program import Switch
 
 _HALF = sp.Rational(1, 2)

@@ -16,8 +16,7 @@ from math import inf
 import sympy as sp
 
 from hsdsl.language.system import TIME
-from hsdsl.mathematics.lower.routines import Definition, print_routines
-from hsdsl.mathematics.lower.straight import Cut
+from hsdsl.mathematics.lower.straight import Cut, Definition, print_routines
 from hsdsl.mathematics.program import Operation, Tape
 
 _ONE = sp.Integer(1)

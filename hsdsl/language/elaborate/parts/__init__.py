@@ -15,13 +15,11 @@ from typing import Any
 
 from hsdsl.base.names import SINCE
 from hsdsl.base.parts import Part, numbered
-from hsdsl.language.elaborate.definitions import define_parameter, units_of
+from hsdsl.language.elaborate.definitions import define_parameter, placeholders, solutions, units_of, with_solutions
+from hsdsl.language.elaborate.modes import elaborate_scene
 from hsdsl.language.elaborate.parts.composition import FINAL, MODE, Composition
 from hsdsl.language.elaborate.parts.instances import Instance, roster_of
-from hsdsl.language.elaborate.parts.names import Board, Names, unknowns_of
-from hsdsl.language.elaborate.parts.starts import Starts
-from hsdsl.language.elaborate.scene import elaborate_scene
-from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
+from hsdsl.language.elaborate.parts.names import Board, Names, Starts, unknowns_of
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, definition_order
 from hsdsl.language.expression.algebra import NO_VALUE, ZERO, whole
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state

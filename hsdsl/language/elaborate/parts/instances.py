@@ -1,5 +1,8 @@
 # pyright: basic
-"""Instances: the parts of a system by name, each with its automaton, and what is wrong with how they are given."""
+"""Instances: the parts of a system by name, each with its automaton, and what is wrong with how they are given.
+
+An automaton may be in a file of its own. Every node knows its own text, so faults there have that file's path and line.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from hsdsl.base.errors import Findings
 from hsdsl.base.names import closest, did_you_mean, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.symbols import KINDS, SymbolTable
+from hsdsl.language.files import DataRefused, ModelFiles
 from hsdsl.language.schema.documents import AutomatonDocument, InstanceDocument, PartModeDocument, SystemDocument
-from hsdsl.language.source import ABSENT, Key
+from hsdsl.language.source import ABSENT, Key, Mapping, Node, Scalar, child, compose, decode
 
 MOST = 10_000  # of one name
 ANY = "*"  # among names that are at fault: an instance of which automaton is not known
@@ -220,3 +225,28 @@ def _check_start(symbols: SymbolTable, one: Instance) -> None:
 
 def _have(names: list[str]) -> str:
     return "have" if len(names) > 1 else "has"
+
+
+_ABOUT = ("hsdsl", "title", "source")  # keys that a file may have and that say nothing about the automaton
+
+
+def read_automata(root: Node, files: ModelFiles, findings: Findings) -> dict[str, bytes]:
+    """Put automata of files in their places; the content of the files, by name."""
+    automata = child(root, "automata")
+    found: dict[str, bytes] = {}
+    for key, entry in list(automata) if isinstance(automata, Mapping) else ():
+        name = child(entry, "file")
+        if not isinstance(name, Scalar) or not isinstance(entry, Mapping) or len(entry.entries) > 1:
+            continue
+        try:
+            content = found.setdefault(name.value, files.content(name.value))
+        except DataRefused as refusal:
+            findings.add(name.place.diagnostic(refusal.code, refusal.message, refusal.hint))
+            continue
+        inner = compose(decode(str(files.folder / name.value), content), findings)
+        if isinstance(inner, Mapping):
+            for about in _ABOUT:
+                inner.entries.pop(about, None)
+        assert isinstance(automata, Mapping)
+        automata.entries[str(key)] = (key, inner)
+    return found

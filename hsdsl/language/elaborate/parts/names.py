@@ -2,7 +2,7 @@
 """What names mean in a system of parts: those of an instance, then the file's, then `instance.name`.
 
 A name is worked out when it is first used, so definitions may use each other in any order; one that comes to itself is
-refused with the way it took.
+refused with the way it took. In initial values, names of states are those of other initial values.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from fractions import Fraction
 from typing import Any
 
 from hsdsl.base.names import SINCE, counted, did_you_mean, shown
+from hsdsl.language.elaborate.definitions import placeholders, solutions, with_solutions
 from hsdsl.language.elaborate.parts.instances import Instance, Roster
-from hsdsl.language.elaborate.resolver import resolved_expression
-from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
-from hsdsl.language.elaborate.symbols import Meanings, SymbolTable
-from hsdsl.language.expression import ExpressionError, algebra, parse, syntax
+from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, resolved_expression
+from hsdsl.language.expression import ExpressionError, algebra, parse
+from hsdsl.language.expression.parse import Call, Name, Number, Sum, Tree, mapped, walk
 from hsdsl.language.expression.plain import RANGES
-from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
-from hsdsl.language.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
+from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, state, symbol
 from hsdsl.language.schema.documents import PartModeDocument
 from hsdsl.language.source import Key, Scalar
 
@@ -424,7 +423,7 @@ class Names(Mapping[str, Meaning]):
         if mode not in several[0].part.modes:
             message = f"the automaton '{several[0].automaton}' has no mode '{mode}'"
             raise ExpressionError.at(inner, "HS303", message, did_you_mean(mode, several[0].part.modes))
-        terms = [syntax.Name(f"{one.name}.{IN_MODE}{mode}", inner.start, inner.end) for one in several]
+        terms = [Name(f"{one.name}.{IN_MODE}{mode}", inner.start, inner.end) for one in several]
         return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
 
 
@@ -432,3 +431,119 @@ def _of_instance(tree: Tree, base: str, name: str) -> Tree:
     if isinstance(tree, Name) and tree.name.partition(".")[0] == base:
         return replace(tree, name=f"{name}.{tree.name.partition('.')[2]}")
     return mapped(tree, lambda inner: _of_instance(inner, base, name))
+
+
+_SENTENCE = "an initial value is an expression of parameters and of other initial values"
+
+
+@dataclass
+class Starts:
+    """The initial values of all instances; ``written`` has each behind those whose states it uses."""
+
+    board: Board
+    written: dict[str, Any] = field(default_factory=dict)
+    _known: dict[str, Value | None] = field(default_factory=dict)
+    _active: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.outer: Mapping[str, Meaning] = self.board.symbols.parameter_scope(_SENTENCE).values
+        for one in self.board.roster.instances.values():
+            for name in given_to(one):
+                if name in one.states:
+                    self.of(one, name, False)
+
+    def of(self, one: Instance, name: str, symbolic: bool) -> Meaning:
+        """The initial value of a state of an instance, or with ``symbolic`` its symbol."""
+        full, given = one.full(name), given_to(one)
+        if name not in given:
+            mode = one.part.modes[one.start or 0]
+            message = f"'{name}' has no initial value where '{one.automaton}' starts in '{mode}'"
+            return Refusal("HS308", message, None)
+        if full not in self._known:
+            if full in self._active:
+                path = " -> ".join((*self._active[self._active.index(full) :], full))
+                message = f"the initial value of '{full}' is defined by itself: {path}"
+                self.board.symbols.report(given[name].place, "HS302", message, "give one of them by parameters")
+                return None
+            self._active.append(full)
+            try:
+                value = self._number(one, given[name], False, one.index)
+                expr = self._number(one, given[name], True, one.index) if value is not None else None
+            finally:
+                self._active.pop()
+            self._known.setdefault(full, value)
+            if expr is not None:
+                self.written[full] = expr.expr
+        found = self._known[full]
+        return state(full) if symbolic and found is not None else found
+
+    def _number(self, one: Instance | None, scalar: Scalar, symbolic: bool, index: int | None) -> Value | None:
+        names = StartNames(self, one, index, symbolic)
+        scope = Scope(names, expanded=Names(self.board, one, None, index).expanded)
+        return self.board.symbols.number(scalar, scope, finite_now=not symbolic)
+
+    def beyond(self, base: str, number: int, attribute: str, symbolic: bool) -> Meaning:
+        """What a name is beyond the first and the last of several instances."""
+        given = self.board.at_end(base, number, attribute)
+        return given if isinstance(given, Refusal) else self._number(None, given, symbolic, number)
+
+
+def given_to(one: Instance) -> dict[str, Scalar]:
+    """The initial values that an instance is given."""
+    extra = one.given.initial.__pydantic_extra__ if one.given.initial else {}
+    return {str(key): scalar for key, scalar in extra.items()}
+
+
+@dataclass(frozen=True)
+class StartNames(Mapping[str, Meaning]):
+    """The names in the initial values of an instance, or beyond the ends of several."""
+
+    starts: Starts
+    one: Instance | None
+    index: int | None
+    symbolic: bool
+
+    def __getitem__(self, name: str) -> Meaning:
+        one, board = self.one, self.starts.board
+        if "." in name:
+            return self._member(name)
+        if one is not None and name in one.kind.parameters:
+            return board.parameters.get(one.full(name))
+        if name == "index" and self.index is not None:
+            return whole_value(self.index)
+        if one is not None and name in one.states:
+            return self.starts.of(one, name, self.symbolic)
+        return self.starts.outer[name]
+
+    def _member(self, name: str) -> Meaning:
+        found, board = MEMBER.fullmatch(name), self.starts.board
+        if found is None:
+            raise KeyError(name)
+        base, index, attribute = found.groups()
+        other: Any = board.instance(base, index, Names(board, self.one, None, self.index))
+        if other is None or isinstance(other, Refusal):
+            return other
+        if isinstance(other, int):
+            return self.starts.beyond(base, other, attribute, self.symbolic)
+        if attribute in other.kind.parameters:
+            return board.parameters.get(other.full(attribute))
+        if attribute.startswith(IN_MODE):
+            return whole_value(int(other.part.modes[other.start or 0] == attribute.removeprefix(IN_MODE)))
+        if attribute in other.states:
+            return self.starts.of(other, attribute, self.symbolic)
+        known = [*other.states, *map(str, other.kind.parameters)]
+        message = f"'{attribute}' is no state or parameter of '{other.automaton}'"
+        return Refusal("HS111", message, did_you_mean(attribute, known, _SENTENCE))
+
+    def __iter__(self) -> Iterator[str]:
+        if self.one is not None:
+            yield from (*self.one.states, *map(str, self.one.kind.parameters))
+        yield from self.starts.outer
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def items(self) -> Any:
+        """The names with their meanings, for hints: states without working their values out."""
+        own: Meanings = {} if self.one is None else {name: state(name) for name in self.one.states}
+        return [*own.items(), *self.starts.outer.items()]
