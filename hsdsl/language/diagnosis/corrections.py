@@ -54,11 +54,15 @@ def correct(root: Node, findings: Findings) -> None:
     rename_states(root, findings)
 
 
-def rename_states(root: Node, findings: Findings) -> None:
-    """Rename states that a flow gives the name of their derivative, or that occur in one flow alone, misspelt."""
+def rename_states(root: Node, findings: Findings) -> bool:
+    """Rename states that a flow gives the name of their derivative, or that occur in one flow alone, misspelt.
+
+    False where there are none.
+    """
+    before = len(findings.diagnostics)
     initial, modes = (child(root, name) for name in ("initial", "modes"))
     if not isinstance(root, Mapping) or not isinstance(modes, Mapping):
-        return
+        return False
     if isinstance(initial, Mapping):
         known = set(map(str, keys(initial)))
         reset = {str(key) for transition in _transitions(modes) for key in keys(child(transition, "reset"))}
@@ -67,6 +71,7 @@ def rename_states(root: Node, findings: Findings) -> None:
             if isinstance(states, Mapping):
                 _dotted_names(states, known, reset, findings)
     _correct_spelling(root, modes, findings)
+    return len(findings.diagnostics) > before
 
 
 def _transitions(modes: Node | None) -> list[Node]:

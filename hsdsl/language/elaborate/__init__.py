@@ -1,7 +1,7 @@
 # pyright: basic
 """Documents to mathematics: names resolved, everything substituted, every error reported.
 
-A document goes through these, in this order; `symbols` has what its names mean, `resolver` reads its expressions.
+A document goes through these, in this order; `symbols` has what its names mean, and reads its expressions.
 
 ================= ===========================================================================
 ``definitions``   parameters and `let`; ``functions``, ``inputs`` and ``solve`` what else has a name
@@ -20,7 +20,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NoReturn
+from typing import Any
 
 from hsdsl.base import limits
 from hsdsl.base.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
@@ -41,7 +41,7 @@ from hsdsl.language.elaborate.inputs import define_inputs, switch_name
 from hsdsl.language.elaborate.modes import elaborate_modes, elaborate_outputs, elaborate_scene, scene_of
 from hsdsl.language.elaborate.parts import Parts
 from hsdsl.language.elaborate.parts.instances import read_automata
-from hsdsl.language.elaborate.symbols import ExpressionResolver, SymbolTable, resolved_expression
+from hsdsl.language.elaborate.symbols import SymbolTable, resolved_expression
 from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
@@ -104,48 +104,35 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
         data = read_automata(root, files, findings)
         known = dict(findings.diagnostics)
         document = read(root, findings)
-        whole = known == findings.diagnostics
+        well_formed = findings.diagnostics == known
         try:
-            symbols = SymbolTable(document, ExpressionResolver(findings), files, data=data, drivable=drivable)
-            return _elaborated(symbols, root, text)
+            return _elaborated(SymbolTable(document, findings, files, data=data, drivable=drivable), root, text)
         except ModelError:
-            renamed = Findings(files.path, known)
-            if not (whole and _with_states_renamed(root, renamed)):
+            from hsdsl.language.diagnosis.corrections import rename_states
+
+            findings = Findings(files.path, known)
+            if not (well_formed and rename_states(root, findings)):
                 raise
-            document = read(root, renamed)
-            symbols = SymbolTable(document, ExpressionResolver(renamed), files, data=data, drivable=drivable)
-            return _elaborated(symbols, root, text)
-
-
-def _with_states_renamed(root: Node, findings: Findings) -> bool:
-    """Whether states are misspelt; these are reported, and renamed in the nodes."""
-    from hsdsl.language.diagnosis.corrections import rename_states
-
-    before = len(findings.diagnostics)
-    rename_states(root, findings)
-    return len(findings.diagnostics) > before
+            document = read(root, findings)  # the same with other names of states
+            return _elaborated(SymbolTable(document, findings, files, data=data, drivable=drivable), root, text)
 
 
 def _elaborated(symbols: SymbolTable, root: Node, text: Text) -> Elaboration:
     try:
-        with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
+        with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.box:
             system = with_events(_system(symbols))
             system = with_timers(system) if symbols.timed else system
     except OutOfTime:
-        _report_timeout(symbols.resolver)
+        message = "working this expression out takes too long"
+        hint = "make parts of it states, or allow more time with --limit seconds=600"
+        if symbols.at is not None:
+            symbols.report(symbols.at.place, TOO_LONG, message, hint)
+        symbols.findings.raise_if_any()
+        raise ModelError([Diagnostic(TOO_LONG, message, None, hint)]) from None
     except ValueError as error:  # a check at birth that no diagnostic foresaw
         raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
     top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
     return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
-
-
-def _report_timeout(resolver: ExpressionResolver) -> NoReturn:
-    message = "working this expression out takes too long"
-    hint = "make parts of it states, or allow more time with --limit seconds=600"
-    if resolver.at is not None:
-        resolver.report(resolver.at.place, TOO_LONG, message, hint)
-    resolver.findings.raise_if_any()
-    raise ModelError([Diagnostic(TOO_LONG, message, None, hint)])
 
 
 def _system(symbols: SymbolTable) -> HybridSystem:
@@ -170,7 +157,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     experiment = elaborate_experiment(symbols)
     units = of_parts | elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)
-    symbols.resolver.findings.raise_if_any()
+    symbols.findings.raise_if_any()
     return HybridSystem(
         path=symbols.files.path,
         digest=symbols.files.with_data(symbols.data).digest,

@@ -180,7 +180,7 @@ def _function(symbols: SymbolTable, name: Key, document: FunctionDocument) -> Fu
             message = f"the argument '{argument}' of `{name}` has the name of {KINDS[kind]}"
             symbols.report(argument.place, "HS301", message, "give one of them another name")
             known = False
-    tree = symbols.resolver.tree(document.expression)
+    tree = symbols.tree(document.expression)
     arguments, text = tuple(map(str, document.of)), document.expression.value
     return Function(str(name), arguments, tree if known else None, text, symbols.of_functions)
 
@@ -188,7 +188,7 @@ def _function(symbols: SymbolTable, name: Key, document: FunctionDocument) -> Fu
 def _check(symbols: SymbolTable, document: FunctionDocument, function: Function, names: Mapping[str, Meaning]) -> None:
     own: Meanings = {argument: Value(symbol(argument)) for argument in function.arguments}
     scope = Scope(ChainMap(own, names))  # pyright: ignore[reportArgumentType]
-    if function.tree is not None and not symbols.resolver.names_known(document.expression, function.tree, scope):
+    if function.tree is not None and not symbols.names_known(document.expression, function.tree, scope):
         _spoil(symbols, function)
 
 
@@ -234,7 +234,7 @@ def solutions(symbols: SymbolTable, document: SolveDocument, scope: Scope, mode:
         place = document.unknowns[0].place if document.unknowns else document.equations[0].place
         symbols.report(place, "HS325", f"`solve` has {count}", "give one equation for each unknown")
         return None
-    sides = [symbols.resolver.equation(scalar, scope) for scalar in document.equations]
+    sides = [symbols.equation(scalar, scope) for scalar in document.equations]
     if any(pair is None for pair in sides):
         return None
     unknowns = [symbol(_inner(name, mode)) for name in document.unknowns]

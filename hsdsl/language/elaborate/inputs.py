@@ -115,7 +115,7 @@ def read_samples(symbols: SymbolTable, name: Key, entry: InputFile) -> Samples |
     table = _Table(str(symbols.files.folder / file.value), lines, entry.hold)
     table.read(name if column is None else column.value.strip(), file.value if column is None else None)
     for diagnostic in table.faults:
-        symbols.resolver.findings.add(diagnostic)
+        symbols.findings.add(diagnostic)
     return None if table.faults else (tuple(table.times), tuple(table.values))
 
 

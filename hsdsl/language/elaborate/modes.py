@@ -18,7 +18,7 @@ from hsdsl.base.functions import floor, sign
 from hsdsl.base.names import SINCE, did_you_mean, shown
 from hsdsl.base.parts import numbers_of
 from hsdsl.language.elaborate.definitions import placeholders, solutions, with_solutions
-from hsdsl.language.elaborate.symbols import KINDS, ExpressionResolver, Meanings, SymbolTable, all_of, definition_order
+from hsdsl.language.elaborate.symbols import KINDS, Meanings, SymbolTable, all_of, definition_order
 from hsdsl.language.expression.algebra import by_constants
 from hsdsl.language.expression.conditions import Trigger, comparisons
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state, symbol
@@ -44,7 +44,7 @@ def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[
         return None
     scope = symbols.scopes[str(name)] = mode_scope(symbols, name, document)
     flow = symbols.numbers((document.flow or {}).values(), scope)
-    walls = all_of([surface(symbols.resolver, scalar, scope, "domain") for scalar in document.domain])
+    walls = all_of([surface(symbols, scalar, scope, "domain") for scalar in document.domain])
     edges = all_of(elaborate_edges(symbols, name, document, scope))
     outputs = outputs_of(symbols, shared, document, scope)
     if flow is None or walls is None or edges is None:
@@ -162,12 +162,12 @@ NOWHERE = Surface(ZERO, ZERO, ZERO, "")
 _GUARDED = re.compile(r"(\S+)\s+(?:if|when)\s+(.+)")
 
 
-def surface(resolver: ExpressionResolver, scalar: Scalar, scope: Scope, key: str) -> Surface | None:
+def surface(symbols: SymbolTable, scalar: Scalar, scope: Scope, key: str) -> Surface | None:
     """The surface of an inequality, its residual negative inside the domain.
 
     ``when: L >= R`` ends the domain where L - R rises through 0; a wall ``L >= R`` where R - L does.
     """
-    sides = resolver.inequality(scalar, scope, key)
+    sides = symbols.inequality(scalar, scope, key)
     if sides is None:
         return None
     left, right = sides.left.expr, sides.right.expr
@@ -213,12 +213,11 @@ def unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
 
 
 def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDocument, scope: Scope) -> Edge | None:
-    resolver = symbols.resolver
     flow = symbols.document.modes[source].flow or {}  # pyright: ignore[reportArgumentType]
     still = frozenset(symbol(str(state)) for state, rate in flow.items() if rate.value.strip() == "0")
     event = event_of(symbols, transition, scope, still)
-    crossed = surface(resolver, transition.when, scope, "when") if transition.event is None else NOWHERE
-    condition = None if transition.condition is None else resolver.condition(transition.condition, scope)
+    crossed = surface(symbols, transition.when, scope, "when") if transition.event is None else NOWHERE
+    condition = None if transition.condition is None else symbols.condition(transition.condition, scope)
     values = symbols.numbers(transition.reset.values(), scope)
     stays = transition.event is not None and transition.to.value == ABSENT
     target = source if stays else known_mode(symbols, transition.to)
@@ -267,7 +266,7 @@ def event_of(
     given = transition.event
     if not _is_event(symbols, transition) or given is None:
         return None
-    trigger = symbols.resolver.trigger(given, scope)
+    trigger = symbols.trigger(given, scope)
     delay = None if transition.delay is None else symbols.number(transition.delay, scope)
     ranked = transition.priority
     priority = None if isinstance(ranked, int) else symbols.number(ranked, scope)

@@ -48,7 +48,6 @@ def all_of(parts: Iterable[T | None]) -> list[T] | None:
     return whole if len(whole) == len(every) else None
 
 
-@dataclass
 class ExpressionResolver:
     """Resolver of expressions: their faults go to ``findings``, and the answer is then None.
 
@@ -160,7 +159,7 @@ Meanings = dict[str, Meaning]
 
 
 @dataclass
-class SymbolTable:
+class SymbolTable(ExpressionResolver):
     """A document with its names.
 
     ``names`` has the kind, of :data:`KINDS`, of every name that is not of one mode alone; ``values`` the meaning of
@@ -172,7 +171,7 @@ class SymbolTable:
     """
 
     document: ModelDocument
-    resolver: ExpressionResolver
+    findings: Findings
     files: ModelFiles
     names: dict[str, str] = field(default_factory=dict)
     values: Meanings = field(default_factory=dict)
@@ -238,17 +237,9 @@ class SymbolTable:
         """A scope with the parameters alone."""
         return self.scope(("parameters",), sentence, hint=hint)
 
-    def number(self, scalar: Scalar, scope: Scope, finite_now: bool = False) -> Value | None:
-        """The value of an expression; see `ExpressionResolver.number`."""
-        return self.resolver.number(scalar, scope, finite_now)
-
     def numbers(self, scalars: Iterable[Scalar], scope: Scope, finite_now: bool = False) -> list[Value] | None:
         """The values of expressions; None where one of them is broken."""
-        return all_of([self.resolver.number(scalar, scope, finite_now) for scalar in scalars])
-
-    def report(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
-        """Report a fault at a place."""
-        self.resolver.report(place, code, message, hint)
+        return all_of([self.number(scalar, scope, finite_now) for scalar in scalars])
 
     def content(self, name: str) -> bytes:
         """The content of a data file, which is read once; raises DataRefused."""

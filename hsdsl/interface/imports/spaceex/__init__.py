@@ -21,7 +21,7 @@ from hsdsl.interface.imports.spaceex.urgency import Judge
 from hsdsl.interface.imports.spaceex.writing import written
 from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.plain import value
-from hsdsl.language.files.model import read_bytes
+from hsdsl.language.files import read_bytes
 
 __all__ = ["imported"]
 

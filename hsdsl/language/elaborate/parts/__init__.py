@@ -69,7 +69,7 @@ class Parts:
         self.parts = tuple(map(self._with_timer, self.parts))
         self.initial = self._initial()
         self.units = dict(self._units())
-        if not symbols.resolver.findings.diagnostics:  # else what reads them may not have been looked at
+        if not symbols.findings.diagnostics:  # else what reads them may not have been looked at
             self.board.check_ends()
 
     def _units(self) -> Iterator[tuple[str, str]]:

@@ -57,7 +57,7 @@ class Composition:
         flow = [value for one in self.instances for value in self._flow(one)]
         walls = [wall for one in self.instances for wall in self._walls(one)]
         transitions = [t for one in self.instances for t in transitions_of(self.board, one)]
-        if self.board.symbols.resolver.findings.diagnostics:
+        if self.board.symbols.findings.diagnostics:
             return ()
         broadcast = Broadcast(self.board, [t for t in transitions if t.listens])
         edges = [self._edge(broadcast, t) for t in transitions if not t.listens]
@@ -119,7 +119,7 @@ class Composition:
             for scalar in document.domain:
                 if self.board.is_broken(scalar, names):
                     continue
-                found = surface(self.board.symbols.resolver, scalar, names.scope, "domain")
+                found = surface(self.board.symbols, scalar, names.scope, "domain")
                 self.board.note(scalar, names, found)
                 if found is not None:
                     yield self._surface(one, k, found)
@@ -213,7 +213,7 @@ def _labels(board: Board, mode: str, document: PartModeDocument) -> list[str]:
 def _transition(
     board: Board, names: Names, source: int, name: str, document: PartTransitionDocument
 ) -> PartTransition | None:
-    one, resolver = names.instance, board.symbols.resolver
+    one, symbols = names.instance, board.symbols
     assert one is not None
     if not _of_one_kind(board, one, name, document):
         return None
@@ -224,13 +224,13 @@ def _transition(
             rising = event_of(board.symbols, document, names.scope)
             board.note(document.event, names, rising)
     elif document.when is not None and not board.is_broken(document.when, names):
-        crossed = surface(resolver, document.when, names.scope, "when")
+        crossed = surface(symbols, document.when, names.scope, "when")
         board.note(document.when, names, crossed)
     elif document.on is not None:
         after = _events(board, names, document.on)
     condition = None
     if document.condition is not None and not board.is_broken(document.condition, names):
-        condition = resolver.condition(document.condition, names.scope)
+        condition = symbols.condition(document.condition, names.scope)
         board.note(document.condition, names, condition)
     resets, keys, texts, whole = _resets(board, names, document)
     if target is None or not whole or (crossed is None and rising is None and not document.on) or after is None:

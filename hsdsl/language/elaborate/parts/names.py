@@ -106,7 +106,7 @@ class Board:
         """The value of an expression; what another instance of the same automaton reports already is not repeated."""
         if self.is_broken(scalar, names):
             return None
-        value = self.symbols.resolver.number(scalar, names.scope)
+        value = self.symbols.number(scalar, names.scope)
         self.note(scalar, names, value)
         return value
 
