@@ -149,10 +149,27 @@ def define_functions(symbols: SymbolTable) -> tuple[FunctionText, ...]:
     made = {str(name): _function(symbols, name, document) for name, document in documents.items()}
     symbols.values.update(made)
     symbols.of_functions.update(made)
-    names = symbols.scope((), _WHAT, {**_parameters(symbols), **made}, "make it an argument").values
-    for name, function in made.items():
-        _check(symbols, documents[name], function, names)  # pyright: ignore[reportArgumentType]
-    _refuse_cycles(symbols, made)
+
+    def spoil(function: Function) -> None:
+        """Mark a function as broken and reported."""
+        symbols.values[function.name] = symbols.of_functions[function.name] = replace(function, tree=None)
+
+    parameters: Meanings = {str(name): Value(symbol(name)) for name in symbols.document.parameters}
+    names = symbols.scope((), _WHAT, {**parameters, **made}, "make it an argument").values
+    for key, document in documents.items():
+        function = made[str(key)]
+        own: Meanings = {argument: Value(symbol(argument)) for argument in function.arguments}
+        scope = Scope(ChainMap(own, names))  # pyright: ignore[reportArgumentType]
+        if function.tree is not None and not symbols.names_known(document.expression, function.tree, scope):
+            spoil(function)
+    calls = {name: tuple(functions_called(f.tree)) if f.tree is not None else () for name, f in made.items()}
+    while (found := cycle(calls)) is not None:
+        message = f"`{found[0]}` is defined by itself: {' -> '.join((*found, found[0]))}"
+        place = next(key for key in documents if key == found[0]).place
+        symbols.report(place, "HS302", message, "no function may lead back to itself")
+        for name in found:
+            calls[name] = ()
+            spoil(made[name])
     return tuple(FunctionText(f.name, f.arguments, f.text) for f in made.values())
 
 
@@ -163,10 +180,6 @@ def named_functions(texts: Iterable[FunctionText], values: Mapping[str, Meaning]
     made = {f.name: Function(f.name, f.arguments, parse(f.text), f.text, others) for f in texts}
     names.update(made)
     return made
-
-
-def _parameters(symbols: SymbolTable) -> Meanings:
-    return {str(name): Value(symbol(name)) for name in symbols.document.parameters}
 
 
 def _function(symbols: SymbolTable, name: Key, document: FunctionDocument) -> Function:
@@ -183,32 +196,6 @@ def _function(symbols: SymbolTable, name: Key, document: FunctionDocument) -> Fu
     tree = symbols.tree(document.expression)
     arguments, text = tuple(map(str, document.of)), document.expression.value
     return Function(str(name), arguments, tree if known else None, text, symbols.of_functions)
-
-
-def _check(symbols: SymbolTable, document: FunctionDocument, function: Function, names: Mapping[str, Meaning]) -> None:
-    own: Meanings = {argument: Value(symbol(argument)) for argument in function.arguments}
-    scope = Scope(ChainMap(own, names))  # pyright: ignore[reportArgumentType]
-    if function.tree is not None and not symbols.names_known(document.expression, function.tree, scope):
-        _spoil(symbols, function)
-
-
-def _spoil(symbols: SymbolTable, function: Function) -> None:
-    """Mark a function as broken and reported."""
-    symbols.values[function.name] = symbols.of_functions[function.name] = replace(function, tree=None)
-
-
-def _refuse_cycles(symbols: SymbolTable, made: Mapping[str, Function]) -> None:
-    calls = {name: tuple(functions_called(f.tree)) if f.tree is not None else () for name, f in made.items()}
-    while (found := cycle(calls)) is not None:
-        message = f"`{found[0]}` is defined by itself: {' -> '.join((*found, found[0]))}"
-        symbols.report(_key(symbols, found[0]).place, "HS302", message, "no function may lead back to itself")
-        for name in found:
-            calls[name] = ()
-            _spoil(symbols, made[name])
-
-
-def _key(symbols: SymbolTable, name: str) -> Key:
-    return next(key for key in symbols.document.functions if key == name)
 
 
 def placeholders(document: SolveDocument | None, mode: str = "") -> Meanings:

@@ -35,7 +35,7 @@ def only(system: HybridSystem, given: Iterable[str]) -> HybridSystem:
     if all((mode.name, state) in needed for mode in system.modes for state in mode.states):
         return system
     outputs = [k for k, name in enumerate(system.outputs) if name in names]
-    own = _with_states(system)
+    own = {mode.name for mode in system.modes if mode.states}
     mode, states = system.initial.mode, {state for _, state in needed}
     start = [name for name, _ in system.initial.values if mode not in own or (mode, name) in needed]
     scale = tuple(item for item in system.experiment.scale if item[0] in states)
@@ -70,7 +70,7 @@ def _roots(system: HybridSystem, names: frozenset[str]) -> Iterator[Node]:
 
 def _uses(system: HybridSystem) -> dict[Node, list[Node]]:
     uses: dict[Node, list[Node]] = defaultdict(list)
-    own = _with_states(system)
+    own = {mode.name for mode in system.modes if mode.states}
     for mode in system.modes:
         for state, expression in zip(mode.states, mode.flow, strict=True):
             uses[mode.name, state] += _states(mode, [expression])
@@ -78,10 +78,6 @@ def _uses(system: HybridSystem) -> dict[Node, list[Node]]:
             for state, expression in edge.values.items():
                 uses[_entered(own, edge, state)] += _states(mode, [expression])
     return uses
-
-
-def _with_states(system: HybridSystem) -> set[str]:
-    return {mode.name for mode in system.modes if mode.states}
 
 
 def _entered(own: set[str], edge: Edge, state: str) -> Node:
@@ -102,17 +98,16 @@ def _smaller_mode(mode: Mode, needed: set[Node], outputs: list[int], own: set[st
         states=tuple(mode.states[k] for k in kept),
         flow=tuple(mode.flow[k] for k in kept),
         flow_texts=tuple(mode.flow_texts[k] for k in kept),
-        edges=tuple(_smaller_edge(edge, needed, own) for edge in mode.edges),
+        edges=tuple(
+            edge.of_states([state for state in edge.target_states if _entered(own, edge, state) in needed])
+            for edge in mode.edges
+        ),
         outputs=tuple(mode.outputs[k] for k in outputs),
         queues=tuple(
             q.of_states([mode.states[k] for k in kept]) for q in mode.queues if (mode.name, q.waiting) in needed
         ),
         scene=tuple(None if value is None or gone & {*_states(mode, [value])} else value for value in mode.scene),
     )
-
-
-def _smaller_edge(edge: Edge, needed: set[Node], own: set[str]) -> Edge:
-    return edge.of_states([state for state in edge.target_states if _entered(own, edge, state) in needed])
 
 
 def flat_part(system: HybridSystem, names: Iterable[str]) -> HybridSystem:
@@ -203,10 +198,11 @@ _TIMER = symbol(SINCE)
 def with_timers(system: HybridSystem) -> HybridSystem:
     """The system with the state `since` in every mode whose expressions use it, and in no other."""
     own = {mode.name: not (mode.final and not mode.states) for mode in system.modes}
-    timed = {mode.name for mode in system.modes if own[mode.name] and any(map(_uses_timer, _timed_parts(mode)))}
+    timed = {mode.name for mode in system.modes if own[mode.name] and _uses_timer(mode)}
     given, start = dict(system.initial.values), system.initial
     if not timed:
-        return replace(system, initial=_without(system)) if SINCE in given else system
+        pairs = [tuple(pair for pair in pairs if pair[0] != SINCE) for pairs in (start.values, start.written)]
+        return replace(system, initial=replace(start, values=pairs[0], written=pairs[1])) if SINCE in given else system
     if SINCE not in given:
         start = replace(start, values=(*start.values, (SINCE, ZERO)))
         start = replace(start, written=(*start.written, (SINCE, ZERO)) if start.written else ())
@@ -219,21 +215,11 @@ def with_timers(system: HybridSystem) -> HybridSystem:
     )
 
 
-def _without(system: HybridSystem) -> Initial:
-    initial = system.initial
-    kept = [tuple(pair for pair in pairs if pair[0] != SINCE) for pairs in (initial.values, initial.written)]
-    return replace(initial, values=kept[0], written=kept[1])
-
-
-def _uses_timer(expression: Any) -> bool:
-    return _TIMER in getattr(expression, "free_symbols", ())
-
-
-def _timed_parts(mode: Mode) -> Iterator[Any]:
-    yield from (*mode.flow, *mode.outputs, *mode.scene)
-    yield from (side for s in mode.surfaces for side in (s.residual, s.left, s.right))
-    for edge in mode.edges:
-        yield from (edge.condition, *edge.reset)
+def _uses_timer(mode: Mode) -> bool:
+    parts = [*mode.flow, *mode.outputs, *mode.scene]
+    parts += [side for s in mode.surfaces for side in (s.residual, s.left, s.right)]
+    parts += [part for edge in mode.edges for part in (edge.condition, *edge.reset)]
+    return any(_TIMER in getattr(part, "free_symbols", ()) for part in parts)
 
 
 def _timed_mode(mode: Mode, timed: set[str], own: dict[str, bool]) -> Mode:

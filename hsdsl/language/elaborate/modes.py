@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import ChainMap
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,13 +27,13 @@ from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import ZERO, Edge, Event, HybridSystem, Mode, Shape, Surface
 
 
-def elaborate_modes(symbols: SymbolTable, outputs: dict[str, Value | None]) -> tuple[Mode, ...]:
+def elaborate_modes(symbols: SymbolTable, outputs: dict[Key, Value | None]) -> tuple[Mode, ...]:
     """Every mode, in file order. Where something is reported the modes are not complete, and no system is made."""
     modes = [_mode(symbols, name, document, outputs) for name, document in symbols.document.modes.items()]
     return tuple(mode for mode in modes if mode is not None)
 
 
-def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[str, Value | None]) -> Mode | None:
+def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[Key, Value | None]) -> Mode | None:
     if document.flow is None and not document.final:
         message = f"the mode '{name}' has no `flow`"
         symbols.report(name.place, "HS304", message, "write `flow: {}` for a mode without states, or `final: true`")
@@ -45,8 +45,13 @@ def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[
     scope = symbols.scopes[str(name)] = mode_scope(symbols, name, document)
     flow = symbols.numbers((document.flow or {}).values(), scope)
     walls = all_of([surface(symbols, scalar, scope, "domain") for scalar in document.domain])
-    edges = all_of(elaborate_edges(symbols, name, document, scope))
-    outputs = outputs_of(symbols, shared, document, scope)
+    names = edge_names(name, document.transitions, lambda at, *fault: symbols.report(at.place, *fault))
+    pairs = zip(names, document.transitions, strict=True)
+    edges = all_of([_edge(symbols, str(name), label, transition, scope) for label, transition in pairs])
+    given = {str(name): scalar for name, scalar in symbols.document.outputs.items()}
+    outputs = {name: output_here(symbols, given[name], value, scope) for name, value in shared.items()}
+    outputs |= {str(name): symbols.number(scalar, scope) for name, scalar in document.outputs.items()}
+    values = (outputs.get(name) for name in symbols.all_outputs)  # None for one that the mode does not have
     if flow is None or walls is None or edges is None:
         return None
     return Mode(
@@ -56,7 +61,7 @@ def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[
         flow_texts=tuple(scalar.value for scalar in (document.flow or {}).values()),
         walls=tuple(walls),
         edges=tuple(edges),
-        outputs=outputs,
+        outputs=tuple(None if value is None else value.expr for value in values),
         final=document.final,
     )
 
@@ -80,19 +85,19 @@ def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope
     return scope
 
 
-def elaborate_outputs(symbols: SymbolTable) -> dict[str, Value | None]:
+def elaborate_outputs(symbols: SymbolTable) -> dict[Key, Value | None]:
     """The value of each output of the whole model; None where its expression is broken.
 
     A `let` name that some mode defines means itself, like a state, until the mode is known.
     """
     scope = output_scope(symbols)
-    outputs: dict[str, Value | None] = {}
+    outputs: dict[Key, Value | None] = {}
     for name, scalar in symbols.document.outputs.items():
-        _check_name(symbols, name)
         outputs[name] = symbols.number(scalar, scope)
-    for mode in symbols.document.modes.values():
-        for name in mode.outputs:
-            _check_name(symbols, name)
+    for name in (*outputs, *(name for mode in symbols.document.modes.values() for name in mode.outputs)):
+        if symbols.names.get(name) == "states":
+            message = f"the output '{name}' has the name of a state"
+            symbols.report(name.place, "HS301", message, "states are recorded anyway")
     return outputs
 
 
@@ -100,21 +105,6 @@ def output_scope(symbols: SymbolTable) -> Scope:
     """The names that can be used in an output of the whole model."""
     inner: Meanings = symbols.recorded | {name: state(name) for name in symbols.inner_lets}
     return symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "", inner)
-
-
-def _check_name(symbols: SymbolTable, name: Key) -> None:
-    if symbols.names.get(name) == "states":
-        message = f"the output '{name}' has the name of a state"
-        symbols.report(name.place, "HS301", message, "states are recorded anyway")
-
-
-def outputs_of(symbols: SymbolTable, shared: dict[str, Value | None], document: ModeDocument, scope: Scope) -> tuple:
-    """The outputs of a mode, in the order of `SymbolTable.all_outputs`; None for one that it does not have."""
-    given = {str(name): scalar for name, scalar in symbols.document.outputs.items()}
-    outputs = {name: output_here(symbols, given[name], value, scope) for name, value in shared.items()}
-    outputs |= {str(name): symbols.number(scalar, scope) for name, scalar in document.outputs.items()}
-    values = (outputs.get(name) for name in symbols.all_outputs)
-    return tuple(None if value is None else value.expr for value in values)
 
 
 def output_here(symbols: SymbolTable, scalar: Scalar, value: Value | None, scope: Scope) -> Value | None:
@@ -170,46 +160,32 @@ def surface(symbols: SymbolTable, scalar: Scalar, scope: Scope, key: str) -> Sur
     sides = symbols.inequality(scalar, scope, key)
     if sides is None:
         return None
-    left, right = sides.left.expr, sides.right.expr
-    greater = sides.operator in (">", ">=")
+    left, right = sides[0].expr, sides[2].expr
+    greater = sides[1] in (">", ">=")
     residual = left - right if greater == (key == "when") else right - left
     return Surface(left, right, residual, scalar.value)
 
 
-def elaborate_edges(symbols: SymbolTable, name: Key, document: ModeDocument, scope: Scope) -> list[Edge | None]:
-    """The edges that leave a mode, in file order; None for one with faults."""
-    names = _names(symbols, name, document.transitions)
-    return [
-        _edge(symbols, str(name), edge_name, transition, scope)
-        for edge_name, transition in zip(names, document.transitions, strict=True)
-    ]
-
-
-def _names(symbols: SymbolTable, source: Key, transitions: list[TransitionDocument]) -> list[str]:
-    """The name of each transition: its own, or `SRC->DST`, `SRC->DST#2` and so on."""
+def edge_names(
+    mode: str, transitions: Sequence[TransitionDocument], report: Callable[[Scalar, str, str, str], None]
+) -> list[str]:
+    """The name of each transition of a mode: its own, or `SRC->DST`, `SRC->DST#2`, ...; one given twice is reported."""
     given: set[str] = set()
-    for transition in transitions:
-        name = symbols.text(transition.name)
-        if name in given and transition.name is not None:
-            message = f"the mode '{source}' has a transition '{shown(name)}' already"
-            symbols.report(transition.name.place, "HS307", message, "give it another name")
-        elif name is not None:
-            given.add(name)
     counts: dict[str, int] = {}
-    targets = [str(source) if t.event is not None and t.to.value == ABSENT else t.to.value for t in transitions]
-    return [
-        symbols.text(t.name) or unnamed(f"{source}->{target}", counts, given)
-        for t, target in zip(transitions, targets, strict=True)
-    ]
+    labels = [None if t.name is None or t.name.value == ABSENT else t.name for t in transitions]
+    for label in filter(None, labels):
+        if label.value in given:
+            message = f"the mode '{mode}' has a transition '{shown(label.value)}' already"
+            report(label, "HS307", message, "give it another name")
+        given.add(label.value)
 
-
-def unnamed(pair: str, counts: dict[str, int], given: set[str]) -> str:
-    """The name of a transition that has none: `SRC->DST`, `SRC->DST#2` and so on."""
-    while True:
+    def unnamed(pair: str) -> str:
         counts[pair] = counts.get(pair, 0) + 1
         name = pair if counts[pair] == 1 else f"{pair}#{counts[pair]}"
-        if name not in given:
-            return name
+        return unnamed(pair) if name in given else name
+
+    pairs = zip(labels, transitions, strict=True)
+    return [unnamed(f"{mode}->{t.target or mode}") if label is None else label.value for label, t in pairs]
 
 
 def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDocument, scope: Scope) -> Edge | None:

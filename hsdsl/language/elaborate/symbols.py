@@ -15,7 +15,7 @@ from hsdsl.base.errors import Findings
 from hsdsl.base.names import SINCE, closest, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.expression import Expected, ExpressionError, numeric, parse, symbolic
-from hsdsl.language.expression.conditions import Inequality, Trigger, equation, inequality, the_comparison, trigger_of
+from hsdsl.language.expression.conditions import Trigger, equation, inequality, the_comparison, trigger_of
 from hsdsl.language.expression.parse import Call, Tree
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, state
 from hsdsl.language.expression.timebox import Box
@@ -92,50 +92,44 @@ class ExpressionResolver:
 
     def equation(self, scalar: Scalar, scope: Scope) -> tuple[Value, Value] | None:
         """Both sides of an equation."""
-        text = scalar.value
-        return self._built(scalar, scope, "condition", lambda tree: equation(tree, scope, text))
+        return self._built(scalar, scope, "condition", lambda tree: equation(tree, scope, scalar.value))
 
     def trigger(self, scalar: Scalar, scope: Scope) -> Trigger | None:
         """The condition of an event."""
         return self._built(scalar, scope, "condition", lambda tree: trigger_of(tree, scope, scalar.value))
 
-    def inequality(self, scalar: Scalar, scope: Scope, key: str) -> Inequality | None:
-        """The two sides of one inequality."""
-        text = scalar.value
-        return self._built(scalar, scope, "inequality", lambda tree: inequality(tree, scope, text, key), key)
+    def inequality(self, scalar: Scalar, scope: Scope, key: str) -> tuple[Value, str, Value] | None:
+        """The two sides of one inequality, and its sign between them."""
+        return self._built(scalar, scope, "inequality", lambda tree: inequality(tree, scope, scalar.value, key), key)
 
     def _built(
         self, scalar: Scalar, scope: Scope, expected: Expected, build: Callable[[Tree], T], key: str = ""
     ) -> T | None:
-        """An object built of an expression; None where it has faults, which are reported."""
-        try:
-            tree = self._resolved(scalar, scope, expected, key)
-            return build(tree) if tree else None
-        except ExpressionError as error:
-            self._report(scalar, error)
-            return None
-
-    def _resolved(self, scalar: Scalar, scope: Scope, expected: Expected, key: str) -> Tree | None:
-        """The tree of an expression all of whose names can be used; None where one's definition is broken."""
+        """An object built of an expression; None where it has faults, which are reported, or uses what is broken."""
         if scalar.value == ABSENT:
             return None
         self.at = scalar
         if self.box:
             self.box.restart()
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
-        tree = _tree(text, expected, scope)
-        tree = tree if scope.expanded is None else scope.expanded(tree)
-        known = self.names_known(scalar, tree, scope)
-        if expected == "inequality" and not (isinstance(tree, Call) and scope.faults(tree)):
-            the_comparison(tree, key, text)
-        return tree if known else None
+        try:
+            tree = _tree(text, expected, scope)
+            tree = tree if scope.expanded is None else scope.expanded(tree)
+            known = self.names_known(scalar, tree, scope)
+            if expected == "inequality" and not (isinstance(tree, Call) and scope.faults(tree)):
+                the_comparison(tree, key, text)
+            return build(tree) if known else None
+        except ExpressionError as error:
+            self._report(scalar, error)
+            return None
 
     def _report(self, scalar: Scalar, error: ExpressionError) -> None:
-        hint = error.hint
-        if scalar.plain and scalar.value.count("(") > scalar.value.count(")") and _cut_by_comment(scalar.place):
+        hint, text, (_, line, column) = error.hint, scalar.place.text, scalar.place.end
+        cut = scalar.plain and scalar.value.count("(") > scalar.value.count(")")
+        if cut and text.lines[line][column:].lstrip().startswith("#"):
             hint = "YAML begins a comment at ` #`: quote this expression"
         span = scalar.span(error.start, error.end)
-        self.findings.add(scalar.place.text.diagnostic(error.code, error.message, span, hint))
+        self.findings.add(text.diagnostic(error.code, error.message, span, hint))
 
 
 def _tree(text: str, expected: Expected, scope: Scope) -> Tree:
@@ -144,11 +138,6 @@ def _tree(text: str, expected: Expected, scope: Scope) -> Tree:
         message, hint = f"`{text.strip()}` is not a finite number", "every number is finite here"
         raise ExpressionError("HS118", message, 0, len(text), hint)
     return parse(text, expected)
-
-
-def _cut_by_comment(place: SourceRange) -> bool:
-    line = place.text.lines[place.end[1]]
-    return line[place.end[2] :].lstrip().startswith("#")
 
 
 KINDS = {

@@ -20,23 +20,14 @@ from hsdsl.language.expression.parse import Comparison, ExpressionError, Logic, 
 from hsdsl.language.expression.scope import Scope, Value
 
 
-@dataclass(frozen=True)
-class Inequality:
-    """``left operator right``."""
-
-    left: Value
-    operator: str
-    right: Value
-
-
-def inequality(tree: Tree, scope: Scope, text: str, key: str) -> Inequality:
-    """The two sides of an inequality whose names the scope has.
+def inequality(tree: Tree, scope: Scope, text: str, key: str) -> tuple[Value, str, Value]:
+    """The two sides of an inequality whose names the scope has, and its sign between them.
 
     Raises ExpressionError: as `symbolic.number`, and where there is no inequality or more than one.
     """
     comparison = the_comparison(tree, key, text)
     left, right = (symbolic.number(side, scope, text) for side in comparison.operands)
-    return Inequality(left, comparison.operators[0], right)
+    return left, comparison.operators[0], right
 
 
 def equation(tree: Tree, scope: Scope, text: str) -> tuple[Value, Value]:

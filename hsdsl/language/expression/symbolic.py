@@ -221,8 +221,15 @@ class _Builder:
         if size > numeric.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
             raise ExpressionError.at(tree, "HS120", message, _SIMPLIFY)
-        if constant and not expr.is_Rational:
-            self.refuse_large_constant(tree, size, depth)
+        if constant and not expr.is_Rational:  # SymPy would compute it for ever
+            sentence = None
+            if size > numeric.MOST_NODES_OF_A_CONSTANT:
+                sentence = f"is a constant of more than {numeric.MOST_NODES_OF_A_CONSTANT} operations"
+            elif depth > numeric.MOST_LEVELS_OF_A_CONSTANT:
+                most = numeric.MOST_LEVELS_OF_A_CONSTANT
+                sentence = f"is a constant whose functions are nested more than {most} deep"
+            if sentence:
+                raise ExpressionError.at(tree, "HS120", f"`{self.text_of(tree)}` {sentence}", _DECIMAL)
         within = _bits_within(tree, parts)
         most = numeric.MOST_BITS_WITHIN_A_POWER if isinstance(tree, Power) else numeric.MOST_BITS_WITHIN
         if within > most:
@@ -231,16 +238,6 @@ class _Builder:
         if depth > numeric.MOST_LEVELS:
             raise self.too_deep(tree)
         return Value(expr, number, constant, uses, size, depth, within)
-
-    def refuse_large_constant(self, tree: Tree, size: int, depth: int) -> None:
-        """Raise where SymPy would compute a constant for ever."""
-        sentence = None
-        if size > numeric.MOST_NODES_OF_A_CONSTANT:
-            sentence = f"is a constant of more than {numeric.MOST_NODES_OF_A_CONSTANT} operations"
-        elif depth > numeric.MOST_LEVELS_OF_A_CONSTANT:
-            sentence = f"is a constant whose functions are nested more than {numeric.MOST_LEVELS_OF_A_CONSTANT} deep"
-        if sentence:
-            raise ExpressionError.at(tree, "HS120", f"`{self.text_of(tree)}` {sentence}", _DECIMAL)
 
     def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
         """Raise where a constant has no finite real value."""
@@ -313,12 +310,9 @@ def _bits_within(tree: Tree, parts: list[Value]) -> int:
 
 def _not_real(expr: Any) -> bool:
     """Whether an expression is infinite for SymPy, or not real."""
-    parts = expr.args if expr.is_Mul or expr.is_Add else (expr,)
-    return any(p in _NOT_REAL or (p.is_Pow and _root_of_negative(*p.args)) for p in (expr, *parts))
-
-
-def _root_of_negative(base: Any, exponent: Any) -> bool:
-    return bool(base.is_Rational and base < 0 and exponent.is_Rational and not exponent.is_Integer)
+    parts = (expr, *(expr.args if expr.is_Mul or expr.is_Add else ()))
+    roots = [(p.base, p.exp) for p in parts if p.is_Pow and p.base.is_Rational and p.exp.is_Rational]
+    return any(p in _NOT_REAL for p in parts) or any(base < 0 and not exp.is_Integer for base, exp in roots)
 
 
 def _with_our_functions(expr: Any) -> Any:

@@ -50,8 +50,10 @@ def compose(text: Text, findings: Findings) -> Node:
         parser.dispose()
 
 
-def _is_name(key: Node) -> bool:
-    return isinstance(key, Scalar) and is_identifier(key.value)
+def _is_strange(entry: tuple[Node, Node]) -> bool:
+    """Whether an entry in braces has no value, and no name for a key."""
+    key, value = entry
+    return is_bare(value) and not (isinstance(key, Scalar) and is_identifier(key.value))
 
 
 def _is_cut(item: Node) -> bool:
@@ -98,7 +100,9 @@ class _Composer:
         if anchor is not None:
             self.anchors[anchor] = (None, 0, 0)
         if event.tag is not None:
-            self._tag(event)
+            message = f"`{shown(event.tag)}` is a tag in YAML, and models have no tags"
+            hint = "quote this expression; a condition is negated with `not`"
+            self.findings.add(self._place(event).diagnostic("HS009", message, hint))
         self._grow(event, 1, 1)
         if isinstance(event, yaml.ScalarEvent):
             measured: tuple[Node, int, int] = (self._scalar(event), 1, 1)
@@ -149,7 +153,7 @@ class _Composer:
                 self._stop(key.place.diagnostic("HS016", message, hint))
             nodes, height = nodes + more_keys + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
-        if event.flow_style and any(is_bare(value) and not _is_name(key) for key, value in entries):
+        if event.flow_style and any(map(_is_strange, entries)):
             from hsdsl.language.diagnosis.yaml_text import rejoined_entries
 
             entries = rejoined_entries(entries, self.findings)
@@ -191,11 +195,6 @@ class _Composer:
             raise AssertionError
         self._grow(event, nodes, height)
         return node, nodes, height
-
-    def _tag(self, event: Any) -> None:
-        message = f"`{shown(event.tag)}` is a tag in YAML, and models have no tags"
-        hint = "quote this expression; a condition is negated with `not`"
-        self.findings.add(self._place(event).diagnostic("HS009", message, hint))
 
     def _grow(self, event: Any, nodes: int, height: int) -> None:
         self.count += nodes

@@ -59,8 +59,9 @@ def decode(path: str, data: bytes) -> Text:
     """
     most = limits.current().bytes
     if len(data) > most:
+        size = f"{most >> 20} MiB" if most % (1 << 20) == 0 else f"{most:,} bytes"
         hint = f"keep data in CSV files and name them in inputs, or allow more with --limit bytes={most * 10}"
-        raise _refused(path, "HS003", f"the file is larger than {_size(most)}", hint)
+        raise _refused(path, "HS003", f"the file is larger than {size}", hint)
     data = data.removeprefix(b"\xef\xbb\xbf")
     if data.startswith(_ARCHIVE):
         hint = "a saved run (.npz) is read with hsdsl.store.load"
@@ -75,36 +76,21 @@ def decode(path: str, data: bytes) -> Text:
         message = f"the byte 0x{data[error.start]:02x} here is not UTF-8 text"
         raise ModelError([Diagnostic("HS001", message, span, "save the file as UTF-8", before.lines[-1])]) from None
     text = Text.of(path, content)
-    wrong = [_forbidden(text, match) for match in _first_of_each(content)]
+    first: dict[str, int] = {}
+    for match in INVISIBLE.finditer(content):
+        first.setdefault(match.group(), match.start())
+    wrong: list[Diagnostic] = []
+    for sign, start in first.items():
+        before = _BREAK.split(content[:start])
+        message = f"the invisible character U+{ord(sign):04X} is not allowed in a model"
+        wrong.append(text.fault("HS002", message, len(before), len(before[-1]) + 1, "remove it"))
     if wrong:
         raise ModelError(wrong)
     return text
 
 
-def _size(count: int) -> str:
-    return f"{count >> 20} MiB" if count % (1 << 20) == 0 else f"{count:,} bytes"
-
-
 def _refused(path: str, code: str, message: str, hint: str) -> ModelError:
     return ModelError([Diagnostic(code, message, Span(path, 1, 1), hint)])
-
-
-def _first_of_each(content: str) -> list[re.Match[str]]:
-    first: dict[str, re.Match[str]] = {}
-    for match in INVISIBLE.finditer(content):
-        first.setdefault(match.group(), match)
-    return list(first.values())
-
-
-def _forbidden(text: Text, match: re.Match[str]) -> Diagnostic:
-    before = _BREAK.split(text.content[: match.start()])
-    span = text.span(len(before), len(before[-1]) + 1)
-    return text.diagnostic(
-        "HS002", f"the invisible character U+{ord(match.group()):04X} is not allowed in a model", span, "remove it"
-    )
-
-
-_ESCAPE_LENGTHS = {"x": 2, "u": 4, "U": 8}
 
 
 def positions(raw: str, length: int, value: str) -> list[int]:
@@ -114,33 +100,17 @@ def positions(raw: str, length: int, value: str) -> list[int]:
     """
     if raw == value:
         return list(range(length + 1))
-    if raw.startswith('"'):
-        offsets = _double_quoted(raw)
-    elif raw.startswith("'"):
-        offsets = _single_quoted(raw)
-    else:
-        offsets = []
-    if len(offsets) == length + 1:
-        return offsets
-    return _aligned(raw, value)
-
-
-def _single_quoted(raw: str) -> list[int]:
     offsets: list[int] = []
-    at = 1
-    while at < len(raw) - 1:
-        offsets.append(at)
-        at += 2 if raw[at] == "'" else 1
-    return [*offsets, len(raw) - 1]
-
-
-def _double_quoted(raw: str) -> list[int]:
-    offsets: list[int] = []
-    at = 1
-    while at < len(raw) - 1:
-        offsets.append(at)
-        at += 2 + _ESCAPE_LENGTHS.get(raw[at + 1], 0) if raw[at] == "\\" else 1
-    return [*offsets, len(raw) - 1]
+    if raw[:1] in ("'", '"'):
+        at = 1
+        while at < len(raw) - 1:
+            offsets.append(at)
+            if raw[0] == '"' and raw[at] == "\\":
+                at += 2 + {"x": 2, "u": 4, "U": 8}.get(raw[at + 1], 0)
+            else:
+                at += 2 if raw[0] == raw[at] == "'" else 1
+        offsets.append(len(raw) - 1)
+    return offsets if len(offsets) == length + 1 else _aligned(raw, value)
 
 
 def _aligned(raw: str, value: str) -> list[int]:
@@ -213,15 +183,10 @@ class Scalar:
         where = positions(self.place.text.content[first:last], len(self.value), self.value)
         begin = first + where[min(start, len(where) - 1)]
         finish = first + where[min(max(end - 1, start), len(where) - 1)] + 1
-        line, column = self._line_and_column(begin)
-        return self.place.text.span(line, column, finish - begin)
-
-    def _line_and_column(self, index: int) -> tuple[int, int]:
         first, line, column = self.place.start
-        before = Text.of("", self.place.text.content[first:index]).lines
-        if len(before) == 1:
-            return line + 1, column + 1 + len(before[0])
-        return line + len(before), 1 + len(before[-1])
+        before = _BREAK.split(self.place.text.content[first:begin])
+        column = len(before[-1]) + (column if len(before) == 1 else 0)
+        return self.place.text.span(line + len(before), column + 1, finish - begin)
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,7 +66,10 @@ class Parts:
         self.scene, scene = self._scene()
         self._check_lets(document)
         self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
-        self.parts = tuple(map(self._with_timer, self.parts))
+        for k, part in enumerate(self.parts):
+            if part.name in self.board.timed:  # all of its modes have the state `since`
+                timed = replace(part, states=tuple((*states, f"{part.name}.{SINCE}") for states in part.states))
+                self.parts = (*self.parts[:k], timed, *self.parts[k + 1 :])
         self.initial = self._initial()
         self.units = dict(self._units())
         if not symbols.findings.diagnostics:  # else what reads them may not have been looked at
@@ -179,11 +182,6 @@ class Parts:
             if str(name) in taken:
                 message = f"'{name}' is an unknown of `solve` in the mode '{mode}', and also {taken[str(name)]}"
                 self.board.report_once(name, "HS301", message, "give one of them another name")
-
-    def _with_timer(self, part: Part) -> Part:
-        """A part with the state `since` in all of its modes, where it uses that."""
-        timer = (f"{part.name}.{SINCE}",) if part.name in self.board.timed else ()
-        return replace(part, states=tuple((*states, *timer) for states in part.states))
 
     def _initial(self) -> Initial:
         """The initial state of the whole; states that the initial mode of a part lacks are 0."""

@@ -16,12 +16,12 @@ from typing import Any
 
 from hsdsl.base.names import SINCE, did_you_mean, shown
 from hsdsl.base.parts import numbered
-from hsdsl.language.elaborate.modes import NOWHERE, event_of, of_events, surface, unnamed
+from hsdsl.language.elaborate.modes import NOWHERE, edge_names, event_of, of_events, surface
 from hsdsl.language.elaborate.parts.instances import Instance
 from hsdsl.language.elaborate.parts.names import MEMBER, Board, Names
 from hsdsl.language.expression.algebra import ONE, ZERO, either, is_mode, pick, select, total, truth_of, whole
 from hsdsl.language.expression.scope import Refusal, symbol
-from hsdsl.language.schema.documents import PartModeDocument, PartTransitionDocument
+from hsdsl.language.schema.documents import PartTransitionDocument
 from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import Edge, Mode, Surface
 from hsdsl.language.system import Event as Rising
@@ -189,25 +189,12 @@ def transitions_of(board: Board, one: Instance) -> list[PartTransition]:
     found: list[PartTransition] = []
     for source, (mode, document) in enumerate(one.modes):
         names = Names(board, one, mode, one.index)
-        for name, transition in zip(_labels(board, mode, document), document.transitions, strict=True):
+        labels = edge_names(mode, document.transitions, board.report_once)
+        for name, transition in zip(labels, document.transitions, strict=True):
             made = _transition(board, names, source, name, transition)
             if made is not None:
                 found.append(made)
     return found
-
-
-def _labels(board: Board, mode: str, document: PartModeDocument) -> list[str]:
-    """The name of each transition of a mode; a name given twice is reported, once."""
-    given: set[str] = set()
-    for label in (transition.name for transition in document.transitions):
-        if label is not None and label.value in given:
-            board.report_once(label, "HS307", f"the mode '{mode}' has a transition '{shown(label.value)}' already",
-                              "give it another name")  # fmt: skip
-        given |= {label.value} if label is not None else set()
-    counts: dict[str, int] = {}
-    return [
-        t.name.value if t.name else unnamed(f"{mode}->{t.target or mode}", counts, given) for t in document.transitions
-    ]
 
 
 def _transition(
@@ -300,7 +287,8 @@ def _events(board: Board, names: Names, label: Scalar, beyond: bool = False) -> 
             return ()
         return _events(board, replace(names, index=sender), given, beyond=True)
     senders = [other for other in several or [] if other is not names.instance] or ([sender] if sender else [])
-    known = [label for other in senders for mode, inner in other.modes for label in _labels(board, mode, inner)]
+    modes = [(mode, inner.transitions) for other in senders for mode, inner in other.modes]
+    known = [label for mode, made in modes for label in edge_names(mode, made, board.report_once)]
     if senders and name not in known:
         message = f"the automaton '{senders[0].automaton}' has no transition '{shown(name)}'"
         board.report_once(label, "HS353", message, did_you_mean(name, known))
@@ -381,9 +369,11 @@ class Broadcast:
     board: Board
     listeners: Sequence[PartTransition]
     _by_event: dict[Event, list[PartTransition]] = field(init=False)
+    _places: dict[PartTransition, int] = field(init=False)
 
     def __post_init__(self) -> None:
         self._by_event = defaultdict(list)
+        self._places = {listener: k for k, listener in enumerate(self.listeners)}
         for listener in self.listeners:
             if listener.one.part.final[listener.target]:
                 message = f"'{listener.name}' fires together with another transition, and leads to a final mode"
@@ -398,13 +388,16 @@ class Broadcast:
         news: dict[Event, Any] = {first.event: ONE}
         while news:
             later: dict[Event, list[Any]] = defaultdict(list)
-            for listener in self._hearing(news, first):
+            hearing = dict.fromkeys(x for event in news for x in self._by_event[event] if x.one is not first.one)
+            for listener in sorted(hearing, key=lambda x: (-x.priority, self._places[x])):
                 if listener in settled:
                     continue
                 heard = either([truth for event, truth in news.items() if event in listener.after])
                 if heard == 1:
                     settled.add(listener)
-                truth = heard * self._enabled(listener)
+                one = listener.one
+                here = is_mode(symbol(one.name), listener.source + 1) if one.part.is_numbered else ONE
+                truth = heard * here * (ONE if listener.condition is None else truth_of(listener.condition))
                 before = fired.get(listener.one.name)
                 truth = truth if before is None else truth * (1 - before)
                 if truth != 0:
@@ -412,17 +405,6 @@ class Broadcast:
                     later[listener.event].append(truth)
                     yield truth, listener
             news = {event: sum(truths[1:], truths[0]) for event, truths in later.items()}
-
-    def _hearing(self, news: dict[Event, Any], first: PartTransition) -> list[PartTransition]:
-        found = dict.fromkeys(listener for event in news for listener in self._by_event[event])
-        places = {listener: k for k, listener in enumerate(self.listeners)}
-        return sorted((x for x in found if x.one is not first.one), key=lambda x: (-x.priority, places[x]))
-
-    @staticmethod
-    def _enabled(listener: PartTransition) -> Any:
-        one = listener.one
-        here = is_mode(symbol(one.name), listener.source + 1) if one.part.is_numbered else ONE
-        return here if listener.condition is None else here * truth_of(listener.condition)
 
     def changes(self, first: PartTransition) -> dict[str, Any]:
         """The states that change where a transition fires, with their values, expressions of the values before."""
@@ -438,7 +420,9 @@ class Broadcast:
             for state, value in given.items():
                 setter = setters.setdefault(state, follower)
                 if setter.one is not follower.one:
-                    self._clash(state, setter, follower)
+                    names = " and ".join(f"'{made.one.name}.{made.name}'" for made in (setter, follower))
+                    message = f"{names} fire together and both set '{state}'"
+                    self.board.report_once(follower.keys[state], "HS353", message, "let one of them set it")
                 safe = total(value, lambda a, b, truth=truth: select(truth, a, b), frozenset())
                 values[state] = select(truth, safe, values.get(state, symbol(state)))
         return values
@@ -446,9 +430,3 @@ class Broadcast:
     def _timer(self, made: PartTransition) -> dict[str, Any]:
         """The timer of an instance, which each of its transitions that does not stay sets to 0."""
         return {made.one.full(SINCE): ZERO} if made.one.name in self.board.timed and not made.stays else {}
-
-    def _clash(self, state: str, one: PartTransition, other: PartTransition) -> None:
-        message = (
-            f"'{one.one.name}.{one.name}' and '{other.one.name}.{other.name}' fire together and both set '{state}'"
-        )
-        self.board.report_once(other.keys[state], "HS353", message, "let one of them set it")

@@ -73,8 +73,12 @@ class Board:
             return None
         self._active.append((str(key), label))
         try:
-            lacks = partial and self.lacks(scalar, names)
-            value = _lacking(label, names) if lacks else self.value(scalar, names)
+            if partial and self.lacks(scalar, names):
+                message = f"'{label.rpartition('.')[2]}' has no value in the mode '{names.mode}': "
+                message += "it uses a name that others define"
+                value: Meaning = Refusal("HS354", message, "define that name in this mode, too, under `let`")
+            else:
+                value = self.value(scalar, names)
         finally:
             self._active.pop()
         return self._known.setdefault(key, value)
@@ -264,11 +268,6 @@ def unknowns_of(mode: PartModeDocument) -> list[str]:
     return [] if mode.solve is None else list(map(str, mode.solve.unknowns))
 
 
-def _lacking(label: str, names: Names) -> Refusal:
-    message = f"'{label.rpartition('.')[2]}' has no value in the mode '{names.mode}': it uses a name that others define"
-    return Refusal("HS354", message, "define that name in this mode, too, under `let`")
-
-
 def whole_value(number: int) -> Value:
     """The value of a whole number."""
     return resolved_expression(str(number), Scope({}))
@@ -361,7 +360,8 @@ class Names(Mapping[str, Meaning]):
         if one is not None:
             yield from (*one.states, *map(str, (*one.kind.let, *one.kind.inputs, *one.kind.parameters)))
         yield from (*self.board.symbols.names, *self.board.symbols.values)
-        yield from (other.full(name) for other in self.board.roster.first_of_each() for name in other.states)
+        groups = self.board.roster.automata.values()
+        yield from (group[0].full(name) for group in groups if group for name in group[0].states)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
