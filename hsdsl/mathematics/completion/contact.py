@@ -268,7 +268,8 @@ def branched(near: Nearby) -> Nearby | None:
     """What a motion depends on, with the branch of the reset that impacts take; None where they take no one branch."""
     if not near.moved.has(*KINKED) and not any(map(_is_root, near.moved.atoms(sp.Pow))):
         return near
-    impacts = [points for seed in SEEDS if len(points := _impacts(near, seed)) == len(SPEEDS)]
+    series = (list(takewhile(bool, (_impact(near, speed, seed) for speed in SPEEDS))) for seed in SEEDS)
+    impacts = [points for points in series if len(points) == len(SPEEDS)]  # one is found at each speed
     if not impacts:
         return near
     branch = _Branch(near, impacts)
@@ -279,11 +280,6 @@ def branched(near: Nearby) -> Nearby | None:
     if reset == near.edge.reset:
         return near
     return near.by(replace(near.edge, reset=reset), impacts[0][0])
-
-
-def _impacts(near: Nearby, seed: int) -> list[Point]:
-    """Ever slower impacts at random points of a guard; fewer than speeds where none is found at one of them."""
-    return list(takewhile(bool, (_impact(near, speed, seed) for speed in SPEEDS)))
 
 
 def _impact(near: Nearby, speed: float, seed: int) -> Point | None:

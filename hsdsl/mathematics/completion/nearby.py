@@ -303,26 +303,22 @@ def counts_of(near: Nearby) -> tuple[int, ...]:
     A sum that converges, as that of what impacts dissipate, is none: its increment vanishes where the state rests. Nor
     is what repeated resets take to a limit of its own.
     """
-    unused = _unused_of(near.mode) if near.changed else ()
-    few = tuple(i for i in near.changed if i in unused)
+    if near.changed and (not _last or _last[0][0] is not near.mode):
+        _last[:] = [(near.mode, _unused(near.mode))]
+    few = tuple(i for i in near.changed if i in _last[0][1])
     if not few or not near.is_small() or (found := fixed_point(near.without(few))) is None:
         return ()
     anywhere = {x: NUMBERS.zero + 1 + 1 / (3 + k) for k, x in enumerate(sorted(near.moved.free_symbols, key=str))}
     at = anywhere | found
-
-    def is_count(i: int, change: sp.Expr) -> bool:
-        return not is_zero(change, at) and abs(1 + value_at(sp.diff(change, near.states[i]), at)) >= 1
-
-    return tuple(i for i, change in zip(near.changed, near.moved, strict=True) if i in few and is_count(i, change))
+    changes = ((i, change) for i, change in zip(near.changed, near.moved, strict=True) if i in few)
+    return tuple(
+        i
+        for i, change in changes
+        if not is_zero(change, at) and abs(1 + value_at(sp.diff(change, near.states[i]), at)) >= 1
+    )
 
 
 _last: list[tuple[Mode, frozenset[int]]] = []  # of a mode all edges in turn; to hash one takes longer than this does
-
-
-def _unused_of(mode: Mode) -> frozenset[int]:
-    if not _last or _last[0][0] is not mode:
-        _last[:] = [(mode, _unused(mode))]
-    return _last[0][1]
 
 
 def _unused(mode: Mode) -> frozenset[int]:

@@ -63,7 +63,9 @@ def overlay(mode: Mode, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES)
     for i, (found, flag) in enumerate(zip(contacts, chosen, strict=True)):
         edges[found.edge] = _released(found, flag, flags[i], *pushes[i])
         releases[found.edge] = i
-        edges += [replace(end, surface=_nowhere_else(end.surface, flag)) for end in found.further]
+        for end in found.further:  # is reached in contact only
+            residual = below(flag, LOOKED_AT, sp.S.NegativeOne, end.surface.residual)
+            edges.append(replace(end, surface=Surface(residual, sp.S.Zero, residual, end.surface.text)))
         releases += [i] * len(found.further)
     known = dict(zip(flags, chosen, strict=True)) if len(flags) == 1 else {}
     whole = replace(mode, flow=tuple(row.xreplace(known) for row in flow) if known else tuple(flow), edges=tuple(edges))
@@ -131,20 +133,10 @@ def _released(found: Contact, chosen: sp.Expr, flag: sp.Symbol, push: sp.Expr, s
     if condition is not None:
         parts = condition.args if isinstance(condition, sp.And) else (condition,)
         lasting = dict.fromkeys(found.kept, sp.true)
-        condition = sp.And(*(_of_contact(part, part.xreplace(lasting), flag) for part in parts))
+        looked_at, holds = sp.Ge(flag, LOOKED_AT), sp.Ge(flag, HELD)  # in contact it holds
+        condition = sp.And(*(sp.Or(p, holds, sp.And(looked_at, p.xreplace(lasting))) for p in parts))
     condition = None if condition in (None, sp.true) else condition
     return replace(edge, surface=Surface(left, right, residual, was.text), condition=condition)
-
-
-def _of_contact(part: sp.Basic, lasting: sp.Basic, flag: sp.Symbol) -> sp.Basic:
-    """A part of an `if`: in contact it holds; where that is looked at, what ``lasting`` says of it."""
-    return sp.Or(part, sp.Ge(flag, HELD), sp.And(sp.Ge(flag, LOOKED_AT), lasting))
-
-
-def _nowhere_else(surface: Surface, flag: sp.Expr) -> Surface:
-    """A surface that is reached in contact only."""
-    residual = below(flag, LOOKED_AT, sp.S.NegativeOne, surface.residual)
-    return Surface(residual, sp.S.Zero, residual, surface.text)
 
 
 MOST_SETS = 64  # of contacts that are connected: further ones of such contacts hold only one at a time

@@ -53,9 +53,11 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     for entry in entries:
         if entry.source in written:
             writer.add_transition(entry)
+    fixed = set(system.parameter_symbols)
     for mode in further:
         own = tuple(entry for entry in entries if entry.source == mode.name)
-        writer.add_mode(_without_constant_guards(replace(mode, edges=(*mode.edges, *own)), system))
+        edges = (edge for edge in (*mode.edges, *own) if edge.surface.residual.free_symbols - fixed)
+        writer.add_mode(replace(mode, edges=tuple(edges)))  # what parameters alone decide does not fire, nor later
     return writer.insertions.result()
 
 
@@ -100,12 +102,6 @@ def _leaving_on_surface(found: Sliding) -> Mode:
     onto = tuple(cancelled(x - r * slope / size) for x, slope in zip(states, slopes, strict=True))
     leave = [replace(edge, reset=onto) if edge.reset == states else edge for edge in mode.edges[:2]]
     return replace(mode, edges=(*leave, *mode.edges[2:]))
-
-
-def _without_constant_guards(mode: Mode, system: HybridSystem) -> Mode:
-    """The mode without transitions that parameters alone decide: where it is entered they do not fire, nor later."""
-    fixed = {symbol(parameter.name) for parameter in system.parameters}
-    return replace(mode, edges=tuple(edge for edge in mode.edges if edge.surface.residual.free_symbols - fixed))
 
 
 class _Writer:
@@ -303,7 +299,10 @@ class Insertions:
             self.insert(end - 1, before + inline)
             return
         column = node.place.start[2]
-        last = _end_of_block(content[:end], column)
+        lines = content[:end].rstrip().split("\n")
+        while (line := lines[-1].lstrip()) == "" or (line[0] == "#" and len(lines[-1]) - len(line) < column):
+            lines.pop()  # comments that begin further left belong to what follows
+        last = len("\n".join(lines).rstrip())
         line_end = content.find("\n", last)
         at = len(content) if line_end < 0 else line_end
         self.insert(at, "".join(f"\n{' ' * column}{line}" for line in block.splitlines()))
@@ -311,14 +310,6 @@ class Insertions:
     def insert(self, index: int, text: str) -> None:
         """Insert at an index of the text."""
         self._insertions.setdefault(index, []).append(text)
-
-
-def _end_of_block(content: str, column: int) -> int:
-    """The end of the last line of a block: comments behind it that begin further left belong to what follows."""
-    lines = content.rstrip().split("\n")
-    while (last := lines[-1].lstrip()) == "" or (last[0] == "#" and len(lines[-1]) - len(last) < column):
-        lines.pop()
-    return len("\n".join(lines).rstrip())
 
 
 def flow_style(fields: dict[str, str]) -> str:

@@ -72,7 +72,9 @@ class LoweredMode:
             "jacobian": self._jacobian(),
             "tape": make_tape(self.flow, self.residuals, self.states, data),
             "expressions": tuple(texts),
-            "diagnosis": print_routines(self._diagnosis(expressions), data),
+            "diagnosis": print_routines(
+                (self._few(f"expression_{k}", (e,)) for k, e in enumerate(self.place(expressions))), data
+            ),
         }
 
     def program(
@@ -100,7 +102,11 @@ class LoweredMode:
             **others,
         )
         bounded = program.jumps or may_hide(self.flow, self.arguments)
-        return replace(program, terms=self._terms()) if bounded else program
+        if not bounded:
+            return program
+        terms = Terms(self.flow, dict(zip(self.states, self._sizes, strict=True)))
+        definition = Definition("terms", (), terms.bounds, terms.statements, self._given)
+        return replace(program, terms=print_routines((definition,), self.names.data))
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
         """Whether a surface is affine in time and the states, also where the modes of parts choose what it is."""
@@ -130,16 +136,6 @@ class LoweredMode:
             return lowered.Jacobian(routines, places, width, order)
         inside = [k // width * own + k % width for k in places if k // width < own]
         return lowered.Jacobian(routines, places, width, order, own, varied, ordering(inside, own))
-
-    def _terms(self) -> lowered.Routines:
-        """Bounds on the terms that the flow is computed from."""
-        terms = Terms(self.flow, dict(zip(self.states, self._sizes, strict=True)))
-        definition = Definition("terms", (), terms.bounds, terms.statements, self._given)
-        return print_routines((definition,), self.names.data)
-
-    def _diagnosis(self, expressions):
-        for k, result in enumerate(self.place(expressions)):
-            yield Definition(f"expression_{k}", self.arguments, (result,), places=self._places)
 
     def _routines(self):
         mode, arguments = self.mode, self.arguments

@@ -64,6 +64,12 @@ class Instance:
         return f"{self.name}.{name}"
 
     @cached_property
+    def starts(self) -> dict[str, Scalar]:
+        """The initial values that it is given."""
+        extra = self.given.initial.__pydantic_extra__ if self.given.initial else {}
+        return {str(key): scalar for key, scalar in extra.items()}
+
+    @cached_property
     def start(self) -> int | None:
         """The index of the mode it starts in; None where that is not known."""
         mode, names = self.given.initial.mode if self.given.initial else None, [*map(str, self.kind.modes)]

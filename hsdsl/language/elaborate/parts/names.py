@@ -139,9 +139,7 @@ class Board:
         one = self.instance(base, index, names)
         if one is None or isinstance(one, Refusal):
             return one
-        if isinstance(one, int):
-            return self._beyond(base, one, attribute)
-        return self.of(one, attribute, names.lenient)
+        return names.beyond(base, one, attribute) if isinstance(one, int) else names.of(one, attribute)
 
     def instance(self, base: str, index: str | None, names: Names) -> Instance | int | Refusal | None:
         """The instance of a name; its number where that is beyond the ends. KeyError where there is none.
@@ -197,13 +195,6 @@ class Board:
                     message = f"nothing reads '{shown(key)}' beyond the ends of '{base}'"
                     hint = did_you_mean(key, read, f"remove it, or read {base}[index - 1].{shown(key)}")
                     self.symbols.report(key.place, "HS351", message, hint)
-
-    def _beyond(self, base: str, number: int, attribute: str) -> Meaning:
-        given = self.at_end(base, number, attribute)
-        if isinstance(given, Refusal):
-            return given
-        key = ("at_ends", base, number, attribute)
-        return self.evaluated(key, given, Names(self, index=number), f"{base}[{number}].{attribute}")
 
     def of(self, one: Instance, attribute: str, lenient: bool = False) -> Meaning:
         """What a name of an instance is to the others: a choice among what it is in each mode."""
@@ -304,6 +295,18 @@ class Names(Mapping[str, Meaning]):
         place = "here" if self.mode is None else f"the mode '{self.mode}'"
         return Scope(self, self.states, place, expanded=self.expanded)
 
+    def of(self, one: Instance, attribute: str) -> Meaning:
+        """What a name of an instance is here."""
+        return self.board.of(one, attribute, self.lenient)
+
+    def beyond(self, base: str, number: int, attribute: str) -> Meaning:
+        """What a name is beyond the first and the last of several instances."""
+        given, board = self.board.at_end(base, number, attribute), self.board
+        if isinstance(given, Refusal):
+            return given
+        key = ("at_ends", base, number, attribute)
+        return board.evaluated(key, given, Names(board, index=number), f"{base}[{number}].{attribute}")
+
     def __getitem__(self, name: str) -> Meaning:
         if "." in name:
             return self.board.member(name, self)
@@ -317,12 +320,9 @@ class Names(Mapping[str, Meaning]):
         if name == SINCE and self.board.symbols.timed:
             return Refusal("HS117", f"'{SINCE}' is the time since a part entered its mode", "use it in an automaton")
         if name in self.board.lets:
-            return self.board.evaluated(("let", name, self.lenient), self.board.lets[name], self._outside, name)
+            outside = Names(self.board, lenient=self.lenient)
+            return self.board.evaluated(("let", name, self.lenient), self.board.lets[name], outside, name)
         return self.board.symbols.values[name]
-
-    @property
-    def _outside(self) -> Names:
-        return Names(self.board, lenient=self.lenient)
 
     def _own(self, one: Instance, mode: str, name: str) -> Meaning | type[KeyError]:
         """What a name means to an instance itself; the type KeyError where it means nothing."""
@@ -448,13 +448,13 @@ class Starts:
     def __post_init__(self) -> None:
         self.outer: Mapping[str, Meaning] = self.board.symbols.parameter_scope(_SENTENCE).values
         for one in self.board.roster.instances.values():
-            for name in given_to(one):
+            for name in one.starts:
                 if name in one.states:
                     self.of(one, name, False)
 
     def of(self, one: Instance, name: str, symbolic: bool) -> Meaning:
         """The initial value of a state of an instance, or with ``symbolic`` its symbol."""
-        full, given = one.full(name), given_to(one)
+        full, given = one.full(name), one.starts
         if name not in given:
             mode = one.part.modes[one.start or 0]
             message = f"'{name}' has no initial value where '{one.automaton}' starts in '{mode}'"
@@ -467,8 +467,9 @@ class Starts:
                 return None
             self._active.append(full)
             try:
-                value = self._number(one, given[name], False, one.index)
-                expr = self._number(one, given[name], True, one.index) if value is not None else None
+                value = StartNames(self.board, one, index=one.index, starts=self).number(given[name])
+                names = StartNames(self.board, one, index=one.index, starts=self, symbolic=True)
+                expr = names.number(given[name]) if value is not None else None
             finally:
                 self._active.pop()
             self._known.setdefault(full, value)
@@ -477,73 +478,54 @@ class Starts:
         found = self._known[full]
         return state(full) if symbolic and found is not None else found
 
-    def _number(self, one: Instance | None, scalar: Scalar, symbolic: bool, index: int | None) -> Value | None:
-        names = StartNames(self, one, index, symbolic)
-        scope = Scope(names, expanded=Names(self.board, one, None, index).expanded)
-        return self.board.symbols.number(scalar, scope, finite_now=not symbolic)
-
-    def beyond(self, base: str, number: int, attribute: str, symbolic: bool) -> Meaning:
-        """What a name is beyond the first and the last of several instances."""
-        given = self.board.at_end(base, number, attribute)
-        return given if isinstance(given, Refusal) else self._number(None, given, symbolic, number)
-
-
-def given_to(one: Instance) -> dict[str, Scalar]:
-    """The initial values that an instance is given."""
-    extra = one.given.initial.__pydantic_extra__ if one.given.initial else {}
-    return {str(key): scalar for key, scalar in extra.items()}
-
 
 @dataclass(frozen=True)
-class StartNames(Mapping[str, Meaning]):
-    """The names in the initial values of an instance, or beyond the ends of several."""
+class StartNames(Names):
+    """The names in the initial values of an instance, or beyond the ends of several: of states their initial values."""
 
-    starts: Starts
-    one: Instance | None
-    index: int | None
-    symbolic: bool
+    starts: Starts | None = None
+    symbolic: bool = False
 
-    def __getitem__(self, name: str) -> Meaning:
-        one, board = self.one, self.starts.board
-        if "." in name:
-            return self._member(name)
-        if one is not None and name in one.kind.parameters:
-            return board.parameters.get(one.full(name))
-        if name == "index" and self.index is not None:
-            return whole_value(self.index)
-        if one is not None and name in one.states:
-            return self.starts.of(one, name, self.symbolic)
-        return self.starts.outer[name]
+    def number(self, scalar: Scalar) -> Value | None:
+        """The value of an expression of these names."""
+        scope = Scope(self, expanded=self.expanded)
+        return self.board.symbols.number(scalar, scope, finite_now=not self.symbolic)
 
-    def _member(self, name: str) -> Meaning:
-        found, board = MEMBER.fullmatch(name), self.starts.board
-        if found is None:
-            raise KeyError(name)
-        base, index, attribute = found.groups()
-        other: Any = board.instance(base, index, Names(board, self.one, None, self.index))
-        if other is None or isinstance(other, Refusal):
-            return other
-        if isinstance(other, int):
-            return self.starts.beyond(base, other, attribute, self.symbolic)
-        if attribute in other.kind.parameters:
-            return board.parameters.get(other.full(attribute))
+    def of(self, one: Instance, attribute: str) -> Meaning:
+        """What a name of an instance is in an initial value."""
+        assert self.starts is not None
+        if attribute in one.kind.parameters:
+            return self.board.parameters.get(one.full(attribute))
         if attribute.startswith(IN_MODE):
-            return whole_value(int(other.part.modes[other.start or 0] == attribute.removeprefix(IN_MODE)))
-        if attribute in other.states:
-            return self.starts.of(other, attribute, self.symbolic)
-        known = [*other.states, *map(str, other.kind.parameters)]
-        message = f"'{attribute}' is no state or parameter of '{other.automaton}'"
+            return whole_value(int(one.part.modes[one.start or 0] == attribute.removeprefix(IN_MODE)))
+        if attribute in one.states:
+            return self.starts.of(one, attribute, self.symbolic)
+        known = [*one.states, *map(str, one.kind.parameters)]
+        message = f"'{attribute}' is no state or parameter of '{one.automaton}'"
         return Refusal("HS111", message, did_you_mean(attribute, known, _SENTENCE))
 
-    def __iter__(self) -> Iterator[str]:
-        if self.one is not None:
-            yield from (*self.one.states, *map(str, self.one.kind.parameters))
-        yield from self.starts.outer
+    def beyond(self, base: str, number: int, attribute: str) -> Meaning:
+        """What a name is beyond the first and the last of several instances, in an initial value."""
+        given = self.board.at_end(base, number, attribute)
+        return given if isinstance(given, Refusal) else replace(self, instance=None, index=number).number(given)
 
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
+    def __getitem__(self, name: str) -> Meaning:
+        one, starts = self.instance, self.starts
+        assert starts is not None
+        if "." in name:
+            return self.board.member(name, self)
+        if name == "index" and self.index is not None and (one is None or name not in one.kind.parameters):
+            return whole_value(self.index)
+        if one is not None and (name in one.kind.parameters or name in one.states):
+            return self.of(one, name)
+        return starts.outer[name]
+
+    def __iter__(self) -> Iterator[str]:
+        if self.instance is not None:
+            yield from (*self.instance.states, *map(str, self.instance.kind.parameters))
+        yield from self.starts.outer if self.starts is not None else ()
 
     def items(self) -> Any:
         """The names with their meanings, for hints: states without working their values out."""
-        own: Meanings = {} if self.one is None else {name: state(name) for name in self.one.states}
-        return [*own.items(), *self.starts.outer.items()]
+        own: Meanings = {} if self.instance is None else {name: state(name) for name in self.instance.states}
+        return [*own.items(), *(self.starts.outer.items() if self.starts is not None else ())]
