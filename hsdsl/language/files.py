@@ -44,15 +44,10 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         with open(os.open(path, READ), "rb", buffering=0) as stream:
             return _content(stream.fileno(), most, path)
     except (OSError, ValueError) as error:
-        if _is_text(path):
+        if isinstance(path, str) and ("\n" in path.strip() or "hsdsl: " in path):  # several lines, or a key
             message = f"this is the text of a model, not the path of its file: `{shown(os.fspath(path), 40)}`"
             raise UsageError(message, "hsdsl.loads(text) reads a model from its text") from None
         raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
-
-
-def _is_text(path: str | os.PathLike[str]) -> bool:
-    """Whether a path looks like the text of a model: it has several lines, or a key with its value."""
-    return isinstance(path, str) and ("\n" in path.strip() or "hsdsl: " in path)
 
 
 def open_regular(path: str | os.PathLike[str], flags: int = 0) -> BinaryIO:

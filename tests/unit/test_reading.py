@@ -1,3 +1,4 @@
+# pyright: basic
 """Reading a right model: what is imported for it, and that what it depends on is known to the cache of programs."""
 
 from __future__ import annotations

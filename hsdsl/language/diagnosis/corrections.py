@@ -192,18 +192,22 @@ def _nested_values(initial: Mapping, states: list[str], findings: Findings) -> N
         if name in states or not isinstance(value, (Mapping, Sequence)):
             continue
         key, _ = initial.entries.pop(name)
-        entries = list(value) if isinstance(value, Mapping) else _paired(states, value)
-        text = ", ".join(f"{state}: {v.value if isinstance(v, Scalar) else '...'}" for state, v in entries)
-        hint = f"write the values at the level of `mode`: {shown(text or 'x: 0')}"
+        entries, text = _paired(states, value)
+        hint = f"write the values at the level of `mode`: {shown(text)}"
         findings.add(key.place.diagnostic("HS201", f"unknown key '{name}' in `initial`", hint))
         for state, part in entries:
             initial.entries.setdefault(str(state), (state, part))
 
 
-def _paired(states: list[str], values: Sequence) -> list[tuple[Key, Node]]:
-    if len(states) != len(values.items):
-        return []
-    return [(Key.at(state, value.place), value) for state, value in zip(states, values.items, strict=True)]
+def _paired(states: list[str], value: Mapping | Sequence) -> tuple[list[tuple[Key, Node]], str]:
+    """States with values that are given for them, by name or in order, and how that is written."""
+    entries: list[tuple[Key, Node]] = []
+    if isinstance(value, Mapping):
+        entries = list(value)
+    elif len(states) == len(value.items):
+        entries = [(Key.at(state, each.place), each) for state, each in zip(states, value.items, strict=True)]
+    texts = (f"{name}: {each.value if isinstance(each, Scalar) else '...'}" for name, each in entries)
+    return entries, ", ".join(texts) or "x: 0"
 
 
 def _dotted_names(flow: Mapping, known: set[str], reset: set[str], findings: Findings) -> None:
@@ -251,10 +255,9 @@ def _start(root: Mapping, findings: Findings) -> None:
             continue  # it lacks a mode, which has a finding of its own
         first = keys(modes)[0] if len(keys(modes)) == 1 else None
         states = [str(name) for name in keys(child(child(modes, first or ""), "flow"))]
-        entries = list(value) if isinstance(value, Mapping) else _paired(states, value)
+        entries, text = _paired(states, value)
         mode = absent(key.place) if first is None else Scalar(str(first), True, key.place)
-        texts = [f"{name}: {v.value if isinstance(v, Scalar) else '...'}" for name, v in entries] or ["x: 0"]
-        hint = f"write initial: {{mode: {shown(first or '...')}, {shown(', '.join(texts))}}}"
+        hint = f"write initial: {{mode: {shown(first or '...')}, {shown(text)}}}"
         code, message = "HS201", f"unknown key '{key}' in a model"
         if key == "initial":
             code, message = "HS203", "expected a mapping (name: value), got a list"

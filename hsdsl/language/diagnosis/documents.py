@@ -41,7 +41,7 @@ _TAGS = "|".join(("expression", "mapping", "list", "samples", "file", *KINDS))  
 _TAG = re.compile(rf"<(?:{_TAGS})>|function-\w+\[.*")
 _MODE = ("modes", "*")
 _MOST_PARTS = 6  # a transition has so many keys
-_HOMES = {
+_HOMES: dict[tuple[str, ...], str] = {
     _MODE: "in a mode",
     (*_MODE, "transitions", "*"): "in a transition of a mode",
     ("experiment",): "under `experiment`",

@@ -9,7 +9,7 @@ import re
 from collections.abc import Collection, Container, Sequence
 from typing import Any
 
-from hsdsl.base.functions import CONSTANTS, FUNCTIONS
+from hsdsl.base.functions import CONSTANTS, FUNCTIONS  # pyright: ignore[reportUnknownVariableType]
 from hsdsl.base.names import closest, did_you_mean, plain_sign, shown, told_apart
 from hsdsl.language.diagnosis import TABLES
 

@@ -56,8 +56,8 @@ _MOST_PIECES = 100  # of one expression
 def explain(text: Text, error: Any) -> Diagnostic:
     """The diagnostic for a fault that stops the YAML parser, a `yaml.MarkedYAMLError`."""
     problem, context = error.problem or "", error.context or ""
-    marks = [mark for mark in (error.problem_mark, error.context_mark) if mark]
-    places = [(mark.line + 1, mark.column + 1) for mark in marks] or [(1, 1)]
+    marks: list[Any] = [mark for mark in (error.problem_mark, error.context_mark) if mark]
+    places: list[tuple[int, int]] = [(mark.line + 1, mark.column + 1) for mark in marks] or [(1, 1)]
     here, opened = places[0], places[-1]
     if "nesting depth" in problem:  # of libyaml, which reads ahead
         return text.fault("HS014", TOO_DEEP, *here)

@@ -1,18 +1,17 @@
 # pyright: basic
-"""Documents to mathematics: names resolved, everything substituted, every error reported.
+"""Text to mathematics: names resolved, everything substituted, every error reported.
 
-A document goes through these, in this order; `symbols` has what its names mean, and reads its expressions.
+`elaborate_files` is the way of a right model: decode, compose, read, elaborate. A document goes through these, in this
+order; `symbols` has what its names mean, and reads its expressions.
 
 ================= ===========================================================================
-``definitions``   parameters and `let`; ``functions``, ``inputs`` and ``solve`` what else has a name
-``modes``         flow, walls and outputs of modes; ``edges`` their transitions
+``definitions``   parameters, functions, `let`, `solve` and units; ``inputs``
+``modes``         flow, walls, outputs and scene of modes, and their transitions
 ``parts``         in the place of these: a system of parts as one mode
-``scene``         the shapes of the scene
-``experiment``    start and settings; ``reference`` what is known of runs
-``events``        transitions with a memory, then ``timers``: the time in a mode
+``experiment``    start, settings, and what is known of runs
+``events``        transitions with a memory
+``derived``       the time in a mode; smaller systems, and flat ones of parts
 ================= ===========================================================================
-
-Of the system that this gives, ``slicing`` makes a smaller one, and ``product`` a flat one of parts.
 """
 
 from __future__ import annotations
@@ -158,6 +157,9 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     units = of_parts | elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)
     symbols.findings.raise_if_any()
+    kinds = document.automata.values() if isinstance(document, SystemDocument) else ()
+    tables = (document.modes, *(kind.modes for kind in kinds if isinstance(kind, AutomatonDocument)))
+    solves = [document.solve, *(mode.solve for table in tables for mode in table.values())]
     return HybridSystem(
         path=symbols.files.path,
         digest=symbols.files.with_data(symbols.data).digest,
@@ -176,16 +178,9 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         parts=parts,
         definitions=tuple(substituted_definitions(document)),
         functions=functions,
-        unknowns=_unknowns(document),
+        unknowns=tuple(str(name) for solve in solves if solve is not None for name in solve.unknowns),
         assumptions=tuple(filter(None, map(symbols.text, document.assumptions))),
     )
-
-
-def _unknowns(document: ModelDocument) -> tuple[str, ...]:
-    kinds = document.automata.values() if isinstance(document, SystemDocument) else ()
-    tables = (document.modes, *(kind.modes for kind in kinds if isinstance(kind, AutomatonDocument)))
-    given = [document.solve, *(mode.solve for modes in tables for mode in modes.values())]
-    return tuple(str(name) for solve in given if solve is not None for name in solve.unknowns)
 
 
 def parameter_expression(system: HybridSystem, text: str, where: str, allowed: Sequence[str] | None = None) -> Any:
@@ -196,7 +191,15 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
     Raises UsageError: it is not an expression, or uses something else.
     """
     usable = {p.name for p in system.parameters} if allowed is None else set(allowed)
-    scope = Scope(_override_values(system, usable), place=where)
+    others = {"t": "the time", SINCE: "the time since the mode was entered", **dict.fromkeys(system.states, "a state")}
+    others |= dict.fromkeys((i.name for i in system.inputs), "an input")
+    values: dict[str, Meaning] = {
+        name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
+    }
+    for name in (parameter.name for parameter in system.parameters):
+        late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
+        values[name] = Value(symbol(name)) if name in usable else late
+    scope = Scope(values | named_functions(system.functions, values), place=where)
     try:
         with deep_stack(), timebox(limits.current().seconds / PARTS):
             return resolved_expression(text, scope).expr
@@ -204,15 +207,3 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
         raise UsageError(f"{where}: {error.message}", error.hint) from None
     except OutOfTime:
         raise UsageError(f"{where}: working this expression out takes too long") from None
-
-
-def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Meaning]:
-    others = {"t": "the time", SINCE: "the time since the mode was entered", **dict.fromkeys(system.states, "a state")}
-    others.update(dict.fromkeys((i.name for i in system.inputs), "an input"))
-    values: dict[str, Meaning] = {
-        name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
-    }
-    for name in (parameter.name for parameter in system.parameters):
-        late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
-        values[name] = Value(symbol(name)) if name in usable else late
-    return values | named_functions(system.functions, values)

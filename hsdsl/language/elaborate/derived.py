@@ -13,6 +13,8 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import reduce
+from operator import and_
 from typing import Any
 
 import sympy as sp
@@ -181,15 +183,7 @@ class _ProductMode:
                 continue
             kept = whole.of_states(present(self.system.parts, numbers))
             parts = [c for c in (whole.condition, *conditions) if c is not None and c != True]  # noqa: E712
-            yield replace(kept, target=target, condition=all_hold(parts))
-
-
-def all_hold(conditions: list[Any]) -> Any | None:
-    """The condition that all of some hold; None where there are none."""
-    found = None
-    for condition in conditions:
-        found = condition if found is None else found & condition
-    return found
+            yield replace(kept, target=target, condition=reduce(and_, parts) if parts else None)
 
 
 _TIMER = symbol(SINCE)

@@ -1,9 +1,8 @@
 # pyright: basic
 """Systems of parts: instances of automata and their connections, to one hybrid system.
 
-`files` puts automata of other files in place, `instances` lists the parts, `names` and `starts` are what their names
-and initial values mean. `transitions` reads those of each part, `broadcast` joins those that fire together, and
-`composition` makes the one mode of all.
+`instances` lists the parts, with automata of other files in place, and `names` has what their names and initial values
+mean. `composition` reads the transitions of each part, joins those that fire together, and makes the one mode of all.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from hsdsl.base.names import SINCE
 from hsdsl.base.parts import Part, numbered
 from hsdsl.language.elaborate.definitions import define_parameter, placeholders, solutions, units_of, with_solutions
 from hsdsl.language.elaborate.modes import elaborate_scene
-from hsdsl.language.elaborate.parts.composition import FINAL, MODE, Composition
+from hsdsl.language.elaborate.parts.composition import FINAL, MODE, composed
 from hsdsl.language.elaborate.parts.instances import Instance, roster_of
 from hsdsl.language.elaborate.parts.names import Board, Names, Starts, unknowns_of
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, definition_order
@@ -65,7 +64,7 @@ class Parts:
         self.scene: tuple[Shape, ...]
         self.scene, scene = self._scene()
         self._check_lets(document)
-        self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
+        self.modes: tuple[Mode, ...] = composed(self.board, values, scene)
         for k, part in enumerate(self.parts):
             if part.name in self.board.timed:  # all of its modes have the state `since`
                 timed = replace(part, states=tuple((*states, f"{part.name}.{SINCE}") for states in part.states))
