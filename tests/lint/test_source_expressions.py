@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_typ
 from hsdsl.analysis.lint.source_expressions import Role, written
 from hsdsl.analysis.lint.units.model import Units
 from hsdsl.base.errors import Findings
-from hsdsl.language import schema
+from hsdsl.language.schema import documents as schema
 from hsdsl.language.schema import fields
 from hsdsl.language.schema.fields import Document
 from hsdsl.language.source import ABSENT, Scalar, compose, decode

@@ -19,7 +19,7 @@ from hsdsl.engine.backends.c import model_parts, model_source
 from hsdsl.engine.backends.c.pieces import LONGEST
 from hsdsl.engine.integrators.sparse import sparse_factored, sparse_factored_complex
 from hsdsl.engine.runtime.kernel import SYMBOL
-from hsdsl.mathematics.lower.ordering import ordering
+from hsdsl.mathematics.lower.mode import ordering
 from hsdsl.mathematics.program_cache import _rows
 
 SIZES = 40, 80

@@ -12,7 +12,7 @@ from engines import ENGINES, needs_compiler
 
 import hsdsl
 from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
-from hsdsl.language.elaborate.product import flat_part
+from hsdsl.language.elaborate.derived import flat_part
 
 MODELS = Path(__file__).parents[2] / "models" / "parts"
 WAYS = [

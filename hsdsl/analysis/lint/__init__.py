@@ -24,8 +24,7 @@ from hsdsl.analysis.lint.subject import Subject
 from hsdsl.base import limits
 from hsdsl.base.errors import Diagnostic
 from hsdsl.language.elaborate import elaborate_files
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
 from hsdsl.language.files import ModelFiles
 from hsdsl.language.system import HybridSystem
 

@@ -20,9 +20,9 @@ from hsdsl.analysis.lint.subject import EdgePart, ModePart, Subject, edge_parts
 from hsdsl.analysis.lint.units.model import Units
 from hsdsl.base.functions import replaced
 from hsdsl.base.parts import Part, numbered
+from hsdsl.language.expression.algebra import whole
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import whole
-from hsdsl.language.schema import AutomatonDocument, SystemDocument
+from hsdsl.language.schema.documents import AutomatonDocument, SystemDocument
 from hsdsl.language.system import TIME, Edge, Initial, Mode, SampledInput
 from hsdsl.mathematics.decisions.dynamics import Dynamics
 from hsdsl.mathematics.decisions.question import SearchRange

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from hsdsl.analysis.lint.source_expressions import SourceExpression
 from hsdsl.base.graphs import closure
-from hsdsl.language.schema import ModelDocument
+from hsdsl.language.schema.documents import ModelDocument
 from hsdsl.language.system import HybridSystem
 
 _DEFINING = ("parameter", "function", "input", "let")

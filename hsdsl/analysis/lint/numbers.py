@@ -12,7 +12,7 @@ from sympy.logic.boolalg import BooleanFunction
 
 from hsdsl.base.functions import FUNCTIONS
 from hsdsl.language.expression import numeric
-from hsdsl.language.expression.derivatives import lie_derivative
+from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.system import Mode, SampledInput, Surface
 
 INSIDE, ON, BEYOND = -1, 0, 1

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.subject import Subject
 from hsdsl.base.graphs import closure
-from hsdsl.language.schema import AutomatonDocument, SystemDocument
+from hsdsl.language.schema.documents import AutomatonDocument, SystemDocument
 from hsdsl.language.source import Key, Mapping, Node, Scalar, Sequence, children
 
 CODES = ("HS401", "HS402", "HS403", "HS406")

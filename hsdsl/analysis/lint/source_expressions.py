@@ -10,9 +10,9 @@ from typing import Literal
 
 from hsdsl.base.errors import Span
 from hsdsl.language.expression import Expected, parse
+from hsdsl.language.expression.parse import Name, Tree, walk
 from hsdsl.language.expression.scope import functions_called
-from hsdsl.language.expression.syntax import Name, Tree, walk
-from hsdsl.language.schema import (
+from hsdsl.language.schema.documents import (
     AutomatonDocument,
     ExperimentDocument,
     InitialDocument,

@@ -15,11 +15,11 @@ from hsdsl.analysis.lint.units.model import Units
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import Span
 from hsdsl.base.graphs import closure
-from hsdsl.language import schema
 from hsdsl.language.elaborate import Elaboration
 from hsdsl.language.expression import parse, symbolic
+from hsdsl.language.expression.parse import Tree
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.syntax import Tree
+from hsdsl.language.schema import documents as schema
 from hsdsl.language.source import Key, Node, Scalar, descend
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 from hsdsl.mathematics.decisions.dynamics import Dynamics

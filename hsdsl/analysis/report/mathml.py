@@ -13,9 +13,9 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 from hsdsl.base.names import visible
 from hsdsl.base.numbers import decimals
 from hsdsl.language.expression import plain
+from hsdsl.language.expression.algebra import cases
+from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.scope import Function, symbol
-from hsdsl.language.expression.selection import cases
-from hsdsl.language.expression.syntax import ExpressionError
 
 _SIGNS = {">=": "≥", "<=": "≤", ">": ">", "<": "<"}
 _FENCES = {"absolute": ("|", "|"), "floor": ("⌊", "⌋")}

@@ -134,7 +134,7 @@ class Pipeline:
         return self._part_of(_elaborated(self._files))
 
     def _part_of(self, system: HybridSystem) -> HybridSystem:
-        from hsdsl.language.elaborate.slicing import only
+        from hsdsl.language.elaborate.derived import only
 
         for names in self._part:
             system = self._with_sliding(system) if names == SLIDING else only(system, names)
@@ -312,7 +312,7 @@ class Pipeline:
             program, files = cached
             whole = program.left_out == self.program.left_out
             return self if whole else Pipeline(None, self.seconds["load"], files, program, part)
-        from hsdsl.language.elaborate.slicing import left_out, only
+        from hsdsl.language.elaborate.derived import left_out, only
 
         system = only(self.system, names)
         if system is self.system:

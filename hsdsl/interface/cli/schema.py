@@ -9,6 +9,6 @@ def schema(json: Json = False) -> None:
     """Print the JSON Schema of the language (draft 7), which is one JSON object as it is."""
     from json import dumps
 
-    from hsdsl.language.schema import json_schema
+    from hsdsl.language.schema.jsonschema import json_schema
 
     print(dumps(json_schema(), indent=2))

@@ -193,7 +193,7 @@ class _RunSpace:
 
     def space(self, depth: float | None) -> SpaceMetric:
         from hsdsl.analysis.metrics.space import make_space
-        from hsdsl.language.elaborate.product import flat_part
+        from hsdsl.language.elaborate.derived import flat_part
 
         visited = dict.fromkeys(arc.mode for run in (self.run, self.other) for arc in run.arcs)
         system = flat_part(self.values.system, visited)

@@ -685,7 +685,7 @@ class Model:
     @cached_property
     def _staged(self) -> Model:
         """Return the model with the numbers of its scene as further outputs."""
-        from hsdsl.language.elaborate.scene import scene_as_outputs
+        from hsdsl.language.elaborate.modes import scene_as_outputs
 
         self.check_scene()
         return Model(scene_as_outputs(self.system))

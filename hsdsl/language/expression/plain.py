@@ -8,10 +8,9 @@ from typing import Any
 
 from hsdsl.base.functions import CONSTANTS
 from hsdsl.language.expression import symbolic
-from hsdsl.language.expression.inequality import the_comparison
-from hsdsl.language.expression.parse import parse
+from hsdsl.language.expression.conditions import the_comparison
+from hsdsl.language.expression.parse import Call, Expected, Name, Tree, mapped, parse, walk
 from hsdsl.language.expression.scope import Function, Scope, state
-from hsdsl.language.expression.syntax import Call, Expected, Name, Tree, mapped, walk
 
 _NONE: dict[str, Function] = {}
 RANGES = ("sum", "min", "max", "count")  # that one argument may range over instances of parts

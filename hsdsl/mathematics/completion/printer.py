@@ -9,8 +9,8 @@ import sympy as sp
 from sympy.printing.str import StrPrinter
 
 from hsdsl.base.functions import FUNCTIONS
-from hsdsl.language.expression.selection import positive
-from hsdsl.language.expression.tokens import LARGEST_INTEGER
+from hsdsl.language.expression.algebra import positive
+from hsdsl.language.expression.parse import LARGEST_INTEGER
 from hsdsl.language.system import Surface
 
 _NAMES = {function: name for name, (function, *_) in FUNCTIONS.items()}  # `below` apart

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from hsdsl.base.functions import atan2, below, floor, sign
-from hsdsl.language.expression.derivatives import lie_derivative
+from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
 from hsdsl.mathematics.completion.contact import zero_surface

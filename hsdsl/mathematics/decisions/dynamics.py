@@ -16,7 +16,7 @@ import sympy as sp
 
 from hsdsl.base.errors import Decided
 from hsdsl.base.functions import absolute, maximum, minimum, replaced
-from hsdsl.language.expression.derivatives import derivative, lie_derivative
+from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 from hsdsl.mathematics.decisions.decide import MOST_PARTS, Decider

@@ -12,7 +12,7 @@ from hsdsl.analysis.lint.subject import ModePart, Subject
 from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.language.expression import numeric
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.schema import MultiplesDocument, ReferenceDocument
+from hsdsl.language.schema.documents import MultiplesDocument, ReferenceDocument
 from hsdsl.language.source import Scalar
 from hsdsl.language.system import TIME, Mode, Surface
 from hsdsl.mathematics.decisions.mode_point import ModePoint, Unsure, ranked

@@ -10,8 +10,8 @@ from hsdsl.analysis.lint.edits import without_entry
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.subject import Subject
 from hsdsl.base.names import in_latin, listed
+from hsdsl.language.expression.parse import Name
 from hsdsl.language.expression.scope import RESERVED
-from hsdsl.language.expression.syntax import Name
 from hsdsl.language.source import Key
 
 _UNUSED = "remove it, or use it"

@@ -12,7 +12,7 @@ from hsdsl.analysis.lint.source_expressions import TIME, SourceExpression
 from hsdsl.analysis.lint.units.unit import Unit, UnknownUnit, read
 from hsdsl.analysis.lint.units.walk import Any_, Measure, Misfit, Walk
 from hsdsl.base.names import SINCE
-from hsdsl.language.schema import AutomatonDocument, ModelDocument, ParameterEntry
+from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, ParameterEntry
 from hsdsl.language.source import Scalar
 
 _INDEX = re.compile(r"\[[^\]]*\]")

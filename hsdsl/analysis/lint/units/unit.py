@@ -14,7 +14,7 @@ from functools import cache
 from typing import Any
 
 from hsdsl.language.expression import ExpressionError, parse
-from hsdsl.language.expression.syntax import Name, Negative, Number, Power, Product, Tree
+from hsdsl.language.expression.parse import Name, Negative, Number, Power, Product, Tree
 
 _LONGEST = 100  # characters
 _LARGEST_POWER = 100

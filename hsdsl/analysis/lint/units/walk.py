@@ -15,7 +15,7 @@ from typing import Literal
 from hsdsl.analysis.lint.source_expressions import SourceExpression
 from hsdsl.analysis.lint.units.unit import ONE, Unit, exponent_of
 from hsdsl.base.functions import CONSTANTS  # pyright: ignore[reportUnknownVariableType]
-from hsdsl.language.expression.syntax import (
+from hsdsl.language.expression.parse import (
     Call,
     Comparison,
     Logic,

@@ -13,8 +13,7 @@ from hsdsl.analysis.metrics.formulas import Formula, compiled
 from hsdsl.analysis.metrics.rational import Exact
 from hsdsl.base import functions
 from hsdsl.base.errors import UsageError
-from hsdsl.mathematics.lower.routines import Definition, print_routines
-from hsdsl.mathematics.lower.straight import Gradient
+from hsdsl.mathematics.lower.straight import Definition, Gradient, print_routines
 
 DIGITS = 60  # of a number that is not rational
 

@@ -20,9 +20,9 @@ from hsdsl.analysis.metrics.space.expressions import affine as as_affine
 from hsdsl.analysis.metrics.space.expressions import clauses, equations, formula
 from hsdsl.base import functions
 from hsdsl.base.errors import UsageError
-from hsdsl.language.expression.derivatives import lie_derivative
+from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 
 MOST_SAMPLES = 200  # of an input that a guard depends on

@@ -21,9 +21,9 @@ from hsdsl.interface.imports.sbml.convert import Converter
 from hsdsl.interface.imports.sbml.document import is_sbml, model_of
 from hsdsl.interface.imports.sbml.mathml import NotExpressible
 from hsdsl.interface.imports.sbml.writing import written
+from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.plain import value
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.syntax import ExpressionError
+from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.source.xml import Element, read_xml
 
 __all__ = ["DEEPEST", "FEATURE", "converted", "imported", "is_sbml"]

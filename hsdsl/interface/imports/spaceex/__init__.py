@@ -19,9 +19,9 @@ from hsdsl.interface.imports.spaceex.product import Automaton, Key, automaton
 from hsdsl.interface.imports.spaceex.start import first_locations, refuse_outside, start
 from hsdsl.interface.imports.spaceex.urgency import Judge
 from hsdsl.interface.imports.spaceex.writing import written
+from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.plain import value
-from hsdsl.language.expression.syntax import ExpressionError
-from hsdsl.language.files.model import read_bytes
+from hsdsl.language.files import read_bytes
 
 __all__ = ["imported"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from hsdsl.base.errors import ModelError
 from hsdsl.base.names import shown
 from hsdsl.interface.imports.spaceex.formula import Relation, checked, relations
-from hsdsl.language.source.text import Text, decode
+from hsdsl.language.source.nodes import Text, decode
 from hsdsl.language.source.xml import Passage
 
 _ENTRY = re.compile(r"[ \t]*([A-Za-z][\w-]*)[ \t]*=[ \t]*(\"[^\"]*\"|'[^']*'|[^#\n\"']*)[ \t]*(?:#[^\n]*)?(?:\n|$)")

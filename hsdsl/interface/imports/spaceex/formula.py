@@ -10,9 +10,8 @@ from typing import Any
 
 from hsdsl.base.errors import Diagnostic, ModelError
 from hsdsl.base.names import shown
-from hsdsl.language.expression.parse import parse
+from hsdsl.language.expression.parse import ExpressionError, Name, parse, walk
 from hsdsl.language.expression.plain import names_in, value
-from hsdsl.language.expression.syntax import ExpressionError, Name, walk
 from hsdsl.language.source.xml import Passage
 
 _AND = re.compile(r"&&?|\band\b")

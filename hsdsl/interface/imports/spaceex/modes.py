@@ -13,7 +13,7 @@ from hsdsl.interface.imports.spaceex.feasibility import decide
 from hsdsl.interface.imports.spaceex.formula import Relation
 from hsdsl.interface.imports.spaceex.network import Network
 from hsdsl.interface.imports.spaceex.product import Arrow, Automaton, Key, Place
-from hsdsl.language.expression.derivatives import lie_derivative
+from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.plain import names_in, value
 from hsdsl.language.expression.scope import symbol
 from hsdsl.mathematics.decisions.question import negative, positive

@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 from hsdsl.base.errors import ModelError
 from hsdsl.base.names import closest, shown
 from hsdsl.interface.imports.spaceex.document import Bind, Component, Param
-from hsdsl.language.expression.parse import parse
+from hsdsl.language.expression.parse import ExpressionError, parse
 from hsdsl.language.expression.plain import names_in
 from hsdsl.language.expression.scope import RESERVED
-from hsdsl.language.expression.syntax import ExpressionError
 from hsdsl.language.source.xml import Passage
 
 MOST_INSTANCES, DEEPEST = 1000, 20

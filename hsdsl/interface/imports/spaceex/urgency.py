@@ -19,7 +19,7 @@ from hsdsl.interface.imports.spaceex.drafts import Facet, ModeDraft, TransitionD
 from hsdsl.interface.imports.spaceex.feasibility import decide
 from hsdsl.interface.imports.spaceex.formula import Relation, renamed, within
 from hsdsl.interface.imports.spaceex.product import Arrow
-from hsdsl.language.expression.derivatives import lie_derivative
+from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.plain import value
 from hsdsl.language.expression.scope import symbol
 from hsdsl.mathematics.decisions.question import Answer, Constraint, at_most_zero, negative, positive, zero

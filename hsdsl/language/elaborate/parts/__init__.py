@@ -1,9 +1,8 @@
 # pyright: basic
 """Systems of parts: instances of automata and their connections, to one hybrid system.
 
-`files` puts automata of other files in place, `instances` lists the parts, `names` and `starts` are what their names
-and initial values mean. `transitions` reads those of each part, `broadcast` joins those that fire together, and
-`composition` makes the one mode of all.
+`instances` lists the parts, with automata of other files in place, and `names` has what their names and initial values
+mean. `composition` reads the transitions of each part, joins those that fire together, and makes the one mode of all.
 """
 
 from __future__ import annotations
@@ -15,17 +14,15 @@ from typing import Any
 
 from hsdsl.base.names import SINCE
 from hsdsl.base.parts import Part, numbered
-from hsdsl.language.elaborate.definitions import define_parameter, units_of
-from hsdsl.language.elaborate.parts.composition import FINAL, MODE, Composition
+from hsdsl.language.elaborate.definitions import define_parameter, placeholders, solutions, units_of, with_solutions
+from hsdsl.language.elaborate.modes import elaborate_scene
+from hsdsl.language.elaborate.parts.composition import FINAL, MODE, composed
 from hsdsl.language.elaborate.parts.instances import Instance, roster_of
-from hsdsl.language.elaborate.parts.names import Board, Names, unknowns_of
-from hsdsl.language.elaborate.parts.starts import Starts
-from hsdsl.language.elaborate.scene import elaborate_scene
-from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
+from hsdsl.language.elaborate.parts.names import Board, Names, Starts, unknowns_of
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, definition_order
+from hsdsl.language.expression.algebra import NO_VALUE, ZERO, whole
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state
-from hsdsl.language.expression.selection import NO_VALUE, ZERO, whole
-from hsdsl.language.schema import PartModeDocument, SystemDocument
+from hsdsl.language.schema.documents import PartModeDocument, SystemDocument
 from hsdsl.language.source import Key
 from hsdsl.language.system import Initial, Mode, Parameter, Shape, started
 
@@ -67,11 +64,14 @@ class Parts:
         self.scene: tuple[Shape, ...]
         self.scene, scene = self._scene()
         self._check_lets(document)
-        self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
-        self.parts = tuple(map(self._with_timer, self.parts))
+        self.modes: tuple[Mode, ...] = composed(self.board, values, scene)
+        for k, part in enumerate(self.parts):
+            if part.name in self.board.timed:  # all of its modes have the state `since`
+                timed = replace(part, states=tuple((*states, f"{part.name}.{SINCE}") for states in part.states))
+                self.parts = (*self.parts[:k], timed, *self.parts[k + 1 :])
         self.initial = self._initial()
         self.units = dict(self._units())
-        if not symbols.resolver.findings.diagnostics:  # else what reads them may not have been looked at
+        if not symbols.findings.diagnostics:  # else what reads them may not have been looked at
             self.board.check_ends()
 
     def _units(self) -> Iterator[tuple[str, str]]:
@@ -181,11 +181,6 @@ class Parts:
             if str(name) in taken:
                 message = f"'{name}' is an unknown of `solve` in the mode '{mode}', and also {taken[str(name)]}"
                 self.board.report_once(name, "HS301", message, "give one of them another name")
-
-    def _with_timer(self, part: Part) -> Part:
-        """A part with the state `since` in all of its modes, where it uses that."""
-        timer = (f"{part.name}.{SINCE}",) if part.name in self.board.timed else ()
-        return replace(part, states=tuple((*states, *timer) for states in part.states))
 
     def _initial(self) -> Initial:
         """The initial state of the whole; states that the initial mode of a part lacks are 0."""

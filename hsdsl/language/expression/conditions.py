@@ -1,5 +1,8 @@
 # pyright: basic, reportOperatorIssue=false
-"""Conditions of events: comparisons with their surfaces, joined by `and` and `or`; `not` is moved into comparisons."""
+"""Inequalities of guards and walls, and the conditions of events.
+
+A condition of an event is comparisons with their surfaces, joined by `and` and `or`; `not` is moved into comparisons.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +15,70 @@ import sympy as sp
 from hsdsl.base.functions import absolute, below
 from hsdsl.base.names import shown
 from hsdsl.language.expression import symbolic
-from hsdsl.language.expression.scope import Scope
-from hsdsl.language.expression.selection import either
-from hsdsl.language.expression.syntax import Comparison, ExpressionError, Logic, Not, Tree, Truth
+from hsdsl.language.expression.algebra import either
+from hsdsl.language.expression.parse import Comparison, ExpressionError, Logic, Not, Tree, Truth
+from hsdsl.language.expression.scope import Scope, Value
+
+
+def inequality(tree: Tree, scope: Scope, text: str, key: str) -> tuple[Value, str, Value]:
+    """The two sides of an inequality whose names the scope has, and its sign between them.
+
+    Raises ExpressionError: as `symbolic.number`, and where there is no inequality or more than one.
+    """
+    comparison = the_comparison(tree, key, text)
+    left, right = (symbolic.number(side, scope, text) for side in comparison.operands)
+    return left, comparison.operators[0], right
+
+
+def equation(tree: Tree, scope: Scope, text: str) -> tuple[Value, Value]:
+    """The two sides of an equation whose names the scope has.
+
+    Raises ExpressionError: as `symbolic.number`, and where there is no single equation.
+    """
+    if not (isinstance(tree, Comparison) and tree.operators == ("==",)):
+        raise ExpressionError.at(tree, "HS325", "expected one equation", "write it as left == right")
+    left, right = (symbolic.number(side, scope, text) for side in tree.operands)
+    return left, right
+
+
+def the_comparison(tree: Tree, key: str, text: str) -> Comparison:
+    """The tree, if it is exactly one inequality.
+
+    Raises ExpressionError: otherwise, with what to write under ``key``.
+    """
+    if isinstance(tree, (Logic, Not)) or (isinstance(tree, Comparison) and len(tree.operands) > 2):
+        message = f"`{key}` takes one inequality"
+        raise ExpressionError.at(tree, "HS116", message, _apart(tree, key, text))
+    if not isinstance(tree, Comparison):
+        message = f"`{key}` takes an inequality, and this is not one"
+        hint = "write it as left >= right" + ("" if isinstance(tree, Truth) else f": {_said(tree, text)} >= 0")
+        raise ExpressionError.at(tree, "HS116", message, hint)
+    operator = tree.operators[0]
+    if operator in ("==", "!="):
+        message = f"`{key}` takes an inequality, not `{operator}`"
+        left, right = (_said(side, text) for side in tree.operands)
+        hint = f"write {left} >= {right} or {left} <= {right}, whichever is true where the mode "
+        hint += "ends" if key == "when" else "may be"
+        raise ExpressionError.at(tree, "HS107", message, hint)
+    return tree
+
+
+def _apart(tree: Tree, key: str, text: str) -> str:
+    """The hint for several inequalities in one."""
+    if key != "when":
+        return "write each inequality as an item of its own"
+    event = f"write event: {_said(tree, text)}, which is made where that turns true"
+    if not (isinstance(tree, Logic) and all(isinstance(operand, Comparison) for operand in tree.operands)):
+        return event
+    if tree.operator == "or":
+        return "write a transition for each: " + "; ".join(f"when: {_said(o, text)}" for o in tree.operands)
+    first, *others = (_said(operand, text) for operand in tree.operands)
+    return f"{event}; `when: {first}` with `if: {' and '.join(others)}` reads the `if` only where the first is crossed"
+
+
+def _said(tree: Tree, text: str) -> str:
+    return shown(text[tree.start : tree.end], 40)
+
 
 _OPPOSITE = {">": "<=", ">=": "<", "<": ">=", "<=": ">"}
 # within this share of its sides a comparison that is reached together with another one counts as reached:

@@ -1,18 +1,22 @@
-# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportReturnType=false
-"""Selections: one of several expressions, by the number of a mode or by a truth.
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false, reportReturnType=false
+"""What SymPy expressions are made of besides sums and products: choices, derivatives, solutions of linear equations.
 
-A truth is a number, 1 or 0. All expressions of a selection are computed, so each gets arguments that have a value where
-it is not selected.
+A choice is by the number of a mode or by a truth, a number that is 1 or 0. All its expressions are computed, so each
+gets arguments that have a value where it is not chosen.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import random
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import sympy as sp
 
-from hsdsl.base.functions import below, rebuilt, sign, solution
+from hsdsl.base.functions import below, floor, rebuilt, sign, solution
+from hsdsl.language.expression.scope import TIME, Value
 
 _HALF = sp.Rational(1, 2)
 _SAFE: dict[str, Any] = {
@@ -149,3 +153,104 @@ def _guarded(expr: Any, safe: Any, guard: Guard, constants: frozenset[Any]) -> A
 def is_number(expr: Any, number: int) -> Any:
     """The condition that an expression is a number."""
     return sp.Eq(expr, number)
+
+
+@lru_cache(maxsize=4096)  # memory of events has many conditions, which only jump
+def moving(expr: sp.Basic) -> frozenset[Any]:
+    """The symbols outside of what only jumps: by the others the derivative is zero."""
+    if expr.is_Symbol:
+        return frozenset((expr,))
+    if isinstance(expr, (sign, floor)):
+        return frozenset()
+    parts = expr.args[2:] if isinstance(expr, below) else expr.args
+    return frozenset().union(*map(moving, parts))
+
+
+@lru_cache(maxsize=1 << 14)  # the modes of a large model have most of their derivatives in common
+def derivative(expr: sp.Expr, symbol: sp.Symbol) -> sp.Expr:
+    """The derivative of an expression by a symbol: that of SymPy, which asks of every part of it whether it is zero."""
+    if symbol not in moving(expr):
+        return sp.S.Zero
+    if expr.is_Symbol:
+        return sp.S.One
+    if isinstance(expr, below):
+        return below(*expr.args[:2], *(derivative(choice, symbol) for choice in expr.args[2:]))
+    ordinary = type(expr)._eval_derivative is sp.Function._eval_derivative  # by the chain rule
+    if not (expr.is_Add or expr.is_Mul or ordinary or (expr.is_Pow and expr.exp.is_Number)):
+        return expr.diff(symbol)
+    slopes = [(i, slope) for i, part in enumerate(expr.args) if (slope := derivative(part, symbol)) != 0]
+    if not slopes:
+        return sp.S.Zero
+    if expr.is_Pow:
+        return expr * (slopes[0][1] * expr.exp / expr.base)
+    if ordinary:
+        return sp.Add(*(expr.fdiff(i + 1) * slope for i, slope in slopes))
+    if expr.is_Mul:
+        return sp.Add(*(sp.Mul(*expr.args[:i], slope, *expr.args[i + 1 :]) for i, slope in slopes))
+    return sp.Add(*(slope for _, slope in slopes))
+
+
+def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
+    """The derivative of an expression of time and states along a flow, L_f."""
+    rates = {TIME: sp.S.One, **flow}
+    present = sorted(expr.free_symbols & rates.keys(), key=lambda s: s.name)
+    return sp.Add(*(derivative(expr, s) * rates[s] for s in present))
+
+
+_MOST_TRIES = 3  # points at which a matrix must be singular to count as singular everywhere
+
+
+@dataclass(frozen=True)
+class Solved:
+    """The expression of each unknown, the states that the equations use, and how many nodes they have."""
+
+    values: dict[Any, Any]
+    uses: frozenset[str]
+    size: int
+
+
+def linear_solutions(
+    sides: Sequence[tuple[Value, Value]], unknowns: Sequence[Any]
+) -> Solved | tuple[int, str, str | None]:
+    """The solutions of equations left == right; or which equation has a fault, what it is, and a hint."""
+    rows, constants = [], []
+    zero = dict.fromkeys(unknowns, sp.S.Zero)
+    for place, (left, right) in enumerate(sides):
+        residual = left.expr - right.expr
+        row = [residual.diff(x) for x in unknowns]
+        if any(entry.free_symbols & zero.keys() for entry in row):
+            return place, "this equation is not linear in the unknowns", "products and functions of unknowns are not"
+        if all(entry == 0 for entry in row):
+            return place, "this equation has none of the unknowns", "an unknown of each equation must be in it"
+        rows.append(row)
+        constants.append(-residual.xreplace(zero))
+    if _singular(rows):
+        message = "these equations do not determine the unknowns: one of them follows from the others"
+        return len(sides) - 1, message, "remove an unknown and an equation, or add what is missing"
+    count = len(unknowns)
+    entries = [entry for row in rows for entry in row]
+    if count == 1:
+        values = {unknowns[0]: constants[0] / entries[0]}
+    else:
+        values = {x: solution(sp.Integer(i), sp.Integer(count), *entries, *constants) for i, x in enumerate(unknowns)}
+    parts = [value for pair in sides for value in pair]
+    return Solved(values, frozenset().union(*(part.uses for part in parts)), sum(part.size for part in parts))
+
+
+def _singular(rows: list[list[Any]]) -> bool:
+    """Whether a matrix is singular at some random points."""
+    numbers = random.Random(0)
+    names = sorted({s for row in rows for entry in row for s in entry.free_symbols}, key=lambda s: s.name)
+    for _ in range(_MOST_TRIES):
+        point = {name: sp.Rational(numbers.randint(1, 9999), 997) for name in names}
+        try:
+            matrix: Any = sp.Matrix([[entry.xreplace(point).evalf(60) for entry in row] for row in rows])
+            if not all(entry.is_real and entry.is_finite for entry in matrix):
+                return False
+            sizes = [max(abs(entry) for entry in matrix.row(i)) for i in range(len(rows))]
+            scaled: Any = sp.Matrix([[entry / size for entry in matrix.row(i)] for i, size in enumerate(sizes)])
+            if not abs(scaled.det()) < sp.Float("1e-40", 60):
+                return False
+        except (TypeError, ValueError, ZeroDivisionError):
+            return False
+    return True

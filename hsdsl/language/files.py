@@ -1,20 +1,28 @@
-"""The bytes of a model file, of a pipe or of standard input: read once, as many as are allowed, none from a device."""
+"""The bytes of model files and of their data files: read once, capped, none from a device or from a forbidden place.
+
+All that is made of a model is made of these bytes: a file that is saved meanwhile changes nothing.
+"""
 
 from __future__ import annotations
 
 import errno
+import hashlib
 import io
 import os
 import select
 import stat
 import sys
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 from hsdsl.base import limits
 from hsdsl.base.errors import UsageError
+from hsdsl.base.limits import Limits, applied
 from hsdsl.base.names import closest, shown
 
 STANDARD_INPUT = ("-", "/dev/stdin")
@@ -36,15 +44,10 @@ def read_bytes(path: str | os.PathLike[str]) -> bytes:
         with open(os.open(path, READ), "rb", buffering=0) as stream:
             return _content(stream.fileno(), most, path)
     except (OSError, ValueError) as error:
-        if _is_text(path):
+        if isinstance(path, str) and ("\n" in path.strip() or "hsdsl: " in path):  # several lines, or a key
             message = f"this is the text of a model, not the path of its file: `{shown(os.fspath(path), 40)}`"
             raise UsageError(message, "hsdsl.loads(text) reads a model from its text") from None
         raise UsageError(f"{os.fspath(path)}: {reason(error)}", _models_nearby(Path(path))) from None
-
-
-def _is_text(path: str | os.PathLike[str]) -> bool:
-    """Whether a path looks like the text of a model: it has several lines, or a key with its value."""
-    return isinstance(path, str) and ("\n" in path.strip() or "hsdsl: " in path)
 
 
 def open_regular(path: str | os.PathLike[str], flags: int = 0) -> BinaryIO:
@@ -106,7 +109,7 @@ def _content(descriptor: int, most: int, path: str | os.PathLike[str]) -> bytes:
     if stat.S_ISDIR(mode):
         raise IsADirectoryError
     named = stat.S_ISFIFO(mode) and os.path.exists(os.path.realpath(path))
-    data, patience = bytearray(), time.monotonic() + _SILENCE
+    data, latest = bytearray(), time.monotonic() + _SILENCE
     while len(data) < most:
         try:
             chunk = os.read(descriptor, most - len(data))
@@ -119,7 +122,7 @@ def _content(descriptor: int, most: int, path: str | os.PathLike[str]) -> bytes:
         if not chunk and (data or not named):
             break
         if not chunk:
-            if time.monotonic() > patience:
+            if time.monotonic() > latest:
                 raise OSError(errno.EPIPE, "nobody writes to this pipe")
             time.sleep(0.01)
     return bytes(data)
@@ -137,3 +140,81 @@ def _models_nearby(path: Path) -> str | None:
         return f"name a model, such as {next(iter(names.values()))}" if names else "name a model file"
     near = closest(path.name, names)
     return f"did you mean '{names[near]}'?" if near else None
+
+
+LARGEST = 64 << 20  # bytes
+
+
+class DataRefused(Exception):
+    """A data file that cannot be used: the code, the sentence and the hint of its diagnostic."""
+
+    def __init__(self, code: str, message: str, hint: str | None = None) -> None:
+        super().__init__(code, message, hint)
+        self.code, self.message, self.hint = code, message, hint
+
+
+@dataclass(frozen=True)
+class ModelFiles:
+    """A model's path and bytes, and the bytes of its data files by name; None while their names are not known."""
+
+    path: str
+    text: bytes = field(repr=False)
+    limits: Limits
+    data: Mapping[str, bytes] | None = field(default=None, repr=False)
+
+    @classmethod
+    def read(cls, path: str | os.PathLike[str], limits_: Limits | None = None, text: bytes | None = None) -> ModelFiles:
+        """Read a model file, unless its bytes are given.
+
+        Raises UsageError: it cannot be read.
+        """
+        with applied(limits_):
+            return cls(os.fspath(path), read_bytes(path) if text is None else text, limits.current())
+
+    @cached_property
+    def digest(self) -> str:
+        """The checksum of all files."""
+        return hashlib.sha256(b"".join((self.text, *(self.data or {}).values()))).hexdigest()
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the data files: that of the model, or the current one where the model comes through a pipe."""
+        return Path() if is_piped(self.path) else Path(self.path).parent
+
+    def with_data(self, data: Mapping[str, bytes]) -> ModelFiles:
+        """The same model with the bytes of its data files."""
+        return replace(self, data=data)
+
+    def content(self, name: str) -> bytes:
+        """The bytes of a data file.
+
+        Raises DataRefused: it lies elsewhere, is no regular file, is too large, or cannot be read.
+        Raises KeyError: the data files are known, and it is none of them.
+        """
+        if self.data is not None:
+            return self.data[name]
+        with applied(self.limits):
+            target = _inside(self.folder, name)
+        try:
+            with open_regular(target, getattr(os, "O_NOFOLLOW", 0)) as stream:
+                content = stream.read(LARGEST + 1)
+        except (OSError, ValueError) as error:
+            message = f"the file '{shown(name)}' cannot be read: {reason(error)}"
+            raise DataRefused("HS311", message, "its path is taken from the folder of the model") from None
+        if len(content) > LARGEST:
+            raise DataRefused("HS311", f"the file '{shown(name)}' is larger than {LARGEST >> 20} MiB")
+        return content
+
+
+def _inside(folder: Path, name: str) -> Path:
+    """The file's path with links followed, if it stays in the model's folder."""
+    try:
+        target = (folder / name).resolve()
+        folders = (folder.resolve(), *(allowed.resolve() for allowed in limits.current().folders))
+        if any(target.is_relative_to(allowed) for allowed in folders):
+            return target
+    except (OSError, ValueError, RuntimeError):
+        pass
+    message = f"the file '{shown(name)}' is not in the folder of the model"
+    hint = "put it there and write its path from that folder, or allow its folder with --allow-path FOLDER"
+    raise DataRefused("HS317", message, hint)

@@ -1,13 +1,15 @@
-"""Suggestions for values: a name, a mapping or a list in the form of another tool."""
+"""Hints for values that are of another kind than their key asks for: names, mappings and lists of other tools."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable
 from itertools import pairwise
 from typing import Any, cast
 
-from hsdsl.base.names import is_identifier, plain_sign, shown, told_apart
-from hsdsl.language.source import Key, Scalar, is_empty
+from hsdsl.base.names import closest, is_identifier, plain_sign, shown, told_apart
+from hsdsl.language.diagnosis import TABLES
+from hsdsl.language.source.nodes import Key, Scalar, is_empty
 
 _LONGEST = 1000  # of texts that are looked at for a better form
 _TARGET = r"([^\W\d]\w*)(?:'|\+|\(t\))?|d([^\W\d]\w*)/dt|der\(\s*([^\W\d]\w*)\s*\)"
@@ -18,6 +20,20 @@ _DERIVATIVE = re.compile(r"([^\W\d]\w*)(?:'|\(t\)|\.)|d([^\W\d]\w*)/dt|(?:der|di
 _SECOND = re.compile(r"([^\W\d]\w*)(?:''|\.\.)|d2([^\W\d]\w*)/dt2|der\(der\(([^\W\d]\w*)\)\)")
 _WORDS = re.compile(r"([^\W\d]\w*) +(-?[\w.]+)")
 _AND = re.compile(r"\s+and\s+|\s*(?:,|&&)\s*")
+
+
+def input_keys_meant(keys: Iterable[str]) -> set[str]:
+    """The keys of an input that its keys were probably meant to be."""
+    fields, names = ("file", "column", "times", "values"), TABLES["keys"]["file"].split()
+    meant = {closest(key, (*fields, *names)) if key not in fields else key for key in keys}
+    return {"file" if key in names else key for key in meant if key}
+
+
+def hint_for(expected: str, value: Any) -> str | None:
+    """The hint for a value that is not what was expected."""
+    if expected in _KINDS:
+        return _KINDS[expected](value)
+    return in_brackets(value) if isinstance(value, list) else None
 
 
 def assigned(text: str) -> tuple[str, str] | None:
@@ -63,7 +79,7 @@ def _entry(name: str, value: str) -> str:
     return f"write {name}: {shown(value) or '...'}"
 
 
-def as_mapping(value: Any) -> str:
+def _as_mapping(value: Any) -> str:
     """The hint for what should have been names with values."""
     match value:
         case Scalar(value=text) if lines := _assignments(text):
@@ -87,7 +103,7 @@ def as_mapping(value: Any) -> str:
             return "write {name: value}"
 
 
-def as_list(value: Any) -> str:
+def _as_list(value: Any) -> str:
     """The hint for what should have been a list."""
     match value:
         case Scalar(value=text):
@@ -158,3 +174,27 @@ def _after_a_dash(item: Any) -> bool:
 def _before(part: Scalar | Key) -> str:
     _, line, column = part.place.start
     return part.place.text.lines[line][:column]
+
+
+def _as_condition(value: Any) -> str:
+    parts = [part.value for part in value if isinstance(part, Scalar)]
+    return in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}"
+
+
+def _as_flag(value: Any) -> str | None:
+    if not isinstance(value, Scalar):
+        return in_brackets(value) if isinstance(value, list) else None
+    words = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
+    meant = words.get(value.value.lower())
+    return f"write {meant}" if meant else None
+
+
+_UNDER_IF = "under `when`, put the rest under `if`; under `domain`, make each an item"
+_KINDS: dict[str, Callable[[Any], str | None]] = {
+    "a mapping (name: value)": _as_mapping,
+    "a list": _as_list,
+    "an expression": lambda value: in_brackets(value) or "write every component as a name of its own",
+    "a condition": _as_condition,
+    "one inequality": lambda value: in_brackets(value) or _UNDER_IF,
+    "true or false": _as_flag,
+}
