@@ -1,9 +1,8 @@
-"""Dependence of names on names: definitions that nothing uses, and states that influence nothing."""
+"""Dependence of names on names: definitions that nothing uses."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from hsdsl.analysis.lint.source_expressions import SourceExpression
@@ -12,7 +11,6 @@ from hsdsl.language.schema import ModelDocument
 from hsdsl.language.system import HybridSystem
 
 _DEFINING = ("parameter", "function", "input", "let")
-_SETTINGS = ("until", "step", "tolerance", "relaxation", "max_transitions", "every")
 
 
 class Definition(NamedTuple):
@@ -61,29 +59,13 @@ def unused(document: ModelDocument, expressions: Iterable[SourceExpression]) -> 
     return frozenset(uses) - closure(roots, lambda definition: uses.get(definition, ()))
 
 
-@dataclass(frozen=True)
-class Influence:
-    """Names of states, parameters and sampled inputs, over all modes together.
+def observed_and_read(system: HybridSystem) -> tuple[set[str], set[str]]:
+    """The names that guards, conditions, walls, outputs and scenes use, over all modes together.
 
-    ``observed`` are in guards, conditions, walls, outputs and scenes. ``needed`` can change the value of such a name,
-    or a setting of the experiment. ``read`` are in expressions other than a state's own flow and resets.
+    Then those, and the names in expressions other than a state's own flow and resets.
     """
-
-    observed: frozenset[str]
-    needed: frozenset[str]
-    read: frozenset[str]
-
-
-def influence(system: HybridSystem) -> Influence:
-    """Trace influence backwards from what a run shows, by the symbols in the expressions of a system."""
-    defining: dict[str, set[str]] = {}
-    for name, expr in _definitions(system):
-        defining.setdefault(name, set()).update(_names(expr))
     observed = {name for expr in _observed(system) for name in _names(expr)}
-    read = observed | {name for own, names in defining.items() for name in names if name != own}
-    settings = (name for expr in _settings(system) for name in _names(expr))
-    needed = closure((*observed, *settings), lambda name: defining.get(name, ()))
-    return Influence(frozenset(observed), frozenset(needed), frozenset(read))
+    return observed, observed | {name for own, expr in _definitions(system) for name in _names(expr) if name != own}
 
 
 def _names(expr: Any) -> Iterator[str]:
@@ -111,11 +93,3 @@ def _definitions(system: HybridSystem) -> Iterator[tuple[str, Any]]:
     yield from ((parameter.name, parameter.value) for parameter in system.parameters)
     for given in system.inputs:
         yield from ((given.name, value) for value in (*given.times, *given.values))
-
-
-def _settings(system: HybridSystem) -> list[Any]:
-    samples = system.experiment.samples
-    values = [getattr(system.experiment, name) for name in _SETTINGS]
-    values += [size for _, size in system.experiment.scale]
-    values += samples if isinstance(samples, tuple) else [samples]
-    return [value for value in values if value is not None]

@@ -1,13 +1,11 @@
-"""Edits that take an entry out of a mapping or an item out of a list; comments and layout stay."""
+"""Edits that take an entry out of a mapping; comments and layout stay."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence as Items
+from collections.abc import Sequence
 
 from hsdsl.base.errors import Edit
-from hsdsl.language.source import Mapping, Node, Sequence, SourceRange
-
-_Range = tuple[int, int]
+from hsdsl.language.source import Mapping, Node, SourceRange
 
 
 def without_entry(mapping: Node | None, name: str) -> tuple[Edit, ...]:
@@ -15,16 +13,13 @@ def without_entry(mapping: Node | None, name: str) -> tuple[Edit, ...]:
     if not isinstance(mapping, Mapping) or name not in mapping.entries:
         return ()
     ranges = [(key.place.start[0], _end(value, key.place)) for key, value in mapping]
-    return _removed(mapping.place, ranges, list(mapping.entries).index(name))
-
-
-def without_item(items: Node | None, index: int) -> tuple[Edit, ...]:
-    """The edit that removes an item of a list written in brackets; none for another list."""
-    if not isinstance(items, Sequence):
-        return ()
-    ranges = [(item.place.start[0], item.place.end[0]) for item in items.items]
-    content = items.place.text.content
-    return _removed(items.place, ranges, index) if content[items.place.start[0]] == "[" else ()
+    index, content = list(mapping.entries).index(name), mapping.place.text.content
+    if content[mapping.place.start[0]] != "{":
+        return _from_block(content, ranges, index)
+    start, end = ranges[index]
+    if index + 1 < len(ranges):
+        return (Edit(start, ranges[index + 1][0]),)
+    return (Edit(ranges[index - 1][1] if index else start, end),)
 
 
 def _end(value: Node, key: SourceRange) -> int:
@@ -44,23 +39,7 @@ def _trimmed(content: str, end: int) -> int:
         end = line
 
 
-def _removed(whole: SourceRange, ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
-    content = whole.text.content
-    if content[whole.start[0]] in "{[":
-        return _from_flow(ranges, index)
-    return _from_block(content, ranges, index)
-
-
-def _from_flow(ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
-    start, end = ranges[index]
-    if index + 1 < len(ranges):
-        return (Edit(start, ranges[index + 1][0]),)
-    if index > 0:
-        return (Edit(ranges[index - 1][1], end),)
-    return (Edit(start, end),)
-
-
-def _from_block(content: str, ranges: Items[_Range], index: int) -> tuple[Edit, ...]:
+def _from_block(content: str, ranges: Sequence[tuple[int, int]], index: int) -> tuple[Edit, ...]:
     start, end = ranges[index]
     if "#" in content[start:end]:
         return ()  # a comment within would go too

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from hsdsl.analysis.lint.dependencies import Definition, Influence, influence, unused
+from hsdsl.analysis.lint.dependencies import Definition, unused
 from hsdsl.analysis.lint.numbers import Number, evaluate, rational, sample_at
 from hsdsl.analysis.lint.source_expressions import SourceExpression, written
 from hsdsl.analysis.lint.units.model import Units
@@ -116,11 +116,6 @@ class Subject:
     def unused(self) -> frozenset[Definition]:
         """The parameters, inputs and `let` names that nothing depends on."""
         return unused(self.document, self.expressions)
-
-    @cached_property
-    def influence(self) -> Influence:
-        """What can influence what is seen of the model."""
-        return influence(self.system)
 
     @cached_property
     def starts(self) -> tuple[str, ...]:

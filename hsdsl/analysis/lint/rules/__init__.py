@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from hsdsl.analysis.lint.finding import Finding
-from hsdsl.analysis.lint.rules import experiment, guards, names, regularity, scene, shape, tangency, transitions, units
+from hsdsl.analysis.lint.rules import experiment, guards, names, regularity, shape, tangency, transitions, units
 from hsdsl.analysis.lint.subject import Subject
 
 FAMILIES = {
     "names": ("HS400", "HS419"),
-    "shape": ("HS420", "HS439"),
-    "scene": ("HS440", "HS459"),
+    "shape": ("HS420", "HS459"),
     "experiment": ("HS460", "HS479"),
     "comments": ("HS490", "HS499"),
     "mathematics": ("HS500", "HS599"),
@@ -47,8 +46,6 @@ RULES: dict[str, Rule] = {
     "HS404": Rule("unused-state", names.unused_state),
     "HS405": Rule("shadowed-name", names.shadowed_name, "note"),
     "HS406": Rule("unreachable-mode", names.unreachable_mode),
-    "HS407": Rule("confusable-names", names.confusable_names),
-    "HS408": Rule("misleading-name", names.misleading_name),
     "HS409": Rule("misnamed-output", names.misnamed_output),
     "HS410": Rule("unused-function", names.unused_name("function")),
     "HS421": Rule("identity-reset", shape.identity_reset),
@@ -58,21 +55,11 @@ RULES: dict[str, Rule] = {
     "HS427": Rule("shadowed-transition", shape.shadowed_transition),
     "HS428": Rule("constant-condition", shape.constant_condition),
     "HS429": Rule("empty-section", shape.empty_section, "note"),
-    "HS430": Rule("idle-priority", shape.idle_priority),
-    "HS441": Rule("idle-state", scene.idle_state, "note"),
-    "HS442": Rule("idle-parameter", scene.idle_parameter, "note"),
-    "HS443": Rule("twin-modes", scene.twin_modes),
-    "HS444": Rule("constant-state", scene.constant_state, "note"),
-    "HS445": Rule("repeated-default", scene.repeated_default, "note"),
-    "HS446": Rule("repeated-wall", scene.repeated_wall),
-    "HS447": Rule("after-the-end", scene.after_the_end),
+    "HS447": Rule("after-the-end", shape.after_the_end),
     "HS461": Rule("starts-outside", experiment.starts_outside),
     "HS462": Rule("starts-on-guard", experiment.starts_on_guard, "note"),
     "HS463": Rule("ends-on-event", experiment.ends_on_event, "note"),
     "HS464": Rule("large-relaxation", experiment.large_relaxation),
-    "HS466": Rule("odd-samples", experiment.odd_samples),
-    "HS467": Rule("odd-step", experiment.odd_step),
-    "HS468": Rule("late-reference", experiment.late_reference),
     "HS490": Rule("unused-ignore"),
     "HS491": Rule("unknown-ignore"),
     "HS492": Rule("undecided", severity="note"),

@@ -2,32 +2,18 @@
 
 from __future__ import annotations
 
-import unicodedata
 from collections.abc import Callable, Collection, Iterator
 
-from hsdsl.analysis.lint.dependencies import Definition
+from hsdsl.analysis.lint.dependencies import Definition, observed_and_read
 from hsdsl.analysis.lint.edits import without_entry
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.subject import Subject
-from hsdsl.base.names import in_latin, listed
-from hsdsl.language.expression.scope import RESERVED
+from hsdsl.base.names import listed
 from hsdsl.language.expression.syntax import Name
 from hsdsl.language.source import Key
 
 _UNUSED = "remove it, or use it"
-_RENAME = "call it something else"
 _SEPARATE = "give one of them another name"
-_ELSEWHERE = {  # names of functions and constants in other languages
-    "ln": "the logarithm",
-    "arcsin": "the inverse sine",
-    "arccos": "the inverse cosine",
-    "arctan": "the inverse tangent",
-    "sgn": "the sign",
-    "pow": "a power",
-    "inf": "infinity",
-    "nan": "a missing number",
-    "π": "pi",
-}
 
 
 def unused_name(kind: str) -> Callable[[Subject], Iterator[Finding]]:
@@ -57,8 +43,8 @@ def unused_let(subject: Subject) -> Iterator[Finding]:
 
 def unused_state(subject: Subject) -> Iterator[Finding]:
     """Find states that no expression uses but their own flow and resets."""
-    influence = subject.influence
-    unused = [key for name, key in subject.states.items() if influence.observed and name not in influence.read]
+    observed, read = observed_and_read(subject.system)
+    unused = [key for name, key in subject.states.items() if observed and name not in read]
     if unused:
         one = len(unused) == 1
         message = f"nothing depends on the state{'s' * (not one)} {listed(unused)}"
@@ -84,40 +70,6 @@ def unreachable_mode(subject: Subject) -> Iterator[Finding]:
         if part.mode.name not in subject.reachable:
             message = f"no transition leads from the initial mode to the mode '{part.key}'"
             yield Finding(part.key.place.span, message, "let a transition lead to it, or remove it")
-
-
-def confusable_names(subject: Subject) -> Iterator[Finding]:
-    """Find names that look alike, once for all that are taken for the same one."""
-    alike: dict[str, dict[str, Key]] = {}
-    for name in _names(subject):
-        alike.setdefault(_appearance(name), {}).setdefault(str(name), name)
-    for first, *others in (list(names.values()) for names in alike.values() if len(names) > 1):
-        taken = "is easily" if len(others) == 1 else "are easily"
-        names = f"the name{'s' * (len(others) > 1)} {listed(others)}"
-        yield Finding(others[0].place.span, f"{names} {taken} taken for '{first}'", _RENAME)
-
-
-def _appearance(name: str) -> str:
-    """Reduce a name to its letters, alike ones as one; single letters keep their case."""
-    latin = in_latin(unicodedata.normalize("NFKC", name))
-    return latin if len(latin) == 1 else latin.replace("_", "").casefold()
-
-
-def misleading_name(subject: Subject) -> Iterator[Finding]:
-    """Find names that look like a function or a constant."""
-    for name in _names(subject):
-        lowered = name.lower()
-        if len(name) > 1 and lowered in RESERVED:
-            yield Finding(name.place.span, f"'{name}' looks like `{lowered}` of the language", _RENAME)
-        elif lowered in _ELSEWHERE:
-            yield Finding(name.place.span, f"'{name}' looks like {_ELSEWHERE[lowered]}", _RENAME)
-
-
-def _names(subject: Subject) -> Iterator[Key]:
-    document = subject.document
-    yield from (*document.parameters, *document.inputs, *document.let, *document.outputs)
-    for part in subject.modes:
-        yield from (*(part.document.flow or ()), *part.document.let, *part.document.outputs)
 
 
 def misnamed_output(subject: Subject) -> Iterator[Finding]:

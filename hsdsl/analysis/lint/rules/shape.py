@@ -121,12 +121,12 @@ def _empty(mapping: Node | None, keys: tuple[str, ...]) -> Iterator[Finding]:
             yield Finding(key.place.span, f"`{key}` is empty", "leave it out", fix=fix)
 
 
-def idle_priority(subject: Subject) -> Iterator[Finding]:
-    """Find priorities of modes where all priorities are equal."""
-    for part, item in subject.edges:
-        mapping = subject.node(*item.path)
-        equal = len({edge.priority for edge in part.mode.edges}) == 1
-        if equal and item.edge.priority and isinstance(mapping, Mapping) and "priority" in mapping.entries:
-            key, _ = mapping.entries["priority"]
-            message = f"no transition of the mode '{part.key}' has another priority"
-            yield Finding(key.place.span, message, "leave it out", fix=without_entry(mapping, "priority"))
+def after_the_end(subject: Subject) -> Iterator[Finding]:
+    """Find transitions and walls of final modes."""
+    for part in subject.modes:
+        if part.mode.final:
+            things = [(item.document.when, "transition never fires") for item in part.edges]
+            things += [(scalar, "wall is never met") for scalar in part.document.domain]
+            for scalar, never in things:
+                message = f"this {never}: a run ends on entering '{part.key}'"
+                yield Finding(scalar.place.span, message, "remove it, or `final: true`")
