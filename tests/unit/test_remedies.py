@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.analysis.report.remedies import REMEDIES, remedies_of, table
 from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.report.words import REMEDIES, remedies_of, table
 
 ROOT = Path(hsdsl.__file__).parent
 CLOSE = """\

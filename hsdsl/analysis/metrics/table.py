@@ -67,10 +67,10 @@ CURVE_METRICS = {
     "rho": CurveMetric("curves", "rho", ("relaxation", "hops")),  # over time, as one of the next two
     "quotient": CurveMetric("curves", "rho", ("hops",)),  # a strip's points count as the guard's
     "relaxed": CurveMetric("curves", "rho", ("relaxation", "hops")),  # its strips as deep as the runs' own
-    "rho-hat": CurveMetric("labelled_sup", "rho_hat", ("coordinates",)),  # of states, at the first run's samples
-    "sup": CurveMetric("labelled_sup", "sup_norm"),  # largest difference of states, plus 1 in different modes
-    "skorokhod": CurveMetric("skorokhod", "skorokhod"),  # the same under the best retiming, which is paid for
-    "tau-epsilon": CurveMetric("tau_epsilon", "tau_epsilon"),  # closeness of hybrid arcs, jump by jump
+    "rho-hat": CurveMetric("labelled", "rho_hat", ("coordinates",)),  # of states, at the first run's samples
+    "sup": CurveMetric("labelled", "sup_norm"),  # largest difference of states, plus 1 in different modes
+    "skorokhod": CurveMetric("labelled", "skorokhod"),  # the same under the best retiming, which is paid for
+    "tau-epsilon": CurveMetric("labelled", "tau_epsilon"),  # closeness of hybrid arcs, jump by jump
 }
 POINT_METRICS = ("quotient", "relaxed")  # those that are also between points
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from xml.etree import ElementTree
 
-from hsdsl.analysis.lint.units.unit import Unit, UnknownUnit, read
+from hsdsl.analysis.lint.units import Unit, UnknownUnit, read
 from hsdsl.base.names import visible
 
 Element = ElementTree.Element

@@ -9,7 +9,7 @@ import numpy as np
 
 from hsdsl.analysis.plot.style import colours
 from hsdsl.analysis.report import words
-from hsdsl.analysis.report.alike import condensed
+from hsdsl.analysis.report.words import condensed
 from hsdsl.base.names import visible, without_memory
 from hsdsl.base.parts import layout_of, numbered
 from hsdsl.engine.backends.c import width

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from hsdsl.analysis.lint.finding import Finding
-from hsdsl.analysis.lint.rules import experiment, guards, names, regularity, shape, tangency, transitions, units
+from hsdsl.analysis.lint.rules import experiment, guards, regularity, shape, units
 from hsdsl.analysis.lint.subject import Subject
 
 FAMILIES = {
@@ -40,14 +40,14 @@ def family(code: str) -> str:
 
 
 RULES: dict[str, Rule] = {
-    "HS401": Rule("unused-parameter", names.unused_name("parameter")),
-    "HS402": Rule("unused-input", names.unused_name("input")),
-    "HS403": Rule("unused-let", names.unused_let),
-    "HS404": Rule("unused-state", names.unused_state),
-    "HS405": Rule("shadowed-name", names.shadowed_name, "note"),
-    "HS406": Rule("unreachable-mode", names.unreachable_mode),
-    "HS409": Rule("misnamed-output", names.misnamed_output),
-    "HS410": Rule("unused-function", names.unused_name("function")),
+    "HS401": Rule("unused-parameter", shape.unused_name("parameter")),
+    "HS402": Rule("unused-input", shape.unused_name("input")),
+    "HS403": Rule("unused-let", shape.unused_let),
+    "HS404": Rule("unused-state", shape.unused_state),
+    "HS405": Rule("shadowed-name", shape.shadowed_name, "note"),
+    "HS406": Rule("unreachable-mode", shape.unreachable_mode),
+    "HS409": Rule("misnamed-output", shape.misnamed_output),
+    "HS410": Rule("unused-function", shape.unused_name("function")),
     "HS421": Rule("identity-reset", shape.identity_reset),
     "HS422": Rule("missing-reset", shape.missing_reset),
     "HS425": Rule("dead-end", shape.dead_end),
@@ -67,18 +67,18 @@ RULES: dict[str, Rule] = {
     "HS502": Rule("condition-beyond-surface", guards.condition_beyond_surface),
     "HS503": Rule("guard-inside-domain", guards.guard_inside_domain, "note"),
     "HS504": Rule("guard-turns-inward", guards.guard_turns_inward, "note"),
-    "HS505": Rule("tangency", tangency.tangency, "note"),
-    "HS506": Rule("reset-lands-beyond", transitions.reset_lands_beyond),
-    "HS507": Rule("reset-lands-on-guard", transitions.reset_lands_on_guard, "note"),
+    "HS505": Rule("tangency", regularity.tangency, "note"),
+    "HS506": Rule("reset-lands-beyond", guards.reset_lands_beyond),
+    "HS507": Rule("reset-lands-on-guard", guards.reset_lands_on_guard, "note"),
     "HS508": Rule("overlapping-guards", guards.overlapping_guards),
-    "HS509": Rule("sliding", transitions.sliding),
-    "HS510": Rule("zero-time-cycle", transitions.zero_time_cycle),
+    "HS509": Rule("sliding", guards.sliding),
+    "HS510": Rule("zero-time-cycle", guards.zero_time_cycle),
     "HS511": Rule("jump-inside-mode", regularity.jump_inside_mode),
     "HS512": Rule("kink-inside-mode", regularity.kink_inside_mode, "note"),
     "HS513": Rule("vanishing-divisor", regularity.vanishing_divisor),
     "HS514": Rule("outside-real-domain", regularity.outside_real_domain),
     "HS515": Rule("not-lipschitz", regularity.not_lipschitz),
-    "HS517": Rule("degenerate-surface", tangency.degenerate_surface),
+    "HS517": Rule("degenerate-surface", regularity.degenerate_surface),
     "HS601": Rule("unknown-unit", units.unknown_unit),
     "HS602": Rule("inconsistent-units", units.misfits("sum", units.CONVERT)),
     "HS603": Rule("argument-units", units.misfits("argument", units.PLAIN)),

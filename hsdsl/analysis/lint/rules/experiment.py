@@ -7,8 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from hsdsl.analysis.lint.finding import Finding
-from hsdsl.analysis.lint.numbers import BEYOND, ON, Number, evaluate, holds, leaves, side
-from hsdsl.analysis.lint.subject import ModePart, Subject
+from hsdsl.analysis.lint.subject import BEYOND, ON, ModePart, Number, Subject, evaluate, holds, leaves, side
 from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.language.expression import numeric
 from hsdsl.language.expression.scope import symbol
