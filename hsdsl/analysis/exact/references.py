@@ -7,10 +7,10 @@ domains, by its `residual`, is the model's reference; names of files do not coun
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -27,20 +27,8 @@ STORED = Path(__file__).with_name("stored")
 LARGEST_DEFECT = 1e-9  # of slopes, guards and resets, relative
 
 
-class Referenced(Protocol):
-    """The part of a model that its reference needs."""
-
-    @property
-    def program(self) -> Program: ...
-
-    @property
-    def system(self) -> Any: ...
-    @property
-    def simulate(self) -> Callable[..., Execution]: ...
-
-
 @checks_arguments
-def reference(model: Referenced, block: int = 0) -> Execution:
+def reference(model: Any, block: int = 0) -> Execution:
     """Return the exact execution of a model.
 
     Parameters
@@ -73,12 +61,12 @@ def reference(model: Referenced, block: int = 0) -> Execution:
     )
 
 
-def references_of(model: Referenced) -> list[Mapping[str, str]]:
+def references_of(model: Any) -> list[Mapping[str, str]]:
     """The overrides of each block of a model's ``reference:`` section, by names such as ``initial.w``."""
     return [block.settings for block in model.system.reference]
 
 
-def start_of(model: Referenced, block: int) -> Mapping[str, str]:
+def start_of(model: Any, block: int) -> Mapping[str, str]:
     """The initial values by which a block of a model's ``reference:`` section differs from the model."""
     settings: Mapping[str, str] = dict(enumerate(references_of(model))).get(block, {})
     if any(not name.startswith("initial.") for name in settings):

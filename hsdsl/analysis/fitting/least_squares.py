@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
@@ -284,8 +284,7 @@ LONGER = 1.25  # of the time of measurements
 FURTHER, NARROW = 1.1, 1e-6  # so many times as far, and by this share of the time, transitions are moved over them
 
 
-@dataclass(frozen=True)
-class WrongSide:
+class WrongSide(NamedTuple):
     """A measurement that agrees better with the other side of the transition next to it.
 
     ``gain`` is what the sum of squares would lose there, ``late`` how much later than the transition it is, and

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 from hsdsl.analysis.lint.source_expressions import TIME, SourceExpression
 from hsdsl.base.functions import CONSTANTS  # pyright: ignore[reportUnknownVariableType]
@@ -382,8 +382,7 @@ _INDEX = re.compile(r"\[[^\]]*\]")
 _VALUES = ("parameter", "input", "reset", "output", "initial", "scale", "reference", "experiment", "delay")
 
 
-@dataclass(frozen=True)
-class Checked:
+class Checked(NamedTuple):
     """An expression, its unit, the one that it should have, if that is known, and what does not fit in it."""
 
     written: SourceExpression

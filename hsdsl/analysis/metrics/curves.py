@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from hsdsl.analysis.metrics.interval import CERTIFIED, ZERO, Budget, Interval
 from hsdsl.analysis.metrics.points import ModePoints, SpaceMetric
 from hsdsl.analysis.metrics.trace import Cells, Side, merge, names_of, trace
 from hsdsl.base.errors import UsageError
-from hsdsl.base.numbers.bernstein import bernstein, largest_norm, length
+from hsdsl.base.numbers.bernstein import UNIT, bernstein, largest_norm, length
 from hsdsl.engine.execution import Array, Execution
 
 GAP = 1e-6  # of the lower bound, at which refinement stops: so that what is printed is the distance
@@ -96,7 +96,7 @@ def rho(
     if cells.same:
         return no_distance(cells, name)
     on = OnSpace(metric, relaxation is not None)
-    found = supremum(cells, on, gap, cells.rounding, metric.evaluations, metric.budget)
+    found = Supremum(cells, on, gap, cells.rounding, metric.evaluations, metric.budget)
     return curve_distance(found, cells, name, gap, metric.budget, metric.status)
 
 
@@ -147,8 +147,31 @@ def curve_distance(
     return CurveDistance(interval, found.time, metric, cells.span, " ".join(filter(None, notes)))
 
 
+class Labelled:
+    """The distance D of states with modes; its methods are what a supremum asks of any distance of points."""
+
+    def over(self, a: Side, b: Side) -> Array:
+        """Bound the distance over each whole cell from above, cheaply; infinite where nothing is known. Shape (n,)."""
+        return largest_norm(a.powers - b.powers) + (a.mode != b.mode) + a.rounding + b.rounding
+
+    def at(self, a: Side, b: Side, end: int, times: Array, enough: float) -> tuple[Array, Array]:
+        """Bound the distance at the cells' left (0) or right (1) ends, from below and above.
+
+        Upper bounds of at most ``enough`` need not be improved.
+        """
+        difference = a.at_end(end) - b.at_end(end)
+        states = np.sqrt(np.sum(difference**2, axis=1))
+        apart = states + (a.mode != b.mode)
+        rounding = a.rounding + b.rounding + (difference.shape[1] + 4) * UNIT * states
+        return np.maximum(0.0, apart - rounding), apart + rounding
+
+    def motion(self, side: Side) -> Array:
+        """Bound how far one curve moves in each cell, by the length of the control polygon. Shape (n,)."""
+        return length(side.powers) + side.stray
+
+
 @dataclass(frozen=True)
-class OnSpace:
+class OnSpace(Labelled):
     """Distances on M, where a strip's point (z, tau) counts as z, or with ``strips`` on the relaxed space."""
 
     metric: SpaceMetric
@@ -218,45 +241,6 @@ FIRST_BATCH, LARGEST_BATCH = 32, 4096
 ROUGH, FEW = 0.01, 0.1  # within so much of the lower bound, spend only so much of the evaluations allowed
 
 
-class CellDistance(Protocol):
-    """A distance between points that can be bounded over cells."""
-
-    def over(self, a: Side, b: Side) -> Array:
-        """Bound the distance over each whole cell from above, cheaply; infinite where nothing is known. Shape (n,)."""
-        ...
-
-    def at(self, a: Side, b: Side, end: int, times: Array, enough: float) -> tuple[Array, Array]:
-        """Bound the distance at the cells' left (0) or right (1) ends, from below and above.
-
-        Upper bounds of at most ``enough`` need not be improved.
-        """
-        ...
-
-    def motion(self, side: Side) -> Array:
-        """Bound how far one curve moves in each cell. Shape (n,)."""
-        ...
-
-
-@dataclass
-class Supremum:
-    """What is known of a supremum: it lies in [lower, upper], and ``lower`` is reached at ``time``.
-
-    ``points`` is the largest upper bound at any single time, ``evaluations`` how many times were looked at.
-    """
-
-    time: float
-    lower: float = 0.0
-    upper: float = 0.0
-    points: float = 0.0
-    evaluations: int = 0
-    complete: bool = True
-
-    def accepted(self, gap: float, floor: float) -> float:
-        """Return what an upper bound may be."""
-        least = max(self.lower, self.points)
-        return max(least * (1 + gap), least + floor)
-
-
 @dataclass
 class _Frontier:
     """Cells not yet decided: upper bounds over each, and at both ends where those are known (else not a number)."""
@@ -273,26 +257,7 @@ class _Frontier:
         return _Frontier(cells, np.concatenate([self.bound, other.bound]), np.concatenate([self.ends, other.ends]))
 
 
-def supremum(cells: Cells, distance: CellDistance, gap: float, floor: float, most: int, budget: Budget) -> Supremum:
-    """Find the supremum of a distance over all cells.
-
-    Stops when ``upper - lower <= max(gap * lower, floor)``, when bounds at single times allow no less, after about
-    ``most`` evaluations, or when the budget is spent.
-    """
-    found = Supremum(float(cells.begin[0]))
-    search = _Search(distance, found, gap, floor, most, budget)
-    bounds = _bounds(cells, distance)
-    known = np.isfinite(bounds)
-    frontier = _Frontier(cells, bounds, np.full((len(cells), 2), np.nan))
-    likely, others = _largest_first(bounds, np.flatnonzero(known))
-    search.best_first(frontier.take(likely))
-    search.best_first(frontier.take(others[search.undecided(bounds[others])]))
-    search.best_first(search.coarse_to_fine(frontier, np.flatnonzero(~known)))
-    found.upper = max(found.upper, found.points)
-    return found
-
-
-def _bounds(cells: Cells, distance: CellDistance) -> Array:
+def _bounds(cells: Cells, distance: Labelled) -> Array:
     return np.concatenate([distance.over(*sides) for sides in _chunks(cells)])
 
 
@@ -301,16 +266,35 @@ def _chunks(cells: Cells) -> Iterator[tuple[Side, Side]]:
     return (cells[k : k + CHUNK].sides() for k in range(0, len(cells), CHUNK))
 
 
-@dataclass
-class _Search:
-    """Refines until what is left cannot matter."""
+class Supremum:
+    """The supremum of a distance over all cells: it lies in [lower, upper], and ``lower`` is reached at ``time``.
 
-    distance: CellDistance
-    found: Supremum
-    gap: float
-    floor: float
-    most: int
-    budget: Budget
+    The search stops when ``upper - lower <= max(gap * lower, floor)``, when bounds at single times allow no less, after
+    about ``most`` evaluations, or when the budget is spent. ``points`` is the largest upper bound at any single time,
+    ``evaluations`` how many times were looked at.
+    """
+
+    def __init__(self, cells: Cells, distance: Labelled, gap: float, floor: float, most: int, budget: Budget) -> None:
+        self.distance, self.gap, self.floor, self.most, self.budget = distance, gap, floor, most, budget
+        self.time = float(cells.begin[0])
+        self.lower = self.upper = self.points = 0.0
+        self.evaluations, self.complete = 0, True
+        bounds = _bounds(cells, distance)
+        known = np.isfinite(bounds)
+        frontier = _Frontier(cells, bounds, np.full((len(cells), 2), np.nan))
+        # Those with the largest bounds settle most of the others.
+        order = np.flatnonzero(known)
+        order = order[_largest(bounds[order], LARGEST_BATCH)]
+        likely, others = order[:LARGEST_BATCH], order[LARGEST_BATCH:]
+        self.best_first(frontier.take(likely))
+        self.best_first(frontier.take(others[self.undecided(bounds[others])]))
+        self.best_first(self.coarse_to_fine(frontier, np.flatnonzero(~known)))
+        self.upper = max(self.upper, self.points)
+
+    def accepted(self, gap: float) -> float:
+        """What an upper bound may be."""
+        least = max(self.lower, self.points)
+        return max(least * (1 + gap), least + self.floor)
 
     def best_first(self, frontier: _Frontier) -> None:
         """Evaluate and cut the cells with the largest bounds until all are decided."""
@@ -365,20 +349,20 @@ class _Search:
 
     def undecided(self, bound: Array) -> Array:
         """Return which bounds may still matter, keeping the largest of the others."""
-        decided = bound <= self.found.accepted(self.gap, self.floor)
+        decided = bound <= self.accepted(self.gap)
         if decided.any():
-            self.found.upper = max(self.found.upper, float(np.max(bound[decided])))
+            self.upper = max(self.upper, float(np.max(bound[decided])))
         return np.flatnonzero(~decided)
 
     def _spent(self, bound: Array) -> bool:
         highest = float(np.max(bound))
-        self.budget.tell(self.found.lower, max(highest, self.found.points))
-        over = self.found.evaluations > 0 and self.budget.spent()  # a first look is always taken
-        near = highest <= self.found.accepted(max(self.gap, ROUGH), self.floor)
-        if self.found.evaluations < self.most * (FEW if near else 1) and not over:
+        self.budget.tell(self.lower, max(highest, self.points))
+        over = self.evaluations > 0 and self.budget.spent()  # a first look is always taken
+        near = highest <= self.accepted(max(self.gap, ROUGH))
+        if self.evaluations < self.most * (FEW if near else 1) and not over:
             return False
-        self.found.complete = False
-        self.found.upper = max(self.found.upper, highest)
+        self.complete = False
+        self.upper = max(self.upper, highest)
         return True
 
     def _refined(self, batch: _Frontier) -> _Frontier:
@@ -391,7 +375,7 @@ class _Search:
         batch = batch.take(self.undecided(batch.bound))
         stuck = ~batch.cells.divisible
         if stuck.any():
-            self.found.upper = max(self.found.upper, float(np.max(batch.bound[stuck])))
+            self.upper = max(self.upper, float(np.max(batch.bound[stuck])))
             batch = batch.take(np.flatnonzero(~stuck))
         if not len(batch.cells):
             return batch
@@ -408,22 +392,16 @@ class _Search:
             return
         undecided = cells[unknown]
         times = (undecided.begin, undecided.end)[end]
-        found, enough = self.found, self.found.accepted(self.gap, self.floor)
+        enough = self.accepted(self.gap)
         lower, upper = self.distance.at(*undecided.sides(), end, times, enough)
         ends[unknown, end] = upper
-        found.evaluations += len(unknown)
+        self.evaluations += len(unknown)
         best = int(np.argmax(lower))
-        if lower[best] > found.lower:
-            found.lower, found.time = float(lower[best]), float(times[best])
-        found.upper = max(found.upper, float(np.max(upper)))
+        if lower[best] > self.lower:
+            self.lower, self.time = float(lower[best]), float(times[best])
+        self.upper = max(self.upper, float(np.max(upper)))
         # What was accepted before it was improved, or has no bound, must not raise what is accepted next.
-        found.points = max(found.points, float(np.max(upper[(upper > enough) & np.isfinite(upper)], initial=0.0)))
-
-
-def _largest_first(bound: Array, chosen: Array) -> tuple[Array, Array]:
-    """Part the cells with the largest bounds, which settle most of the others, from the rest."""
-    order = chosen[_largest(bound[chosen], LARGEST_BATCH)]
-    return order[:LARGEST_BATCH], order[LARGEST_BATCH:]
+        self.points = max(self.points, float(np.max(upper[(upper > enough) & np.isfinite(upper)], initial=0.0)))
 
 
 def _largest(bound: Array, size: int) -> Array:
@@ -431,7 +409,7 @@ def _largest(bound: Array, size: int) -> Array:
     return np.argpartition(-bound, size - 1) if size < len(bound) else np.arange(len(bound))
 
 
-def _ways(cells: Cells, distance: CellDistance) -> Array:
+def _ways(cells: Cells, distance: Labelled) -> Array:
     """Bound how far both curves together move in each cell."""
     return np.concatenate([distance.motion(a) + distance.motion(b) for a, b in _chunks(cells)])
 

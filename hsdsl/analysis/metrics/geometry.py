@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -99,7 +99,7 @@ class Gate:
     def plane(self) -> Gate:
         """The same gate without inequalities."""
         none = np.zeros((0, self.size))
-        exact = replace(self.exact, rows=self.exact.rows[:0])
+        exact = self.exact._replace(rows=self.exact.rows[:0])
         return replace(self, normals=none, levels=np.zeros(0), room=np.zeros(0), exact=exact, curved=())
 
     @cached_property
@@ -113,8 +113,7 @@ class Gate:
         return float(np.linalg.norm(ends)) * (1 + 1e-9)
 
 
-@dataclass(frozen=True, eq=False)
-class ExactGate:
+class ExactGate(NamedTuple):
     """A gate in rational numbers: guard and image as maps of s (base, then frame), the inequalities, and ``inner``."""
 
     sides: tuple[Exact, Exact]

@@ -25,50 +25,28 @@ states. A strip's point (z, tau) counts as z in its mode.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from hsdsl.analysis.metrics.curves import (
     GAP,
-    CellDistance,
     CurveDistance,
+    Labelled,
     OnSpace,
+    Supremum,
     curve_distance,
     merged,
     no_distance,
-    supremum,
 )
 from hsdsl.analysis.metrics.interval import INFINITE, SAMPLED, Budget, Interval
 from hsdsl.analysis.metrics.points import SpaceMetric
-from hsdsl.analysis.metrics.trace import ROUNDOFF, Cells, Polyline, Side, Trace, names_of, polylines, rounding_of, trace
+from hsdsl.analysis.metrics.trace import ROUNDOFF, Cells, Polyline, Trace, names_of, polylines, rounding_of, trace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean
-from hsdsl.base.numbers.bernstein import UNIT, largest_norm, length
 from hsdsl.engine.execution import Array, Execution
 
 EVALUATIONS = 50_000
-
-
-@dataclass(frozen=True)
-class Labelled:
-    """The distance D of states with modes."""
-
-    def over(self, a: Side, b: Side) -> Array:
-        """Bound by the difference of the two polynomials."""
-        return largest_norm(a.powers - b.powers) + (a.mode != b.mode) + a.rounding + b.rounding
-
-    def at(self, a: Side, b: Side, end: int, times: Array, enough: float = 0.0) -> tuple[Array, Array]:
-        """Return D, less or more than rounding."""
-        difference = a.at_end(end) - b.at_end(end)
-        states = np.sqrt(np.sum(difference**2, axis=1))
-        apart = states + (a.mode != b.mode)
-        rounding = a.rounding + b.rounding + (difference.shape[1] + 4) * UNIT * states
-        return np.maximum(0.0, apart - rounding), apart + rounding
-
-    def motion(self, side: Side) -> Array:
-        """Bound the way by the length of the control polygon."""
-        return length(side.powers) + side.stray
 
 
 def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
@@ -77,7 +55,7 @@ def sup_norm(a: Execution, b: Execution, gap: float = GAP) -> CurveDistance:
     if cells.same:
         return no_distance(cells, "sup")
     budget = Budget()
-    found = supremum(cells, Labelled(), gap, cells.rounding, EVALUATIONS, budget)
+    found = Supremum(cells, Labelled(), gap, cells.rounding, EVALUATIONS, budget)
     return curve_distance(found, cells, "sup", gap, budget)
 
 
@@ -286,8 +264,7 @@ def other_modes(p: Polyline, q: Polyline, tau: float) -> float:
 POINTS = 1500
 
 
-@dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(NamedTuple):
     """Bounds on a distance at n times, two at each breakpoint: of the left limits and of the values."""
 
     times: Array
@@ -311,7 +288,7 @@ def profiles(
     first, second = chosen.sides()
     times = np.stack([chosen.begin, chosen.end], axis=1).ravel()
     found: dict[str, Profile] = {}
-    kinds: dict[str, CellDistance] = {"rho": OnSpace(metric, relaxation is not None), "sup": Labelled()}
+    kinds: dict[str, Labelled] = {"rho": OnSpace(metric, relaxation is not None), "sup": Labelled()}
     for name, kind in kinds.items():
         ends = [kind.at(first, second, end, (chosen.begin, chosen.end)[end], 0.0) for end in (0, 1)]
         lower, upper = (np.stack([ends[0][k], ends[1][k]], axis=1).ravel() for k in (0, 1))

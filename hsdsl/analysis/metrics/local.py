@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -269,8 +269,7 @@ WRONG_WAY = 10  # times the lower bound: a path so long that it may take the wro
 AGAIN = 16  # pairs improved before paths are carried over anew
 
 
-@dataclass(frozen=True, eq=False)
-class KnownPath:
+class KnownPath(NamedTuple):
     """A path that was found: its ends as one vector, the route, and its guard points."""
 
     at: Array
@@ -405,7 +404,7 @@ class _Batch:
     def from_nothing(self, k: int, enough: float) -> None:
         """Search as for a single pair."""
         owner = self.owner
-        starts, ends = ([replace(end, x=end.x[k : k + 1])] for end in (self.start, self.end))
+        starts, ends = ([end._replace(x=end.x[k : k + 1])] for end in (self.start, self.end))
         query = Query(owner.space, starts, ends, owner.toll, owner.hops, owner.budget)
         found = search_nonaffine(query, max(enough, float(self.lower[k]) * (1 + CLOSED)))
         self.lower[k] = max(self.lower[k], found.lower * (1 - ROUNDING))

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from hsdsl.analysis.metrics.gate_sequence import gate_sequence
-from hsdsl.analysis.metrics.geometry import Array, Space
+from hsdsl.analysis.metrics.geometry import Space
 from hsdsl.analysis.metrics.guard_clearance import highest
 from hsdsl.analysis.metrics.interval import (
     CERTIFIED,
@@ -31,6 +32,7 @@ from hsdsl.analysis.metrics.routes import Route
 from hsdsl.analysis.metrics.search import TOLERANCE, End, Query, SearchResult, search
 from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Array
 
 __all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]
 
@@ -116,8 +118,7 @@ def _along_strip(p: SpacePoint, q: SpacePoint, a: End, b: End, relaxation: float
     return float(np.linalg.norm(a.x - b.x)) + abs(p.depth - q.depth)
 
 
-@dataclass(frozen=True, eq=False)
-class ModePoints:
+class ModePoints(NamedTuple):
     """n points of one mode: states (n, d), times, and the edge (else empty) and depth of a strip they are in."""
 
     mode: str

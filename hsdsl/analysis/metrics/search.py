@@ -27,7 +27,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise, takewhile
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +47,7 @@ HOPS = 8  # more than the fewest that lead from one mode to the other
 Bound = Callable[[tuple[int, ...], Indices, int], Array]  # of paths that begin with a sequence
 
 
-@dataclass(frozen=True, eq=False)
-class End:
+class End(NamedTuple):
     """Where N paths end: points (N, n) of a domain, the cost to be there, and a passage they must take (in a strip)."""
 
     mode: int

@@ -311,14 +311,6 @@ class Polyline:
         return self.times + self.jump <= hybrid_time
 
 
-@dataclass(frozen=True, eq=False)
-class _Parts:
-    piece: Array
-    begin: Array  # share of the piece
-    end: Array
-    way: Array
-
-
 def polylines(
     curves: Sequence[Trace], spans: Sequence[tuple[float, float]], resolution: int, cuts: float | None = None
 ) -> list[Polyline]:
@@ -333,22 +325,22 @@ def polylines(
 def _polyline(
     curve: Trace, span: tuple[float, float], resolution: int, cuts: float | None, numbers: dict[str, int]
 ) -> Polyline:
-    parts = _parts(curve, span, resolution, cuts)
-    jump = curve.jump[parts.piece]
+    pieces, begin, end, way = _parts(curve, span, resolution, cuts)
+    jump = curve.jump[pieces]
     opens = np.append(True, jump[1:] != jump[:-1])  # first part of a continuous one
-    total = float(np.sum(parts.way))
+    total = float(np.sum(way))
     spacing = total / resolution if total > 0 else 1.0
-    done = np.cumsum(parts.way)
-    group = np.floor((done - parts.way) / spacing)
+    done = np.cumsum(way)
+    group = np.floor((done - way) / spacing)
     first = opens | np.append(True, group[1:] != group[:-1])
     firsts = np.flatnonzero(first)
-    lasts = np.append(firsts[1:] - 1, len(parts.piece) - 1)
-    ways = done[lasts] - done[firsts] + parts.way[firsts]
+    lasts = np.append(firsts[1:] - 1, len(pieces) - 1)
+    ways = done[lasts] - done[firsts] + way[firsts]
     closes = np.append(opens[1:], True)[lasts]
     order = np.argsort(np.concatenate([np.arange(len(firsts)) * 2, np.flatnonzero(closes) * 2 + 1]), kind="stable")
     at = np.concatenate([firsts, lasts[closes]])[order]
-    share = np.concatenate([parts.begin[firsts], parts.end[lasts[closes]]])[order]
-    piece = parts.piece[at]
+    share = np.concatenate([begin[firsts], end[lasts[closes]]])[order]
+    piece = pieces[at]
     powers = restrict(curve.coefficients[piece], np.zeros_like(share), share)
     label = np.array([numbers[name] for name, _ in curve.modes])[curve.mode[piece]]
     jumps = curve.jump[piece]
@@ -362,8 +354,8 @@ def _polyline(
     )
 
 
-def _parts(curve: Trace, span: tuple[float, float], resolution: int, cuts: float | None) -> _Parts:
-    """Cut the pieces within a span so that none is much longer than a way's share."""
+def _parts(curve: Trace, span: tuple[float, float], resolution: int, cuts: float | None) -> tuple[Array, ...]:
+    """Cut the pieces within a span so that none is much longer than a way's share: pieces, ends as shares, ways."""
     whole = np.flatnonzero((curve.end >= span[0]) & (curve.start <= span[1]))
     begin = curve.share(whole, np.maximum(curve.start[whole], span[0]))
     end = np.where(curve.end[whole] > curve.start[whole], curve.share(whole, np.minimum(curve.end[whole], span[1])), 0)
@@ -379,7 +371,7 @@ def _parts(curve: Trace, span: tuple[float, float], resolution: int, cuts: float
     starts, low = np.repeat(begin, count), number / many
     high = (number + 1) / many
     ends = np.where(number + 1 == many, np.repeat(end, count), starts + width * high)
-    return _Parts(piece, starts + width * low, ends, _way(curve, piece, starts + width * low, ends))
+    return piece, starts + width * low, ends, _way(curve, piece, starts + width * low, ends)
 
 
 def _cut(

@@ -217,7 +217,7 @@ def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcatio
             ahead, same, last, why = None, False, False, str(problem)
         else:
             why = "the orbit makes other transitions from there on"
-        if ahead is None or not same or _turns(here, ahead):
+        if ahead is None or not same or float(here.tangent @ ahead.tangent) < 0.9:  # something may be missed
             length = min(length, reach) / 2
             if length >= LEAST:
                 continue
@@ -245,20 +245,16 @@ def sequence(here: Solution) -> list[str]:
     return [made.edge for made in here.passage.execution.transitions[: here.passage.index + 1]]
 
 
-def _turns(here: Solution, ahead: Solution) -> bool:
-    """Whether the branch turns so much in a step that something may be missed."""
-    return float(here.tangent @ ahead.tangent) < 0.9
-
-
 def _between(follower: Follower, here: Solution, ahead: Solution, length: float) -> list[Bifurcation]:
     """The bifurcations between two solutions, located along the step."""
     before, after, found = follower.tests(here), follower.tests(ahead), list[Bifurcation]()
     for kind in before:
         if before[kind] * after[kind] >= 0:
             continue
-        if kind == "branch point" and _families(follower, here, ahead):
-            continue
-        if kind == "torus" and len(_pairs(follower, here)) != len(_pairs(follower, ahead)):
+        multipliers = [follower.multipliers(each) for each in (here, ahead)]
+        if kind == "branch point" and any(np.any(np.abs(each - 1) < LEAST_MARGIN) for each in multipliers):
+            continue  # a multiplier is 1 but for its error, as on families of orbits
+        if kind == "torus" and len({int(np.sum(each.imag > 0)) for each in multipliers}) > 1:
             continue  # a pair became real on the way
 
         def value(s: float, kind: str = kind) -> float:
@@ -285,15 +281,6 @@ def _interpolated(follower: Follower, here: Solution, length: float, kind: str) 
     solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
     zero = solve(value, 0.0, length)
     return np.array([each(zero) for each in unknowns])
-
-
-def _families(follower: Follower, *solutions: Solution) -> bool:
-    """Whether a multiplier is 1 but for its error, as on families of orbits."""
-    return any(np.any(np.abs(follower.multipliers(each) - 1) < LEAST_MARGIN) for each in solutions)
-
-
-def _pairs(follower: Follower, here: Solution) -> list[complex]:
-    return [m for m in follower.multipliers(here).tolist() if m.imag > 0]
 
 
 def _grazing(previous: Solution, here: Solution) -> Bifurcation:

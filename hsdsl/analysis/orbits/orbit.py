@@ -69,21 +69,36 @@ class Orbit:
         return self.sensitivity.execution
 
     def as_json(self) -> dict[str, Any]:
-        """The object of `orbit --json`."""
-        from hsdsl.analysis.orbits.orbit import as_json
-
-        return as_json(self)
+        """The object of `orbit --json`; a complex number is its real and its imaginary part."""
+        names = ("section", "laps", "mode", "state", "phase", "period", "drift", "residual", "verdict", "reasons")
+        result = {name: getattr(self, name) for name in names}
+        result |= {"state": seen(self.state), "multipliers": _pairs(self.multipliers)}
+        if self.sides:
+            result["sides"] = {edge: _pairs(found) for edge, found in self.sides.items()}
+        return plain(result)
 
     @property
     def summary(self) -> str:
         """The orbit as lines of text."""
-        from hsdsl.analysis.orbits.orbit import summary
+        return "\n".join(f"{label:12}{text}" for label, text in self._facts())
 
-        return summary(self)
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        run = self.execution
+        closing = "" if self.laps == 1 else f", closed by {self.laps} of them"
+        yield "orbit", f"{called(run.title, run.model)}: right after {self.section}{closing}"
+        yield "period", number(self.period, 12)
+        if self.phase is not None:
+            yield "phase", f"t = {number(self.phase, 12)} within the period of the forcing"
+        yield "state", f"mode {self.mode}, {values(seen(self.state))}"
+        if self.drift:
+            yield "drift", f"{values(self.drift)} in a period; nothing depends on it"
+        yield "multipliers", shown(self.multipliers)
+        for edge, found in self.sides.items():
+            yield "", f"{shown(found)} where {edge} goes first"
+        yield "verdict", f"{self.verdict}: {'; '.join(condensed(self.reasons))}"
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the orbit and its multipliers to a .png or .svg file."""
-        from hsdsl.analysis.orbits.orbit import shown
         from hsdsl.analysis.plot.analyses import plot_orbit
 
         states = [x for x in self.state if x not in self.drift]
@@ -150,42 +165,8 @@ def judged(multipliers: Array, error: float) -> tuple[str, str]:
     return ("unstable" if largest > 1 + margin else "undecided"), known
 
 
-def as_json(orbit: Orbit) -> dict[str, Any]:
-    """The object of `orbit --json`; a complex number is its real and its imaginary part."""
-    result = {
-        name: getattr(orbit, name)
-        for name in ("section", "laps", "mode", "state", "phase", "period", "drift", "residual", "verdict", "reasons")
-    }
-    result["state"] = seen(orbit.state)
-    result["multipliers"] = _pairs(orbit.multipliers)
-    if orbit.sides:
-        result["sides"] = {edge: _pairs(found) for edge, found in orbit.sides.items()}
-    return plain(result)
-
-
 def _pairs(found: Array) -> list[dict[str, float]]:
     return [{"real": float(m.real), "imaginary": float(m.imag), "size": float(np.abs(m))} for m in found]
-
-
-def summary(orbit: Orbit) -> str:
-    """The orbit as lines of text."""
-    return "\n".join(f"{label:12}{text}" for label, text in _facts(orbit))
-
-
-def _facts(orbit: Orbit) -> Iterator[tuple[str, str]]:
-    run = orbit.execution
-    closing = "" if orbit.laps == 1 else f", closed by {orbit.laps} of them"
-    yield "orbit", f"{called(run.title, run.model)}: right after {orbit.section}{closing}"
-    yield "period", number(orbit.period, 12)
-    if orbit.phase is not None:
-        yield "phase", f"t = {number(orbit.phase, 12)} within the period of the forcing"
-    yield "state", f"mode {orbit.mode}, {values(seen(orbit.state))}"
-    if orbit.drift:
-        yield "drift", f"{values(orbit.drift)} in a period; nothing depends on it"
-    yield "multipliers", shown(orbit.multipliers)
-    for edge, found in orbit.sides.items():
-        yield "", f"{shown(found)} where {edge} goes first"
-    yield "verdict", f"{orbit.verdict}: {'; '.join(condensed(orbit.reasons))}"
 
 
 def shown(found: Array) -> str:

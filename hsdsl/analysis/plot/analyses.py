@@ -5,10 +5,9 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import groupby, pairwise
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -241,8 +240,7 @@ MARGIN = 0.01  # beside the first and the last column of dots
 DOT = 40_000  # dots from which on they are small and pale
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(NamedTuple):
     """A varied name, the label with its unit, its value in each row, and its grid where it has one."""
 
     label: str
@@ -251,8 +249,7 @@ class Axis:
     logarithmic: bool
 
 
-@dataclass(frozen=True)
-class Quantity:
+class Quantity(NamedTuple):
     """A column: its label, and its value in each row, a number or a word; None where there is none."""
 
     label: str

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from html import escape
 from itertools import pairwise
+from typing import NamedTuple
 
 from hsdsl.base.names import shown, visible, without_memory
 from hsdsl.base.written import event_text, inner_modes, written_edges
@@ -175,8 +176,7 @@ CHANNEL, STUB = 90.0, 40.0  # between columns, at least, and how far an arc goes
 SWEEPS = 12
 
 
-@dataclass(frozen=True)
-class Box:
+class Box(NamedTuple):
     """Where a box is: its left upper corner, and its size."""
 
     x: float
@@ -185,16 +185,14 @@ class Box:
     height: float
 
 
-@dataclass(frozen=True)
-class Line:
+class Line(NamedTuple):
     """A line from box to box: its points from left or right sides, and whether it arcs back to the side it left."""
 
     points: tuple[tuple[float, float], ...]
     arc: bool
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(NamedTuple):
     """Boxes and lines in the order given, and the size of the picture."""
 
     boxes: tuple[Box, ...]

@@ -65,13 +65,13 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
     if not execution.transitions:
         yield "No transitions."
         return
-    table = words.Table.of(execution, limit)
-    cells = list(zip(words.COLUMNS, *table.rows, strict=True))
+    rows, cut, left_out = words.table(execution, limit)
+    cells = list(zip(words.COLUMNS, *rows, strict=True))
     *aligned, notes = [column for column in cells if set(column[1:]) != {"-"} or column[0] != "delay"]
     for i, (line, note) in enumerate(zip(_aligned(aligned), notes, strict=True)):
         yield from _row(line, note, columns)
-        if i == table.cut and table.left_out:
-            yield f"   ... {table.left_out} more ..."
+        if i == cut and left_out:
+            yield f"   ... {left_out} more ..."
 
 
 def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
@@ -110,9 +110,9 @@ def html(execution: Execution, *, limit: int = 60) -> str:
 def _transition_table(execution: Execution, limit: int) -> str:
     if not execution.transitions:
         return "<p>No transitions.</p>"
-    table = words.Table.of(execution, limit)
-    rows = ["<tr>" + "".join(f"<td>{_escaped(cell)}</td>" for cell in row) + "</tr>" for row in table.rows]
-    if table.left_out:
-        rows.insert(table.cut, f'<tr><td colspan="6">&hellip; {table.left_out} more &hellip;</td></tr>')
+    chosen, cut, left_out = words.table(execution, limit)
+    rows = ["<tr>" + "".join(f"<td>{_escaped(cell)}</td>" for cell in row) + "</tr>" for row in chosen]
+    if left_out:
+        rows.insert(cut, f'<tr><td colspan="6">&hellip; {left_out} more &hellip;</td></tr>')
     header = "".join(f"<th>{_escaped(name)}</th>" for name in words.COLUMNS)
     return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"

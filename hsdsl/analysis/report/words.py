@@ -9,7 +9,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -137,27 +136,21 @@ def stop(execution: Execution) -> str:
     return f"{reason}{when}: {message}"
 
 
-@dataclass(frozen=True)
-class Table:
-    """Rows of transitions by `COLUMNS`; after the first ``cut`` of them ``left_out`` are missing."""
+def table(execution: Execution, limit: int) -> tuple[list[tuple[str, ...]], int, int]:
+    """The first and the last transitions, ``limit`` in all, as rows by `COLUMNS`.
 
-    rows: Sequence[tuple[str, ...]]
-    cut: int
-    left_out: int
-
-    @staticmethod
-    def of(execution: Execution, limit: int) -> Table:
-        """Write the first and the last transitions, ``limit`` in all."""
-        transitions, digits = execution.transitions, meant_digits(execution)
-        count = len(transitions)
-        cut = (limit + 1) // 2 if count > limit else count
-        chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
-        instants = times([t.time for t in chosen], digits)
-        rows = [
-            (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t, min(6, digits)))
-            for t, instant in zip(chosen, instants, strict=True)
-        ]
-        return Table(rows, cut, count - len(chosen))
+    Returns the rows, and behind how many of them how many transitions are left out.
+    """
+    transitions, digits = execution.transitions, meant_digits(execution)
+    count = len(transitions)
+    cut = (limit + 1) // 2 if count > limit else count
+    chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
+    instants = times([t.time for t in chosen], digits)
+    rows = [
+        (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t, min(6, digits)))
+        for t, instant in zip(chosen, instants, strict=True)
+    ]
+    return rows, cut, count - len(chosen)
 
 
 def times(values: Sequence[Any], digits: int) -> list[str]:
@@ -390,7 +383,7 @@ def _of(reason: str) -> str:
     return next((remedy for pattern, remedy in _patterns() if pattern.match(reason)), "")
 
 
-def table() -> str:
+def remedy_table() -> str:
     """The remedies as a table in Markdown."""
     rows = (
         f"| {', '.join(f'`{reason}`' for reason in each.reasons)} | {each.meaning} | {each.remedy} |"

@@ -21,8 +21,9 @@ f take slopes that the method puts into states of their own.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -272,8 +273,7 @@ def _size(term: sp.Expr) -> sp.Expr:
     return below(term, 0, -term, term)
 
 
-@dataclass(frozen=True)
-class Jump:
+class Jump(NamedTuple):
     """The derivatives of an edge: of its guard and each reset, the guard's rate, and R_t + R_x f - g of each state.
 
     ``after`` is g, the flow where the reset leads.

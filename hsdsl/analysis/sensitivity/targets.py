@@ -6,7 +6,7 @@ A model's names are identifiers, and none of the added names is.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
@@ -16,8 +16,7 @@ from hsdsl.mathematics.program import Program
 EXAMPLE = "for example c or initial.v"
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """A parameter, or with ``initial`` the initial value of a state; ``label`` is how it is written."""
 
     label: str

@@ -121,23 +121,19 @@ def _read(archive: Mapping[str, Array]) -> Execution:
         for layout, kind, *integers in cast("list[tuple[int, ...]]", archive["arcs"].tolist())
     )
     fields: dict[str, Any] = {name: form.unpack(header[name]) for name in _TEXTS}
-    fields["overrides"] = form.unpack(header.get("overrides", {}))  # files of earlier versions have none
+    fields["overrides"] = form.unpack(header.get("overrides", {}))  # files of earlier versions have neither
+    warnings = tuple(RunWarning(**form.unpack(record)) for record in header.get("warnings", ()))
     fields |= {name: form.unpack_array(archive[name]) for name in COLUMNS}
     execution = Execution(
         stop=Stop(**form.unpack(header["stop"])),
         final=Point(**form.unpack(header["final"])),
-        verdict=Verdict(**form.unpack(header["verdict"]) | {"warnings": _warnings(header, form)}),
+        verdict=Verdict(**form.unpack(header["verdict"]) | {"warnings": warnings}),
         transitions=tuple(Transition(**form.unpack(record)) for record in header["transitions"]),
         arcs=arcs,
         **fields,
     )
     _check(execution)
     return execution
-
-
-def _warnings(header: Mapping[str, Any], form: Lossless) -> tuple[RunWarning, ...]:
-    """The warnings; files of earlier versions have none."""
-    return tuple(RunWarning(**form.unpack(record)) for record in header.get("warnings", ()))
 
 
 def _check(execution: Execution) -> None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 import os
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -36,7 +36,6 @@ from hsdsl.engine.execution import Array
 
 if TYPE_CHECKING:
     from hsdsl.analysis.plot.analyses import Axis
-    from hsdsl.engine.execution import Array
 
 
 @checks_methods
@@ -57,9 +56,8 @@ class Sweep:
     def _repr_html_(self) -> str:
         """Show what was varied and how the runs ended in notebooks."""
         from hsdsl.analysis.plot.notebook import lines_html
-        from hsdsl.analysis.sweep.dataset import summary
 
-        return lines_html(summary(self))
+        return lines_html(self.summary)
 
     @property
     def rows(self) -> int:
@@ -158,22 +156,41 @@ class Sweep:
 
         Raises UsageError: no such column, or more names that vary than a picture has axes.
         """
-        from hsdsl.analysis.sweep.dataset import draw
-
         draw(self, path, of, tail, over)
 
     def as_json(self) -> dict[str, Any]:
         """Its numbers, and where it is."""
-        from hsdsl.analysis.sweep.dataset import as_json
-
-        return as_json(self)
+        described = self.manifest.plain()
+        vary: list[dict[str, Any]] = described["vary"]
+        for item in vary:
+            if "values" in item:
+                values = item.pop("values")
+                item |= {"from": values[0], "to": values[-1], "count": len(values)}
+        counts = {"done": self.done, "complete": self.complete, "stops": self.reasons, "warnings": self.warning_counts}
+        return {"folder": str(self.folder)} | {key: described[key] for key in KEPT} | {"vary": vary} | counts
 
     @property
     def summary(self) -> str:
         """What it is of, how far it is, how its runs ended, and the range of each number."""
-        from hsdsl.analysis.sweep.dataset import summary
+        return "\n".join(self._lines())
 
-        return summary(self)
+    def _lines(self) -> Iterator[str]:
+        manifest, variation = self.manifest, self.manifest.variation
+        yield visible(called(manifest.title, manifest.model))
+        for grid in variation.grids:
+            span = f"from {grid.values[0]:.6g} to {grid.values[-1]:.6g}"
+            yield f"  {grid.name}: {counted(len(grid.values), 'value')} {span}"
+        for each in variation.draws:
+            yield f"  {each.name}: {each.distribution}({', '.join(f'{a:.6g}' for a in each.arguments)})"
+        if variation.draws:
+            yield f"  {variation.random:,} draws with seed {variation.seed}"
+        share = f"  {self.done:,} of {self.rows:,} rows in {len(self.chunks)} of {manifest.chunks} files"
+        yield share + ("" if self.complete else "; the command that made it goes on")
+        yield "stops  " + ", ".join(f"{count:,} {reason}" for reason, count in self.reasons.items())
+        yield from _failures(self)
+        for code, count in self.warning_counts.items():
+            yield f"  {code} in {counted(count, 'row')}: {WARNINGS.get(code, 'of another version')}"
+        yield from _ranges(self)
 
 
 def path_of(folder: Path, chunk: int) -> Path:
@@ -230,40 +247,6 @@ def damaged(sweep: Sweep) -> Iterator[int]:
 KEPT = ("model", "sha256", "title", "random", "seed", "record", "settings", "rows", "chunk", "hsdsl")
 
 
-def as_json(sweep: Sweep) -> dict[str, Any]:
-    """The numbers of a sweep, and where it is."""
-    described = sweep.manifest.plain()
-    vary = [{key: value for key, value in item.items() if key != "values"} | _span(item) for item in described["vary"]]
-    counts = {"done": sweep.done, "complete": sweep.complete, "stops": sweep.reasons, "warnings": sweep.warning_counts}
-    return {"folder": str(sweep.folder)} | {key: described[key] for key in KEPT} | {"vary": vary} | counts
-
-
-def _span(item: Mapping[str, Any]) -> dict[str, Any]:
-    values = item.get("values")
-    return {} if values is None else {"from": values[0], "to": values[-1], "count": len(values)}
-
-
-def summary(sweep: Sweep) -> str:
-    """A sweep in a few lines."""
-    manifest = sweep.manifest
-    share = f"  {sweep.done:,} of {sweep.rows:,} rows in {len(sweep.chunks)} of {manifest.chunks} files"
-    share += "" if sweep.complete else "; the command that made it goes on"
-    stops = "stops  " + ", ".join(f"{count:,} {reason}" for reason, count in sweep.reasons.items())
-    title = visible(called(manifest.title, manifest.model))
-    described = (f"  {text}" for text in _described(manifest))
-    return "\n".join([title, *described, share, stops, *_failures(sweep), *_warnings(sweep), *_ranges(sweep)])
-
-
-def _described(manifest: Manifest) -> Iterator[str]:
-    variation = manifest.variation
-    for grid in variation.grids:
-        yield f"{grid.name}: {counted(len(grid.values), 'value')} from {grid.values[0]:.6g} to {grid.values[-1]:.6g}"
-    for each in variation.draws:
-        yield f"{each.name}: {each.distribution}({', '.join(f'{a:.6g}' for a in each.arguments)})"
-    if variation.draws:
-        yield f"{variation.random:,} draws with seed {variation.seed}"
-
-
 def _failures(sweep: Sweep) -> Iterator[str]:
     """The first message of each reason why runs did not get to their end."""
     messages: dict[str, str] = {}
@@ -274,12 +257,6 @@ def _failures(sweep: Sweep) -> Iterator[str]:
     for reason, message in messages.items():
         more = ", the first of them" if sweep.reasons[reason] > 1 else ""
         yield f"  {reason}{more}: {visible(message)}"
-
-
-def _warnings(sweep: Sweep) -> Iterator[str]:
-    """How many runs have which warning."""
-    for code, count in sweep.warning_counts.items():
-        yield f"  {code} in {counted(count, 'row')}: {WARNINGS.get(code, 'of another version')}"
 
 
 def _ranges(sweep: Sweep) -> Iterator[str]:
@@ -324,11 +301,8 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
         raise UsageError(f"{most}, and here {', '.join(names)} vary", "read the dataset with pandas, and draw a part")
     if not 0 < tail <= 1:
         raise UsageError(f"--tail: expected a share above 0 and up to 1, got {tail:g}")
-    title, unit = (
-        called(sweep.manifest.title, sweep.manifest.model),
-        sweep.manifest.units.get(column.rpartition(".")[2]),
-    )
-    unit = sweep.manifest.units.get("t") if column.endswith(".time") else unit
+    title = called(sweep.manifest.title, sweep.manifest.model)
+    unit = sweep.manifest.units.get("t" if column.endswith(".time") else column.rpartition(".")[2])
     label = f"{column} [{unit}]" if unit else column
     axes = [_axis(sweep, name) for name in names]
     if over:
@@ -341,7 +315,8 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
             raise UsageError(f"--of {column}: there is none in the last {tail:g} of each run", hint)
         plots.plot_dots(path, axes[0], plots.Quantity(label, values), where, title)
         return
-    quantity = plots.Quantity(label, _numbers(sweep, column))
+    numbers = sweep[column]
+    quantity = plots.Quantity(label, numbers if numbers.dtype == object else numbers.astype(float))
     if len(axes) == 1:
         plots.plot_curve(path, axes[0], quantity, title)
     else:
@@ -391,12 +366,6 @@ def _axis(sweep: Sweep, name: str) -> Axis:
     logarithmic = grid.logarithmic if grid else drawn is not None and drawn.distribution.startswith("log")
     label = f"{name} [{unit}]" if unit else name
     return Axis(label, sweep[name], grid and grid.values, logarithmic)
-
-
-def _numbers(sweep: Sweep, column: str) -> Array:
-    """A column as numbers, or as words."""
-    values = sweep[column]
-    return values if values.dtype == object else values.astype(float)
 
 
 def _is_sampled(column: str) -> bool:

@@ -163,44 +163,10 @@ def _checked(grid: Grid) -> Grid:
 BLOCK = 4  # numbers that Philox makes at a time
 
 
-@dataclass(frozen=True)
-class Distribution:
-    """The names of its arguments, what they must fulfil, and its inverse distribution function."""
-
-    arguments: tuple[str, ...]
-    needs: str
-    fits: Callable[..., bool]
-    inverse: Callable[..., Array]
-
-
-def _rising(low: float, high: float) -> bool:
-    return low < high
-
-
-def _positive(*arguments: float) -> bool:
-    return arguments[-1] > 0
-
-
-def _uniform(u: Array, low: float, high: float) -> Array:
-    return low + u * (high - low)
-
-
-def _loguniform(u: Array, low: float, high: float) -> Array:
-    return np.exp(_uniform(u, np.log(low), np.log(high)))
-
-
 def _normal(u: Array, mean: float, deviation: float) -> Array:
     from scipy.special import ndtri  # pyright: ignore[reportMissingTypeStubs]
 
     return mean + deviation * ndtri(u)
-
-
-def _lognormal(u: Array, mean: float, deviation: float) -> Array:
-    return np.exp(_normal(u, mean, deviation))
-
-
-def _exponential(u: Array, mean: float) -> Array:
-    return -mean * np.log1p(-u)
 
 
 def _triangular(u: Array, low: float, mode: float, high: float) -> Array:
@@ -209,21 +175,29 @@ def _triangular(u: Array, low: float, mode: float, high: float) -> Array:
     return np.where(u * (high - low) < mode - low, rising, falling)
 
 
-def _above_zero(low: float, high: float) -> bool:
-    return 0 < low < high
-
-
-def _around(low: float, mode: float, high: float) -> bool:
-    return low <= mode <= high and low < high
-
-
-DISTRIBUTIONS = {
-    "uniform": Distribution(("low", "high"), "low < high", _rising, _uniform),
-    "loguniform": Distribution(("low", "high"), "0 < low < high", _above_zero, _loguniform),
-    "normal": Distribution(("mean", "deviation"), "deviation > 0", _positive, _normal),
-    "lognormal": Distribution(("log_mean", "log_deviation"), "log_deviation > 0", _positive, _lognormal),
-    "exponential": Distribution(("mean",), "mean > 0", _positive, _exponential),
-    "triangular": Distribution(("low", "mode", "high"), "low <= mode <= high and low < high", _around, _triangular),
+# The names of arguments, what they must fulfil, and the inverse distribution function.
+DISTRIBUTIONS: dict[str, tuple[tuple[str, ...], str, Callable[..., bool], Callable[..., Array]]] = {
+    "uniform": (("low", "high"), "low < high", lambda a, b: a < b, lambda u, a, b: a + u * (b - a)),
+    "loguniform": (
+        ("low", "high"),
+        "0 < low < high",
+        lambda a, b: 0 < a < b,
+        lambda u, a, b: np.exp(np.log(a) + u * (np.log(b) - np.log(a))),
+    ),
+    "normal": (("mean", "deviation"), "deviation > 0", lambda _, d: d > 0, _normal),
+    "lognormal": (
+        ("log_mean", "log_deviation"),
+        "log_deviation > 0",
+        lambda _, d: d > 0,
+        lambda u, m, d: np.exp(_normal(u, m, d)),
+    ),
+    "exponential": (("mean",), "mean > 0", lambda m: m > 0, lambda u, m: -m * np.log1p(-u)),
+    "triangular": (
+        ("low", "mode", "high"),
+        "low <= mode <= high and low < high",
+        lambda a, m, b: a <= m <= b and a < b,
+        _triangular,
+    ),
 }
 
 
@@ -233,11 +207,12 @@ def check(name: str, distribution: str, arguments: Sequence[float]) -> None:
     if known is None:
         hint = did_you_mean(distribution, DISTRIBUTIONS)
         raise UsageError(f"--vary {name}: there is no distribution '{shown(distribution)}'", hint)
-    form = f"{distribution}({', '.join(known.arguments)})"
-    if len(arguments) != len(known.arguments):
+    names, needs, fits, _ = known
+    form = f"{distribution}({', '.join(names)})"
+    if len(arguments) != len(names):
         raise UsageError(f"--vary {name}: expected {form}, got {counted(len(arguments), 'number')}")
-    if not known.fits(*arguments):
-        raise UsageError(f"--vary {name}: {form} needs {known.needs}, got {', '.join(f'{a:g}' for a in arguments)}")
+    if not fits(*arguments):
+        raise UsageError(f"--vary {name}: {form} needs {needs}, got {', '.join(f'{a:g}' for a in arguments)}")
 
 
 def draw(name: str, seed: int, distribution: str, arguments: Sequence[float], first: int, last: int) -> Array:
@@ -248,4 +223,4 @@ def draw(name: str, seed: int, distribution: str, arguments: Sequence[float], fi
     skip = first % BLOCK
     raw = stream.random_raw(skip + last - first)[skip:]
     uniform = ((raw >> np.uint64(11)) + 0.5) * 2.0**-53  # neither 0 nor 1
-    return DISTRIBUTIONS[distribution].inverse(uniform, *arguments)
+    return DISTRIBUTIONS[distribution][3](uniform, *arguments)

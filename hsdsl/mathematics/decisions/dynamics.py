@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -304,12 +304,12 @@ class Proof:
 
 def closed(clause: Iterable[Constraint]) -> Clause:
     """Constraints with their ends: where one is at its end, round-off decides."""
-    return tuple(replace(c, relation="<= 0") if c.relation == "< 0" else c for c in clause)
+    return tuple(c._replace(relation="<= 0") if c.relation == "< 0" else c for c in clause)
 
 
 def strict(clause: Iterable[Constraint]) -> Clause:
     """Inequalities without their ends, where they are more than numbers."""
-    return tuple(replace(c, relation="< 0") if c.relation == "<= 0" and not c.expr.is_number else c for c in clause)
+    return tuple(c._replace(relation="< 0") if c.relation == "<= 0" and not c.expr.is_number else c for c in clause)
 
 
 MOST_NAMES = 8

@@ -17,7 +17,7 @@ from fractions import Fraction
 from functools import lru_cache
 from math import inf
 from operator import add, mul
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import mpmath
 import numpy as np
@@ -32,8 +32,7 @@ from hsdsl.base.numbers.enclosures import RESTRICTED, Range, hull, whole_power
 Relation = Literal["= 0", "<= 0", "< 0"]
 
 
-@dataclass(frozen=True)
-class Constraint:
+class Constraint(NamedTuple):
     """An expression of states, inputs and time, and the sign it must have."""
 
     expr: Any
@@ -64,8 +63,7 @@ def positive(expr: Any) -> Constraint:
     return Constraint(-expr, "< 0")
 
 
-@dataclass(frozen=True)
-class SearchRange:
+class SearchRange(NamedTuple):
     """What is known of a name's values: ends that hold for certain (None: without), and how far to look for points."""
 
     low: Any | None

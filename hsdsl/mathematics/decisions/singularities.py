@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
@@ -30,8 +30,7 @@ _JUMPING = (functions.sign, functions.floor, functions.atan2)
 _LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked for at
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """A part of an expression, its name in messages, and the alternatives in which it is singular."""
 
     expr: Any

@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 from hsdsl.base.errors import Decided
 from hsdsl.base.functions import replaced
@@ -163,8 +163,7 @@ def _goes_out(here: ModePoint, edge: Edge, accepts: Callable[[ModePoint], bool])
         return False
 
 
-@dataclass(frozen=True)
-class Landing:
+class Landing(NamedTuple):
     """A reset that lands on a surface of the next mode, wherever its transition fires, and how that is known.
 
     The surface is that of ``edge``, or a wall (None). ``rate`` says how fast the surface function changes after
