@@ -5,7 +5,7 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hsdsl.analysis.lint.source_expressions import Role, written
-from hsdsl.analysis.lint.units.model import Units
+from hsdsl.analysis.lint.units import Units
 from hsdsl.base.errors import Findings
 from hsdsl.language.schema import documents as schema
 from hsdsl.language.schema import fields

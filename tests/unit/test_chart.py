@@ -321,7 +321,8 @@ def by_casadi(mode, value, points):
 def by_diffrax(mode, value, points):
     import jax.numpy as jnp
 
-    from hsdsl.interface.chart.peers.diffrax_event import FUNCTIONS, jax
+    from hsdsl.export import jax
+    from hsdsl.interface.chart.peers.diffrax_event import FUNCTIONS
 
     jax.config.update("jax_enable_x64", True)
     function = as_function(mode, (value,), FUNCTIONS)

@@ -11,11 +11,11 @@ from engines import COMPILER, ENGINES
 import hsdsl
 import hsdsl.analysis.store
 from hsdsl import UsageError
-from hsdsl.analysis.plot.view import View
+from hsdsl.analysis.plot.curves import View
 from hsdsl.analysis.report import as_json, dumps, mode_graph
 from hsdsl.analysis.report.model import model_html
 from hsdsl.analysis.report.summary import summary
-from hsdsl.analysis.sensitivity import summary as derivative_summary
+from hsdsl.analysis.sensitivity import result as derivative_summary
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.export import files_of, source_of
 from hsdsl.interface.cli.verbs import obey

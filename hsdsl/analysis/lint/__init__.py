@@ -14,12 +14,10 @@ import os
 import time
 from dataclasses import dataclass
 
-from hsdsl.analysis.lint.automata import OF_UNITS, automata_of
 from hsdsl.analysis.lint.finding import Finding
-from hsdsl.analysis.lint.ignores import Ignored, sift
-from hsdsl.analysis.lint.parts import findings_of_parts
+from hsdsl.analysis.lint.parts import OF_UNITS, automata_of, findings_of_parts
 from hsdsl.analysis.lint.rules import RULES
-from hsdsl.analysis.lint.selection import Selection, configured
+from hsdsl.analysis.lint.selection import Ignored, Selection, configured, sift
 from hsdsl.analysis.lint.subject import Subject
 from hsdsl.base import limits
 from hsdsl.base.errors import Diagnostic

@@ -88,7 +88,7 @@ def _attempt(
 
 
 def _meaning(system: HybridSystem) -> tuple[Any, ...]:
-    """What no fix may change. Walls that guards repeat, priorities without a rival and defaults may go."""
+    """What no fix may change."""
     edges = [[(e.name, e.target, e.surface.residual, e.condition, e.reset) for e in m.edges] for m in system.modes]
     modes = [(m.name, m.states, m.flow, m.final, m.outputs, m.scene) for m in system.modes]
     parameters = [(p.name, p.value, p.minimum, p.maximum) for p in system.parameters]

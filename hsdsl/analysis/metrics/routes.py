@@ -9,8 +9,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from hsdsl.analysis.metrics.formulas import Formula, affine, stacked
-from hsdsl.analysis.metrics.geometry import TOLERANCE, Array, CurvedGate, Domain, Gate, Space
+from hsdsl.analysis.metrics.geometry import TOLERANCE, Array, CurvedGate, Domain, Formula, Gate, Space, affine, stacked
 from hsdsl.analysis.metrics.guard_clearance import OUTSIDE, segments_inside
 
 # Where a leg that is held is held: dense towards its ends, at which it may leave a boundary it begins on.

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.plot.curves import Array, Curves, curves, moving_levels
+from hsdsl.analysis.plot.curves import Array, Curves, Pair, View, curves, moving_levels, names_of
 from hsdsl.analysis.plot.parts import filled, inert, scripts, shared
 from hsdsl.analysis.plot.style import colours
-from hsdsl.analysis.plot.view import Pair, View, names_of
 from hsdsl.analysis.report import mode_graph, words
-from hsdsl.analysis.report.html import html
+from hsdsl.analysis.report.summary import html
 from hsdsl.base.names import visible
 from hsdsl.base.parts import short_names
 from hsdsl.engine.execution import Execution

@@ -300,7 +300,7 @@ class Execution(Deferred):
         side : {"right", "left"}
             At a jump: the value after the last transition at that instant, or before the first.
         columns : names, optional
-            Which states and outputs; left out, all of them.
+            States and outputs in the file; by default all.
 
         Raises ValueError: for a time outside the run; the message names the first such time.
         Raises UsageError: for a name that is neither a state nor an output.

@@ -8,8 +8,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.analysis.sensitivity.result import Sensitivity, Setting, Slopes
-from hsdsl.analysis.sensitivity.state_names import ERROR, SPAN, UNIT
-from hsdsl.analysis.sensitivity.targets import Target, listed, targets
+from hsdsl.analysis.sensitivity.targets import ERROR, SPAN, UNIT, Target, listed, targets
 from hsdsl.base.defaults import DEFAULT_TOLERANCE
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL

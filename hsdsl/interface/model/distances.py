@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.analysis.metrics.budget import Budget
 from hsdsl.analysis.metrics.curves import CurveDistance
-from hsdsl.analysis.metrics.interval import Interval
+from hsdsl.analysis.metrics.interval import Budget, Interval
 from hsdsl.analysis.metrics.points import SpaceMetric, SpacePoint
 from hsdsl.analysis.metrics.table import CurvePair, between, check_same_model
 from hsdsl.base.calls import checks_arguments
@@ -128,7 +127,7 @@ def plot_distance(
 
     After ``seconds`` the remaining times have wide bounds.
     """
-    from hsdsl.analysis.metrics.profile import profiles
+    from hsdsl.analysis.metrics.labelled import profiles
     from hsdsl.analysis.plot.analyses import plot_over_time
 
     check_same_model(run, other)

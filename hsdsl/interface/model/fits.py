@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.fitting.data import Measurements, measurements
-from hsdsl.analysis.fitting.fit import Fit
-from hsdsl.analysis.fitting.least_squares import fitted
-from hsdsl.analysis.fitting.objective import Objective, Progress
+from hsdsl.analysis.fitting.fit import Fit, Measurements, measurements
+from hsdsl.analysis.fitting.least_squares import Objective, Progress, fitted
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.analysis.sensitivity.targets import Target
 from hsdsl.base.errors import UsageError

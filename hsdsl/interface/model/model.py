@@ -30,7 +30,7 @@ from hsdsl.mathematics.program import Program
 if TYPE_CHECKING:
     from hsdsl.analysis.fitting.fit import Fit
     from hsdsl.analysis.metrics.points import PointDistance, SpacePoint
-    from hsdsl.analysis.orbits.branch import Branch
+    from hsdsl.analysis.orbits.continuation import Branch
     from hsdsl.analysis.orbits.orbit import Orbit
     from hsdsl.analysis.orbits.sampling import OrbitalStability
     from hsdsl.analysis.sensitivity.result import Sensitivity
@@ -544,7 +544,7 @@ class Model:
         seed : int
             Seed of the draws. A row has the same values for any number of workers.
         record : str or sequence of str
-            Records of each run besides its end (`hsdsl.analysis.sweep.recording`).
+            Records of each run besides its end (`hsdsl.analysis.sweep.manifest`).
         outputs : sequence of str, optional
             States and outputs, as for :meth:`simulate`; the others have no columns.
         cluster : str, optional

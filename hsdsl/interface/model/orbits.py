@@ -8,11 +8,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.orbits.branch import Branch
-from hsdsl.analysis.orbits.continuation import CIRCLE, Follower, branch
+from hsdsl.analysis.orbits.continuation import CIRCLE, Branch, Follower, branch
 from hsdsl.analysis.orbits.orbit import Orbit, judged, multipliers_of, returning
-from hsdsl.analysis.orbits.section import LONGER, NoReturn, Return, Section, without_noise
-from hsdsl.analysis.orbits.shooting import COARSER, Closed, NotClosed, closed
+from hsdsl.analysis.orbits.section import (
+    COARSER,
+    LONGER,
+    Closed,
+    NoReturn,
+    NotClosed,
+    Return,
+    Section,
+    closed,
+    without_noise,
+)
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import counted, did_you_mean

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.metrics.budget import Budget
 from hsdsl.analysis.metrics.geometry import TOLERANCE, Space
+from hsdsl.analysis.metrics.interval import Budget
 from hsdsl.analysis.metrics.points import PointDistance, SpacePoint, coordinates, distance
 from hsdsl.analysis.metrics.space import make_space
 from hsdsl.analysis.metrics.table import CURVE_METRICS, POINT_METRICS
@@ -54,7 +54,7 @@ def distance_of_points(
     except ValueError as error:
         raise UsageError(str(error)) from error
     if plot is not None:
-        from hsdsl.analysis.plot.path import plot_path
+        from hsdsl.analysis.plot.analyses import plot_path
 
         plot_path(plot, space, result.path, f"Shortest path, length {result.interval.upper:.6g}")
     return result

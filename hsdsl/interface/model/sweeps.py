@@ -9,12 +9,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from hsdsl.analysis.sweep import Sweep, recording, variation
+from hsdsl.analysis.sweep import Recording, Sweep, variation
 from hsdsl.analysis.sweep import manifest as manifests
-from hsdsl.analysis.sweep.dataset import damaged, write_chunk
+from hsdsl.analysis.sweep.dataset import Run, damaged, run_here, write_chunk
 from hsdsl.analysis.sweep.manifest import Manifest
 from hsdsl.analysis.sweep.rows import library
-from hsdsl.analysis.sweep.schedule import Run, run_here
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import INITIAL, without_memory
@@ -117,7 +116,7 @@ def _planned(model: Model, request: Request) -> Manifest:
         title=program.title,
         units=program.units,
         variation=varied,
-        recording=recording.read(request.record),
+        recording=Recording.read(request.record),
         arguments={name: _plain(value) for name, value in given.items()},
         states=tuple(name for name in states if name in kept),
         outputs=tuple(name for name in program.outputs if name in kept),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.subject import Subject
-from hsdsl.analysis.lint.units.unit import Unit, names_like
+from hsdsl.analysis.lint.units import Unit, names_like
 from hsdsl.base.names import closest, shown
 
 CONVERT = "correct it, or give a factor that converts a name and a unit"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from math import isfinite
 from typing import Any
 
-from hsdsl.analysis.report.alike import condensed, form
+from hsdsl.analysis.report.words import condensed, form
 from hsdsl.interface.chart.rows import csv_text
 from hsdsl.interface.chart.stability import Panel, StabilityMap
 from hsdsl.interface.chart.stability.cells import REFUSED, UNKNOWN, WORDS, Cell

@@ -11,7 +11,7 @@ from hsdsl.interface.imports.spaceex.feasibility import decide
 from hsdsl.interface.imports.spaceex.formula import Relation
 from hsdsl.interface.imports.spaceex.product import Arrow, Place
 from hsdsl.language.expression.algebra import lie_derivative
-from hsdsl.mathematics.decisions.question import Constraint, at_most_zero, zero
+from hsdsl.mathematics.decisions.search import Constraint, at_most_zero, zero
 
 
 @dataclass(frozen=True)

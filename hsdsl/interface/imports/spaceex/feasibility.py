@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.metrics.rational import Exact, about, axes, deepest, matrix, maximise, zeros
+from hsdsl.base.numbers.rational import Exact, about, axes, deepest, matrix, maximise, zeros
 from hsdsl.mathematics.decisions.decide import Decider
-from hsdsl.mathematics.decisions.normal_form import NormalForms
-from hsdsl.mathematics.decisions.question import NEVER, UNKNOWN, Answer, Constraint, SearchRange
+from hsdsl.mathematics.decisions.polynomial import NormalForms
+from hsdsl.mathematics.decisions.search import NEVER, UNKNOWN, Answer, Constraint, SearchRange
 
 _FORMS = NormalForms()
 REACH = 100.0  # how far a search for a point of constraints that are not affine goes, in units of the model

@@ -16,7 +16,7 @@ from hsdsl.interface.imports.spaceex.product import Arrow, Automaton, Key, Place
 from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.plain import names_in, value
 from hsdsl.language.expression.scope import symbol
-from hsdsl.mathematics.decisions.question import negative, positive
+from hsdsl.mathematics.decisions.search import negative, positive
 
 
 def mode_drafts(network: Network, found: Automaton, constants: Mapping[Any, Any]) -> dict[Key, ModeDraft]:

@@ -22,7 +22,7 @@ from hsdsl.interface.imports.spaceex.product import Arrow
 from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.plain import value
 from hsdsl.language.expression.scope import symbol
-from hsdsl.mathematics.decisions.question import Answer, Constraint, at_most_zero, negative, positive, zero
+from hsdsl.mathematics.decisions.search import Answer, Constraint, at_most_zero, negative, positive, zero
 
 STRICT = "<>"
 INWARD = "SpaceEx may also jump where the flow leads back inside; this does not"

@@ -2,7 +2,8 @@
 """The hybrid quotient space of a model (Def. 12), in numbers: domains, guards and resets from the mathematics.
 
 Guards are the exit part: where the surface is zero, `if` holds and the flow does not point back (L_f r >= 0, where no
-input and no time is in it). What is affine is recognised exactly, by constant derivatives at these parameter values.
+input and no time is in it). What is affine is recognised exactly, by constant derivatives at these parameter values;
+the rest becomes compiled formulas.
 """
 
 from __future__ import annotations
@@ -10,20 +11,29 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
+import numpy as np
 import sympy as sp
 
-from hsdsl.analysis.metrics.formulas import Formula, affine, stacked
-from hsdsl.analysis.metrics.geometry import CurvedGate, Domain, Gate, Space
-from hsdsl.analysis.metrics.polyhedra import gate_of, unit_rows
-from hsdsl.analysis.metrics.rational import matrix
-from hsdsl.analysis.metrics.space.expressions import affine as as_affine
-from hsdsl.analysis.metrics.space.expressions import clauses, equations, formula
+from hsdsl.analysis.metrics.geometry import (
+    CurvedGate,
+    Domain,
+    Formula,
+    Gate,
+    Space,
+    affine,
+    compiled,
+    gate_of,
+    stacked,
+    unit_rows,
+)
 from hsdsl.base import functions
 from hsdsl.base.errors import UsageError
+from hsdsl.base.numbers.rational import Exact, matrix
 from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
+from hsdsl.mathematics.lower.straight import Definition, Gradient, print_routines
 
 MOST_SAMPLES = 200  # of an input that a guard depends on
 
@@ -178,3 +188,112 @@ def _geometric(mode: Mode):
         yield from edge.reset
         if edge.condition is not None:
             yield edge.condition
+
+
+DIGITS = 60  # of a number that is not rational
+
+
+def as_affine(expression: sp.Expr, symbols) -> Exact | None:
+    """The expression as an affine function (its constant, then its slopes), None where it is none."""
+    expression = sp.expand(expression)
+    own = set(symbols)
+    if any(f.free_symbols & own for f in expression.atoms(functions.sign, functions.floor, sp.sign, sp.floor)):
+        return None
+    gradient = [sp.expand(expression.diff(s)) for s in symbols]
+    if any(g.free_symbols & own for g in gradient):
+        return None
+    constant = expression.xreplace(dict.fromkeys(symbols, sp.S.Zero))
+    numbers = [_rational(v) for v in (constant, *gradient)]
+    return None if None in numbers else np.array(numbers, dtype=object)
+
+
+def _rational(value: sp.Expr) -> Fraction | None:
+    if not value.is_Rational:
+        value = sp.N(value, DIGITS)
+        if not (value.is_Float and value.is_finite):
+            return None
+        value = sp.Rational(value)
+    return Fraction(int(value.p), int(value.q))
+
+
+def clauses(condition) -> list[list[sp.Expr]]:
+    """A condition as alternatives, each a list of expressions that are at most 0 (closed: strict counts as not)."""
+    if condition is None:
+        return [[]]
+    normal = sp.to_dnf(condition, simplify=False)
+    if normal == sp.true:
+        return [[]]
+    if normal == sp.false:
+        return []
+    return [
+        [e for literal in sp.And.make_args(clause) for e in _literal(literal)] for clause in sp.Or.make_args(normal)
+    ]
+
+
+def _literal(literal) -> list[sp.Expr]:
+    if isinstance(literal, sp.Not):
+        literal = literal.args[0].negated
+    if literal == sp.true or isinstance(literal, sp.Ne):
+        return []
+    if isinstance(literal, (sp.Ge, sp.Gt)):
+        return [literal.rhs - literal.lhs]
+    if isinstance(literal, (sp.Le, sp.Lt)):
+        return [literal.lhs - literal.rhs]
+    if isinstance(literal, sp.Eq):
+        return [literal.lhs - literal.rhs, literal.rhs - literal.lhs]
+    raise UsageError(f"distances: the condition {literal} is no comparison of numbers")
+
+
+def formula(expressions, coordinates) -> Formula:
+    """Compile expressions of some coordinates, with their derivatives."""
+    numbered = [sp.Symbol(f"x{i}", real=True) for i in range(len(coordinates))]
+    mapping = dict(zip(coordinates, numbered, strict=True))
+    results = tuple(sp.sympify(e).xreplace(mapping) for e in expressions)
+    slopes = Gradient(results, numbered)
+    rows = tuple(entry for row in slopes.rows for entry in row)
+    definitions = [
+        Definition("value", tuple(numbered), results),
+        Definition("jacobian", tuple(numbered), rows, slopes.statements),
+    ]
+    jumps = any(
+        f.free_symbols & set(numbered)
+        for e in results
+        for f in e.atoms(functions.sign, functions.floor, sp.sign, sp.floor)
+    )
+    return compiled(print_routines(definitions, ()), (len(results), len(numbered)), jumps)
+
+
+def equations(surface: sp.Expr, reset: Sequence[sp.Expr], own: Sequence[sp.Symbol], image: Sequence[sp.Symbol]):
+    """Expressions of the image's coordinates that are 0 on it; none where the reset hides too much.
+
+    A coordinate that the reset hands on, scaled or shifted, is known from the image; so is what is made of such ones.
+    """
+    known: dict[sp.Symbol, sp.Expr] = {}
+    used: set[sp.Symbol] = set()
+    for target, value in zip(image, reset, strict=True):
+        symbols = value.free_symbols & set(own)
+        if len(symbols) != 1:
+            continue
+        (source,) = symbols
+        slope = sp.expand(value).diff(source)
+        if source not in known and slope.is_number and slope != 0:
+            known[source] = (_fresh(target) - value.xreplace({source: sp.S.Zero})) / slope
+            used.add(target)
+    vanishing = [(surface, surface.free_symbols)]
+    vanishing += [
+        (_fresh(target) - value, value.free_symbols)
+        for target, value in zip(image, reset, strict=True)
+        if target not in used
+    ]
+    back = {_fresh(target): target for target in image}
+    given = set(known)
+    return [
+        sp.sympify(expression).xreplace(known).xreplace(back)
+        for expression, symbols in vanishing
+        if symbols & set(own) <= given
+    ]
+
+
+def _fresh(symbol: sp.Symbol) -> sp.Symbol:
+    """The image's coordinate of a name, which the guard's mode may have as well."""
+    return sp.Symbol(f"{symbol.name}'", real=True)
