@@ -76,11 +76,11 @@ def _sequences(space: Space, start: End, end: End, hops: int) -> Iterator[tuple[
             most = min(most, len(sequence) + MORE_HOPS)
             yield sequence
         if len(sequence) < most:
-            waiting.extend((*sequence, c) for c in crossings(space) if c.source == mode and not _back(sequence, c))
-
-
-def _back(sequence: tuple[Crossing, ...], following: Crossing) -> bool:
-    return bool(sequence) and sequence[-1].surface is following.surface and sequence[-1].forward != following.forward
+            last = sequence[-1] if sequence else None
+            for c in crossings(space):
+                back = last is not None and last.surface is c.surface and last.forward != c.forward
+                if c.source == mode and not back:
+                    waiting.append((*sequence, c))
 
 
 def _try(route: Route, toll: float, found: SearchResult, budget: Budget) -> None:
@@ -362,7 +362,8 @@ class _Batch:
         apart = np.linalg.norm(places - self.at[k], axis=1)
         nearest: list[int] = np.argsort(apart, kind="stable")[:2].tolist()
         first, others = nearest[0], nearest[1:]
-        points, route = alike[first].points, self._route(alike[first].route, k)
+        ends = (self.start.mode, self.start.x[k]), (self.end.mode, self.end.x[k])
+        points, route = alike[first].points, replace(alike[first].route, start=ends[0], end=ends[1])
         if others:
             way = places[others[0]] - places[first]
             share = float((self.at[k] - places[first]) @ way / max(float(way @ way), 1e-300))
@@ -412,9 +413,6 @@ class _Batch:
         self.done[k] = True
         if found.through is not None and found.through.sequence:
             self.pool.append(KnownPath(self.at[k], found.through, found.unknowns))
-
-    def _route(self, route: Route, k: int) -> Route:
-        return replace(route, start=(self.start.mode, self.start.x[k]), end=(self.end.mode, self.end.x[k]))
 
     def _shorter(self, k: int, value: float, found: KnownPath) -> None:
         if value < self.upper[k]:

@@ -47,17 +47,16 @@ class Crossing:
 
 def crossings(space: Space) -> tuple[Crossing, ...]:
     """Every guard in both directions."""
-    found: tuple[Crossing, ...] | None = space.cache.get("crossings")
-    if found is None:
-        both: list[Crossing] = []
-        for gate in (*space.gates, *space.curved_gates):
-            curved = isinstance(gate, CurvedGate)
-            what = (gate.surface, gate.conditions, gate.reset) if curved else _as_formulas(gate)
-            room = inequalities(space.domains[gate.target])
-            both.append(Crossing(gate.edge, gate.source, gate.target, gate.source, True, *what, room))
-            both.append(Crossing(gate.edge, gate.target, gate.source, gate.source, False, *what, room))
-        found = space.cache["crossings"] = tuple(both)
-    return found
+    return space.remembered("crossings", lambda: tuple(_crossings(space)))
+
+
+def _crossings(space: Space) -> Iterator[Crossing]:
+    for gate in (*space.gates, *space.curved_gates):
+        curved = isinstance(gate, CurvedGate)
+        what = (gate.surface, gate.conditions, gate.reset) if curved else _as_formulas(gate)
+        room = inequalities(space.domains[gate.target])
+        yield Crossing(gate.edge, gate.source, gate.target, gate.source, True, *what, room)
+        yield Crossing(gate.edge, gate.target, gate.source, gate.source, False, *what, room)
 
 
 def inequalities(domain: Domain) -> Formula:

@@ -76,7 +76,7 @@ class Manifest:
             "vary": [asdict(each) for each in (*variation.grids, *variation.draws)],
             "random": variation.random,
             "seed": variation.seed if variation.draws else None,
-            "record": self.recording.plain(),
+            "record": asdict(self.recording),
             "settings": self.arguments,
             "states": self.states,
             "outputs": self.outputs,
@@ -196,10 +196,6 @@ class Recording:
     samples: int | str | None = None
     verdict: bool = False
     warnings: bool = False
-
-    def plain(self) -> dict[str, Any]:
-        """As in a manifest."""
-        return asdict(self)
 
     @classmethod
     def read(cls, given: str | Sequence[str]) -> Recording:
