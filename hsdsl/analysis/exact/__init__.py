@@ -1,7 +1,7 @@
 """Exact executions: references that owe nothing to the simulator, and refined runs for other models.
 
-`references` finds the stored execution that solves a model as it is written; `interpolation` makes polynomial pieces of
-formulas, with a bound on their error; `refined` is for any other model: runs in many digits, refined until they agree.
+`references` finds the stored execution that solves a model as it is written; `refined` is for any other model: runs in
+many digits, refined until they agree. Stored ones are made by ``models/references``, with a bound on their error.
 """
 
 from hsdsl.analysis.exact.references import reference, start_of

@@ -11,9 +11,8 @@ import re
 import tomllib
 from bisect import bisect
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 from hsdsl.analysis.lint.rules import FAMILIES, RULES, family
 from hsdsl.analysis.lint.subject import Subject
@@ -24,24 +23,20 @@ from hsdsl.language.source import Node, Scalar, Text, children
 OWN_FILE = "hsdsl.toml"
 _KEYS = ("select", "ignore")
 
+# A comment: the line that it is about, its codes with their places, its own place, and its reason.
+Comment = tuple[int, list[tuple[str, Span]], Span, str | None]
 
-@dataclass(frozen=True)
-class Selection:
-    """The codes of the rules that run."""
 
-    codes: tuple[str, ...]
+def selected(select: Iterable[str] | None = None, ignore: Iterable[str] | None = None) -> tuple[str, ...]:
+    """The codes of the rules that ``select`` names, of all when it is None, without those that ``ignore`` names.
 
-    @classmethod
-    def of(cls, select: Iterable[str] | None = None, ignore: Iterable[str] | None = None) -> Selection:
-        """The rules that ``select`` names, all when it is None, without those that ``ignore`` names.
-
-        Raises UsageError: for a name that no rule has, and for a selection of nothing.
-        """
-        chosen = set(RULES) if select is None else codes_of(select, "select")
-        if not chosen:
-            raise UsageError("select: no rule is named", "leave it out to use all rules")
-        dropped = set[str]() if ignore is None else codes_of(ignore, "ignore")
-        return cls(tuple(code for code in RULES if code in chosen - dropped))
+    Raises UsageError: for a name that no rule has, and for a selection of nothing.
+    """
+    chosen = set(RULES) if select is None else codes_of(select, "select")
+    if not chosen:
+        raise UsageError("select: no rule is named", "leave it out to use all rules")
+    dropped = set[str]() if ignore is None else codes_of(ignore, "ignore")
+    return tuple(code for code in RULES if code in chosen - dropped)
 
 
 def codes_of(names: Iterable[str], where: str) -> set[str]:
@@ -106,24 +101,13 @@ def _checked(file: Path, table: Any) -> dict[str, list[str]]:
 
 UNUSED, UNKNOWN = "HS490", "HS491"
 _LISTED = "codes are HS and three digits; every finding has its own"
-_COMMENT = re.compile(r"#\s*hsdsl\s*:\s*ignore\s*(?:\[([^\]\n]*)\])?(?=[ \t]{0,9}(.{0,500}))")
+_COMMENT = re.compile(r"(?<![^ \t])#\s*hsdsl\s*:\s*ignore\s*(?:\[([^\]\n]*)\])?(?=[ \t]{0,9}(.{0,500}))")
 
 
-@dataclass(frozen=True)
-class Ignored:
+class Ignored(NamedTuple):
     """A finding that a comment ignores, and the reason given there."""
 
     diagnostic: Diagnostic
-    reason: str | None
-
-
-@dataclass(frozen=True)
-class Comment:
-    """One such comment: the line that it is about, its codes with their places, and its reason."""
-
-    line: int
-    codes: tuple[tuple[str, Span], ...]
-    span: Span
     reason: str | None
 
 
@@ -135,59 +119,37 @@ def sift(
     What is wrong with the comments themselves counts, where its rules are among ``codes``.
     """
     text = subject.reading.text
-    reasons: dict[tuple[str, int], str | None] = {}
-    comments = tuple(comments_of(text, subject.root))
-    for comment in comments:
-        for code, _ in comment.codes:
-            reasons[code, comment.line] = comment.reason
-    kept: list[Diagnostic] = []
-    ignored: list[Ignored] = []
-    for diagnostic in found:
-        where = (diagnostic.code, diagnostic.span.line if diagnostic.span else 0)
-        if where in reasons:
-            ignored.append(Ignored(diagnostic, reasons[where]))
-        else:
-            kept.append(diagnostic)
-    used = {(i.diagnostic.code, i.diagnostic.span.line if i.diagnostic.span else 0) for i in ignored}
-    kept += [d for d in _wrong(text, comments, used, codes) if d.code in codes]
-    return tuple(sorted(kept, key=_order)), tuple(sorted(ignored, key=lambda i: _order(i.diagnostic)))
+    comments = list(comments_of(text, subject.root))
+    reasons = {(code, line): reason for line, named, _, reason in comments for code, _ in named}
+    kept = [each for each in found if _where(each) not in reasons]
+    ignored = [Ignored(each, reasons[_where(each)]) for each in found if _where(each) in reasons]
+    used = {_where(each.diagnostic) for each in ignored}
+    kept += [each for each in _wrong(text, comments, used, codes) if each.code in codes]
+    return tuple(sorted(kept, key=_order)), tuple(sorted(ignored, key=lambda each: _order(each.diagnostic)))
 
 
 def comments_of(text: Text, root: Node) -> Iterator[Comment]:
     """The comments of a file that ask to ignore something."""
-    found = [
-        (number, match)
-        for number, line in enumerate(text.lines, start=1)
-        for match in _COMMENT.finditer(line)
-        if _begins_comment(line, match.start())
-    ]
+    found = [(number, match) for number, line in enumerate(text.lines, start=1) for match in _COMMENT.finditer(line)]
     if not found:
         return
-    taken, following = _scalars(root), _following(text.lines)
-    for number, match in found:
-        if not _inside(taken, number - 1, match.start()):
-            alone = not text.lines[number - 1][: match.start()].strip()
-            codes = tuple(_codes(text, number, match))
-            about = following[number - 1] if alone else number
-            yield Comment(about, codes, _span(text, number, match), match[2].strip() or None)
-
-
-def _begins_comment(line: str, column: int) -> bool:
-    return column == 0 or line[column - 1] in " \t"
-
-
-def _scalars(root: Node) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """Beginnings and ends, in order, of all scalars that contain the sign of a comment."""
     nodes = [root]
     for node in nodes:
         nodes += children(node)
-    texts = (node for node in nodes if isinstance(node, Scalar) and "#" in node.value)
-    return sorted({(node.place.start[1:], node.place.end[1:]) for node in texts})
-
-
-def _inside(scalars: list[tuple[tuple[int, int], tuple[int, int]]], line: int, column: int) -> bool:
-    before = bisect(scalars, (line, column), key=lambda ends: ends[0])
-    return before > 0 and (line, column) < scalars[before - 1][1]
+    texts = (node.place for node in nodes if isinstance(node, Scalar) and "#" in node.value)
+    taken, following = sorted({(place.start[1:], place.end[1:]) for place in texts}), _following(text.lines)
+    for number, match in found:
+        place = number - 1, match.start()
+        before = bisect(taken, place, key=lambda ends: ends[0])
+        if before and place < taken[before - 1][1]:
+            continue  # it is in a text
+        alone = not text.lines[number - 1][: match.start()].strip()
+        named = [
+            (part.group(), text.span(number, match.start(1) + part.start() + 1, len(part.group())))
+            for part in re.finditer(r"[^\s,]+", match[1] or "")
+        ]
+        span = text.span(number, match.start() + 1, match.end() - match.start())
+        yield following[number - 1] if alone else number, named, span, match[2].strip() or None
 
 
 def _following(lines: Sequence[str]) -> list[int]:
@@ -201,33 +163,28 @@ def _following(lines: Sequence[str]) -> list[int]:
     return found
 
 
-def _codes(text: Text, number: int, match: re.Match[str]) -> Iterator[tuple[str, Span]]:
-    for part in re.finditer(r"[^\s,]+", match[1] or ""):
-        yield part.group(), text.span(number, match.start(1) + part.start() + 1, len(part.group()))
-
-
-def _span(text: Text, number: int, match: re.Match[str]) -> Span:
-    return text.span(number, match.start() + 1, match.end() - match.start())
-
-
 def _wrong(
     text: Text, comments: Sequence[Comment], used: set[tuple[str, int]], codes: Sequence[str]
 ) -> Iterator[Diagnostic]:
-    for comment in comments:
-        if not comment.codes:
+    for line, named, place, _ in comments:
+        if not named:
             message = "this comment does not say what to ignore"
-            yield _about(text, UNKNOWN, message, comment.span, "write `# hsdsl: ignore[HS401]`, with the code")
-        for code, span in comment.codes:
+            yield _about(text, UNKNOWN, message, place, "write `# hsdsl: ignore[HS401]`, with the code")
+        for code, span in named:
             if code not in RULES:
                 hint = "errors cannot be ignored" if re.fullmatch(r"HS[0-3]\d\d", code) else _LISTED
                 yield _about(text, UNKNOWN, f"'{shown(code)}' is not the code of a lint rule", span, hint)
-            elif code in codes and (code, comment.line) not in used:
-                message = f"there is no {code} to ignore on line {comment.line}"
+            elif code in codes and (code, line) not in used:
+                message = f"there is no {code} to ignore on line {line}"
                 yield _about(text, UNUSED, message, span, "remove the code, or the comment")
 
 
 def _about(text: Text, code: str, message: str, span: Span, hint: str | None) -> Diagnostic:
     return Diagnostic(code, message, span, hint, text.lines[span.line - 1], RULES[code].severity, "symbolic")
+
+
+def _where(diagnostic: Diagnostic) -> tuple[str, int]:
+    return diagnostic.code, diagnostic.span.line if diagnostic.span else 0
 
 
 def _order(diagnostic: Diagnostic) -> tuple[int, int, str]:

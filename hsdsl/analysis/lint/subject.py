@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 from sympy.logic.boolalg import BooleanFunction
@@ -44,8 +44,7 @@ class EdgePart:
         return (self.document.when if self.document.target is None else self.document.to).place.span
 
 
-@dataclass(frozen=True)
-class ModePart:
+class ModePart(NamedTuple):
     """A mode as mathematics and as written; ``key`` is its name in the file, with its place."""
 
     mode: Mode
@@ -302,11 +301,6 @@ def leaves(mode: Mode, surface: Surface, point: Point) -> bool | None:
         value = evaluate(rate, point)
         if not numeric.finite(value):
             return None
-        if abs(value) > ROUND_OFF * _size(rate, point):
+        if abs(value) > ROUND_OFF * sum(abs(evaluate(term, point)) for term in sp.Add.make_args(sp.expand(rate))):
             return bool(value > 0)
     return None
-
-
-def _size(expr: Any, point: Point) -> Any:
-    """The sum of the magnitudes of the terms."""
-    return sum(abs(evaluate(term, point)) for term in sp.Add.make_args(sp.expand(expr)))

@@ -234,13 +234,7 @@ _KEPT = ("abs", "floor")
 _PLAIN = ("sign",)
 
 
-@dataclass(frozen=True)
-class Misfit:
-    """A part of an expression with a unit that does not fit."""
-
-    kind: Kind
-    node: Tree
-    message: str
+Misfit = tuple[Kind, Tree, str]  # a part of an expression with a unit that does not fit, and what to say
 
 
 @dataclass
@@ -293,7 +287,7 @@ class Walk:
                     known = found
                 elif not known.same(found):
                     message = f"`{self.quoted(part)}`, in {found.compared_with(known)}, is {how} something in {known}"
-                    self.misfits.append(Misfit("sum", part, message))
+                    self.misfits.append(("sum", part, message))
                     return "unknown"
         return known if known is not None else "unknown" if unsure else "any"
 
@@ -323,7 +317,7 @@ class Walk:
             return base.to(exponent)
         if not base.pure:
             message = f"`{self.quoted(tree.base)}`, in {base}, is raised to a power that is no plain number"
-            self.misfits.append(Misfit("argument", tree.base, message))
+            self.misfits.append(("argument", tree.base, message))
             return "unknown"
         return base
 
@@ -338,7 +332,8 @@ class Walk:
         inner = Walk(unit_of, function.scalar.value, self.functions)
         found = inner.measure(function.tree)
         if inner.misfits:
-            self.misfits.append(Misfit(inner.misfits[0].kind, tree, f"in `{tree.function}` {inner.misfits[0].message}"))
+            kind, _, message = inner.misfits[0]
+            self.misfits.append((kind, tree, f"in `{tree.function}` {message}"))
         return found
 
     def _call(self, tree: Call) -> Measure:
@@ -370,7 +365,7 @@ class Walk:
         found = self.measure(tree)
         if isinstance(found, Unit) and not found.pure:
             message = f"`{self.quoted(tree)}`, {what}, is in {found.compared_with(ONE)} and not a plain number"
-            self.misfits.append(Misfit("argument", tree, message))
+            self.misfits.append(("argument", tree, message))
 
     def quoted(self, tree: Tree) -> str:
         """The text of a part, cut to what a sentence carries."""
@@ -389,15 +384,6 @@ class Checked(NamedTuple):
     measure: Measure
     expected: Unit | None
     misfits: tuple[Misfit, ...]
-
-
-@dataclass(frozen=True)
-class Misread:
-    """A text that is no unit, with the names in it that nobody knows, and how it is written here, if that is known."""
-
-    scalar: Scalar
-    names: tuple[str, ...]
-    better: str | None
 
 
 class Units:
@@ -430,20 +416,20 @@ class Units:
         return bool(self._texts or self._of_parts)
 
     @cached_property
-    def _read(self) -> tuple[Mapping[str, Unit], tuple[Misread, ...]]:
+    def _read(self) -> tuple[Mapping[str, Unit], tuple[tuple[Scalar, UnknownUnit], ...]]:
         known: dict[str, Unit] = {}
-        wrong: list[Misread] = []
+        wrong: list[tuple[Scalar, UnknownUnit]] = []
         for name, scalar in self._texts.items():
             try:
                 known[name] = read(scalar.value)
             except UnknownUnit as error:
-                wrong.append(Misread(scalar, error.names, error.better))
+                wrong.append((scalar, error))
         if "t" not in self._texts and any(n == "[time]" for unit in known.values() for n, _ in unit.powers):
             known["t"] = read("s")
         return known, tuple(wrong)
 
     @property
-    def misread(self) -> tuple[Misread, ...]:
+    def misread(self) -> tuple[tuple[Scalar, UnknownUnit], ...]:
         """The texts that are no units."""
         return self._read[1]
 

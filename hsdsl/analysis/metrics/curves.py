@@ -8,8 +8,8 @@ ends of ever shorter parts and the length of the way between them. Cells are bou
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -241,13 +241,12 @@ FIRST_BATCH, LARGEST_BATCH = 32, 4096
 ROUGH, FEW = 0.01, 0.1  # within so much of the lower bound, spend only so much of the evaluations allowed
 
 
-@dataclass
-class _Frontier:
+class _Frontier(NamedTuple):
     """Cells not yet decided: upper bounds over each, and at both ends where those are known (else not a number)."""
 
     cells: Cells
     bound: Array
-    ends: Array = field(repr=False)
+    ends: Array
 
     def take(self, chosen: Array) -> _Frontier:
         return _Frontier(self.cells[chosen], self.bound[chosen], self.ends[chosen])
@@ -371,7 +370,7 @@ class Supremum:
         for end in (0, 1):
             self._evaluate(batch.cells, batch.ends, every, end)
         reached = (batch.ends[:, 0] + batch.ends[:, 1] + _ways(batch.cells, self.distance)) / 2
-        batch.bound = np.minimum(batch.bound, reached)
+        batch = batch._replace(bound=np.minimum(batch.bound, reached))
         batch = batch.take(self.undecided(batch.bound))
         stuck = ~batch.cells.divisible
         if stuck.any():

@@ -163,12 +163,8 @@ class GateSequence:
 
 def gate_sequence(space: Space, indices: tuple[int, ...]) -> GateSequence:
     """The chain of a sequence of passages, made once."""
-    key = ("chain", indices)
-    found = space.cache.get(key)
-    if not isinstance(found, GateSequence):
-        found = GateSequence(space, [space.passages[i] if i >= 0 else space.planes[~i] for i in indices])
-        space.cache[key] = found
-    return found
+    passages = (space.passages[i] if i >= 0 else space.planes[~i] for i in indices)
+    return space.remembered(("chain", indices), lambda: GateSequence(space, list(passages)))
 
 
 GAP = 1e-10  # relative

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from hsdsl.base.numbers.rational import Exact, about, after, axes, deepest, matr
 from hsdsl.engine.backends.text import compile_routines
 from hsdsl.mathematics.program import Routines
 
+T = TypeVar("T")
 TOLERANCE = 1e-9  # how far beyond a surface a point still counts as on it, relative to the size of the points
 
 
@@ -121,8 +122,7 @@ class ExactGate(NamedTuple):
     inner: Exact
 
 
-@dataclass(frozen=True, eq=False)
-class CurvedGate:
+class CurvedGate(NamedTuple):
     """A guard whose surface or reset is not affine: ``surface(x) = 0``, ``conditions(x) <= 0``, ``reset(x)``.
 
     ``marks`` are functions of the target's coordinates that are 0 on the image.
@@ -180,6 +180,12 @@ class Space:
     kept: tuple[tuple[int, ...], ...] | None
     timed: bool
     cache: dict[Any, Any] = field(default_factory=dict[Any, Any], repr=False)
+
+    def remembered(self, key: Any, work: Callable[[], T]) -> T:
+        """What was worked out under a key, once for a space."""
+        if key not in self.cache:
+            self.cache[key] = work()
+        return self.cache[key]
 
     def mode_index(self, name: str) -> int:
         """A mode's index by name."""

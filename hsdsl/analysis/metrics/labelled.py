@@ -210,7 +210,7 @@ def tau_epsilon(
     for run, curve in zip((a, b), curves, strict=True):
         if not np.isfinite(curve.coefficients).all():
             raise UsageError(f"a run of {run.model} is not finite: no distance is defined")
-    tau = min(_last_hybrid_time(curve) for curve in curves) if tau is None else tau
+    tau = min(float(np.max(curve.end + curve.jump)) for curve in curves) if tau is None else tau
     spans = [(float(curve.start[0]), float(curve.end[-1])) for curve in curves]
     p, q = polylines(curves, spans, resolution, cuts=tau)
     found, labels = max(one_way(p, q, tau), one_way(q, p, tau)), other_modes(p, q, tau)
@@ -219,10 +219,6 @@ def tau_epsilon(
     interval = INFINITE if found == np.inf else Interval(max(found - reach, labels, 0.0), max(found + reach, labels))
     note = f"For t + j up to {tau:.10g}, runs by {len(p)} and {len(q)} points, up to {2 * reach:.2g} apart."
     return CurveDistance(interval, None, "tau-epsilon", (0.0, tau), note)
-
-
-def _last_hybrid_time(curve: Trace) -> float:
-    return float(np.max(curve.end + curve.jump))
 
 
 def one_way(p: Polyline, q: Polyline, tau: float) -> float:

@@ -27,8 +27,7 @@ from hsdsl.analysis.metrics.interval import (
     up_to_hops,
     weakest,
 )
-from hsdsl.analysis.metrics.local import Neighbours, search_nonaffine
-from hsdsl.analysis.metrics.routes import Route
+from hsdsl.analysis.metrics.local import Neighbours, Route, search_nonaffine
 from hsdsl.analysis.metrics.search import TOLERANCE, End, Query, SearchResult, search
 from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError

@@ -413,16 +413,13 @@ def gaps(space: Space, budget: Budget) -> Array:
             for g in space.passages:
                 if f.target == g.source and np.isinf(found[f.index, g.index]):
                     # Backwards, the same two sides face each other: passage i backwards is i ^ 1.
-                    gap = 0.0 if budget.spent() else _gap(space, f.index, g.index)
+                    gap = 0.0
+                    if not budget.spent() and f.index != g.index ^ 1:  # else it is taken back at once
+                        gap = float(solve(*gate_sequence(space, (f.index, g.index)).problem(None, None), 1)[0][0])
                     found[f.index, g.index] = found[g.index ^ 1, f.index ^ 1] = gap
         if not budget.ran_out:
             space.cache["gaps"] = found
     return found
-
-
-def _gap(space: Space, f: int, g: int) -> float:
-    """0 where a passage is taken back at once."""
-    return 0.0 if f == g ^ 1 else float(solve(*gate_sequence(space, (f, g)).problem(None, None), 1)[0][0])
 
 
 # A way may grow by this share where a pair is left out: far below rounding, and above what numbers that are not
@@ -459,13 +456,8 @@ def followers(space: Space, sequence: tuple[int, ...]) -> Iterator[int]:
 
 def may_run(space: Space, i: int) -> bool:
     """Whether a shortest path may go back and forth through a gate more often than ``RUN``."""
-    key = ("run", i | 1)
-    found: bool | None = space.cache.get(key)
-    if found is None:
-        gate = space.passages[i].gate
-        found = bool(gate.normals.size) and all(may_follow(space, f, f ^ 1)[0] for f in (i, i ^ 1))
-        space.cache[key] = found
-    return found
+    bounded = bool(space.passages[i].gate.normals.size)
+    return bounded and space.remembered(("run", i | 1), lambda: all(may_follow(space, f, f ^ 1)[0] for f in (i, i ^ 1)))
 
 
 def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]:
@@ -475,16 +467,14 @@ def may_follow(space: Space, first: int, second: int) -> tuple[bool, bool, bool]
     or ends in the second one's is bound to it, so the rule that takes it away must not be used (rule 1: unless one
     of the two is free, when going back out of the strip is no longer than going on and coming back).
     """
-    first, second = passage_number(first), passage_number(second)
-    key = ("follow", first, second)
-    found: tuple[bool, bool, bool] | None = space.cache.get(key)
-    if found is None:
-        f, g = space.passages[first], space.passages[second]
+    f, g = (space.passages[passage_number(i)] for i in (first, second))
+
+    def found() -> tuple[bool, bool, bool]:
         after = g.source != g.target or not _never_nearer(g, *g.exact, f.exact[1], f)
         before = f.source != f.target or not _never_nearer(f, f.exact[1], f.exact[0], g.exact[0], g)
-        found = (_worth_returning(f, g), after, before)
-        space.cache[key] = found
-    return found
+        return _worth_returning(f, g), after, before
+
+    return space.remembered(("follow", f.index, g.index), found)
 
 
 def _worth_returning(f: Passage, g: Passage) -> bool:

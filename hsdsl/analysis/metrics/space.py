@@ -33,6 +33,7 @@ from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
+from hsdsl.mathematics.decisions.dynamics import alternatives
 from hsdsl.mathematics.lower.straight import Definition, Gradient, print_routines
 
 MOST_SAMPLES = 200  # of an input that a guard depends on
@@ -218,30 +219,8 @@ def _rational(value: sp.Expr) -> Fraction | None:
 
 def clauses(condition) -> list[list[sp.Expr]]:
     """A condition as alternatives, each a list of expressions that are at most 0 (closed: strict counts as not)."""
-    if condition is None:
-        return [[]]
-    normal = sp.to_dnf(condition, simplify=False)
-    if normal == sp.true:
-        return [[]]
-    if normal == sp.false:
-        return []
-    return [
-        [e for literal in sp.And.make_args(clause) for e in _literal(literal)] for clause in sp.Or.make_args(normal)
-    ]
-
-
-def _literal(literal) -> list[sp.Expr]:
-    if isinstance(literal, sp.Not):
-        literal = literal.args[0].negated
-    if literal == sp.true or isinstance(literal, sp.Ne):
-        return []
-    if isinstance(literal, (sp.Ge, sp.Gt)):
-        return [literal.rhs - literal.lhs]
-    if isinstance(literal, (sp.Le, sp.Lt)):
-        return [literal.lhs - literal.rhs]
-    if isinstance(literal, sp.Eq):
-        return [literal.lhs - literal.rhs, literal.rhs - literal.lhs]
-    raise UsageError(f"distances: the condition {literal} is no comparison of numbers")
+    found = [()] if condition is None else alternatives(condition)
+    return [[e for c in clause for e in (c.expr, -c.expr)[: 1 + (c.relation == "= 0")]] for clause in found]
 
 
 def formula(expressions, coordinates) -> Formula:

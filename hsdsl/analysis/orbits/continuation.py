@@ -20,7 +20,7 @@ import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -44,8 +44,7 @@ NODES = 8  # of a step, where it is interpolated
 CIRCLE = "the branch is closed"
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """An orbit of the branch: its unknowns, the last passage, and the tangent of the branch."""
 
     unknowns: Array
@@ -253,7 +252,7 @@ def _between(follower: Follower, here: Solution, ahead: Solution, length: float)
     for kind in before:
         if before[kind] * after[kind] >= 0:
             continue
-        multipliers = [follower.multipliers(each) for each in (here, ahead)]
+        multipliers: list[Any] = [follower.multipliers(each) for each in (here, ahead)]
         if kind == "branch point" and any(np.any(np.abs(each - 1) < LEAST_MARGIN) for each in multipliers):
             continue  # a multiplier is 1 but for its error, as on families of orbits
         if kind == "torus" and len({int(np.sum(each.imag > 0)) for each in multipliers}) > 1:

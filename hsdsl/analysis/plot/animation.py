@@ -6,11 +6,10 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from shutil import which
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -165,8 +164,7 @@ def _box(run: Execution, samples: Samples, shapes: Sequence[Any]) -> tuple[tuple
 COILS = 8  # of a spring
 
 
-@dataclass(frozen=True)
-class Drawn:
+class Drawn(NamedTuple):
     """A shape at one time: its kind, its points (n, 2), and its sizes."""
 
     kind: str

@@ -30,7 +30,8 @@ def page(runs: Sequence[Execution], view: View) -> str:
     else:
         columns, shown = list(dict.fromkeys([*names, *(name for pair in pairs for name in pair)])), names
     data = [curves(run) for run in runs]
-    modes = list(dict.fromkeys(mode for run, drawn in zip(runs, data, strict=True) for mode in _modes(run, drawn)))
+    pairs_of = zip(runs, data, strict=True)
+    modes = list(dict.fromkeys(m for run, drawn in pairs_of for m in (*(a.mode for a in run.arcs), *drawn.modes)))
     kept = [thinned(drawn, columns, NUMBERS // len(runs)) for drawn in data]
     title = escape(visible(view.title or ", ".join(dict.fromkeys(map(words.heading, runs)))))
     parts = {
@@ -44,10 +45,6 @@ def page(runs: Sequence[Execution], view: View) -> str:
         "script": "\n".join([scripts(), shared("runs.js")]),
     }
     return filled(shared("runs.html"), parts)
-
-
-def _modes(run: Execution, drawn: Curves) -> list[str]:
-    return [*(arc.mode for arc in run.arcs), *drawn.modes]
 
 
 def _facts(runs: Sequence[Execution], data: Sequence[Curves], kept: Sequence[Array]) -> str:

@@ -207,7 +207,7 @@ def laid_out(sizes: Sequence[tuple[float, float]], edges: Sequence[tuple[int, in
     paths, columns = _with_waypoints(ranks, edges)
     _order(columns, paths)
     ends = _ends(ranks, edges)
-    heights = {v: max(h, PORT * (_most_ends(ends, v) + 1)) for v, (_, h) in enumerate(sizes)}
+    heights = {v: max(h, PORT * (max(ends.get((v, -1), 0), ends.get((v, 1), 0)) + 1)) for v, (_, h) in enumerate(sizes)}
     tallest = max(sum(heights.get(v, PASSAGE) + GAP for v in column) for column in columns)
     middle: dict[int, float] = {}
     left: dict[int, float] = {}
@@ -289,10 +289,6 @@ def _ends(ranks: list[int], edges: Sequence[tuple[int, int]]) -> dict[tuple[int,
         for v, side in zip((a, b), _sides(ranks, a, b), strict=True):
             ends[v, side] = ends.get((v, side), 0) + 1
     return ends
-
-
-def _most_ends(ends: dict[tuple[int, int], int], v: int) -> int:
-    return max(ends.get((v, -1), 0), ends.get((v, 1), 0))
 
 
 def _sides(ranks: list[int], a: int, b: int) -> tuple[int, int]:

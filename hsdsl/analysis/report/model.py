@@ -70,23 +70,22 @@ def _start(system: HybridSystem, math: Mathematics) -> str:
 
 
 def _parameters(system: HybridSystem) -> str:
-    rows = [(p.name, p.text, p.unit or "", p.about or "") for p in system.parameters[:MOST_ROWS]]
-    left = len(system.parameters) - MOST_ROWS
-    rows += [(f"{left} more", "", "", "")] if left > 0 else []
+    rows = [(p.name, p.text, p.unit or "", p.about or "") for p in system.parameters]
     return _table(("parameter", "value", "unit", "meaning"), rows)
 
 
 def _parts(system: HybridSystem) -> str:
     """The parts of a composed model, with their modes: its product modes are as many as their product."""
-    rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts[:MOST_ROWS]]
-    left = len(system.parts) - MOST_ROWS
-    return _table(("part", "modes", "starts in"), [*rows, *([(f"{left} more", "", "")] if left > 0 else [])])
+    rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts]
+    return _table(("part", "modes", "starts in"), rows)
 
 
 def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    used = [k for k in range(len(names)) if any(row[k] for row in rows)]
     if not rows:
         return ""
+    more = [(f"{len(rows) - MOST_ROWS} more", *[""] * (len(names) - 1))] * (len(rows) > MOST_ROWS)
+    rows = [*rows[:MOST_ROWS], *more]
+    used = [k for k in range(len(names)) if any(row[k] for row in rows)]
     head = "".join(f"<th>{names[k]}</th>" for k in used)
     body = "".join("<tr>" + "".join(f"<td>{_said(row[k])}</td>" for k in used) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -366,7 +366,7 @@ REMEDIES = (
 
 def remedies_of(reasons: Sequence[str]) -> list[str]:
     """The remedies of some reasons, each once."""
-    found = (_of(reason) for reason in reasons)
+    found = (next((remedy for pattern, remedy in _patterns() if pattern.match(reason)), "") for reason in reasons)
     return [text for text in dict.fromkeys(found) if text]
 
 
@@ -377,10 +377,6 @@ def _patterns() -> list[tuple[re.Pattern[str], str]]:
         for each in REMEDIES
         for reason in each.reasons
     ]
-
-
-def _of(reason: str) -> str:
-    return next((remedy for pattern, remedy in _patterns() if pattern.match(reason)), "")
 
 
 def remedy_table() -> str:

@@ -244,10 +244,6 @@ class Sensitivity:
         further = () if self._smooth.theorem == "holds" else (*self.touches, *self._smooth.reasons)
         return (*own, *(reason for reason in further if not any(reason in told for told in own)))
 
-    def _exists_at(self, index: int) -> bool:
-        """Whether the derivatives of a transition exist."""
-        return not any(tie.index <= index for tie in self._parting)
-
     @cached_property
     def final(self) -> EndSlopes:
         """The derivatives of the end of the run; there are none if the run leaves its domain."""
@@ -256,7 +252,7 @@ class Sensitivity:
         time = self._shifts(end.state) if by_event else self.setting.span
         exists = not self.breaks and run.stop.reason != "left_domain"
         state = self._followed(end.mode, end.time, end.state, time, True)
-        rate = still_rate_name if self._rests(end.mode) else rate_name
+        rate = still_rate_name if (not self._mode(end.mode).states) else rate_name
         outputs = {y: self._output(end.outputs, y, rate(y), time) for y in self.setting.output_names}
         mode, own = self._shown(end.mode, end.state)
         return EndSlopes(
@@ -274,7 +270,7 @@ class Sensitivity:
     def transition(self, index: int) -> TransitionSlopes:
         """Return the derivatives of one transition."""
         made = self.execution.transitions[index]
-        after, exists = made.after or {}, self._exists_at(made.index)
+        after, exists = made.after or {}, (not any(tie.index <= made.index for tie in self._parting))
         time = self._shifts(after)
         before = self._followed(made.source, made.time, made.before, time, False)
         reached = self._followed(made.target, made.time, after, time, True)
@@ -328,10 +324,6 @@ class Sensitivity:
         earlier = bisect_left(segments, t, key=lambda each: each.start) - 1
         segment = plain.timeline.at(t) if after else segments[max(0, earlier)]
         return plain.kernel.bind(index, segment.data).flow(t, *x)
-
-    def _rests(self, mode: str) -> bool:
-        """Whether a mode is a final one without a flow."""
-        return not self._mode(mode).states
 
     def _mode(self, name: str) -> ModeProgram:
         """A mode of the run without derivatives."""
@@ -436,17 +428,19 @@ def as_json(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> dict[str, Any]
         result["transitions"] = [{"at": t.time, **_transition(d)} for t, d in made]
     if "outputs" in parts:
         table = found.sample()
-        values = {name: {"value": v, **_columns(found, table.slopes[name])} for name, v in table.values.items()}
+        values = {
+            name: {"value": v, **{by: table.slopes[name][:, k] for k, by in enumerate(found.wrt)}}
+            for name, v in table.values.items()
+        }
         result["samples"] = {"times": table.times, "values": values}
     if found.ties:
-        result["ties"] = [_tie(tie) for tie in found.ties]
+        result["ties"] = [
+            {"time": tie.time, "reason": tie.reason, "orders": [vars(order) for order in tie.orders]}
+            for tie in found.ties
+        ]
     if found.breaks:
         result["one_sided"] = {edge: _end(side.final) for edge, side in found.sides.items()}
     return plain(result)
-
-
-def _tie(tie: Tie) -> dict[str, Any]:
-    return {"time": tie.time, "reason": tie.reason, "orders": [vars(order) for order in tie.orders]}
 
 
 def _end(end: EndSlopes) -> dict[str, Any]:
@@ -455,10 +449,6 @@ def _end(end: EndSlopes) -> dict[str, Any]:
 
 def _transition(made: TransitionSlopes) -> dict[str, Any]:
     return vars(made) | {"before": seen(made.before), "after": seen(made.after)}
-
-
-def _columns(found: Sensitivity, slopes: Any) -> dict[str, Any]:
-    return {by: slopes[:, k] for k, by in enumerate(found.wrt)}
 
 
 def summary(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> str:

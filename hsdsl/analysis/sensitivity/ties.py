@@ -282,17 +282,13 @@ def touched(run: RunView) -> Iterator[tuple[Number, str]]:
     for arc in run.flows:
         count = len(run.problem.program.modes[run.index(arc.mode)].edges)
         try:
-            rates = [_rates(run.at_row(arc, row), count) for row in range(arc.first, arc.last + 1)]
+            rates = [[run.at_row(arc, row).rate(k) for k in range(count)] for row in range(arc.first, arc.last + 1)]
         except DOMAIN_ERRORS:
             continue
         for i, (before, after) in enumerate(pairwise(rates)):
             for k in range(count):
                 if before[k] > 0 >= after[k]:
                     yield from _turning(run, run.dense_output(arc, arc.first + i), arc.first + i + 1, k)
-
-
-def _rates(place: Place, count: int) -> list[Number]:
-    return [place.rate(k) for k in range(count)]
 
 
 def _turning(run: RunView, along: Callable[[Number], Place], row: int, k: int) -> Iterator[tuple[Number, str]]:

@@ -13,8 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from hsdsl.analysis.store.npz import load, save_npz
-from hsdsl.analysis.store.sidecar import forget_sidecar, read_sidecar, sidecar_of, write_sidecar
-from hsdsl.analysis.store.table import at_samples, write_csv, write_parquet
+from hsdsl.analysis.store.table import (
+    at_samples,
+    forget_sidecar,
+    read_sidecar,
+    sidecar_of,
+    write_csv,
+    write_parquet,
+    write_sidecar,
+)
 from hsdsl.base.atomic import replacing, unplaced
 from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError

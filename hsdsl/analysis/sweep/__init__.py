@@ -1,12 +1,11 @@
 """Sweeps: runs of one model over many values, as a dataset of Parquet files.
 
-=============  ======================================================================================
+=============  ============================================================================================
 `variation`    what varies: grids and random draws
-`manifest`     what a dataset is of: model, values, settings, what is recorded; its format has a version
-`rows`         an ensemble as an Arrow table with the columns of a dataset
+`manifest`     what a dataset is of: model, values, settings, what is recorded; its columns, and their rows
 `dataset`      a folder with a manifest and a file for each chunk of rows: made, read, summed up, drawn
 `cluster`      chunks to the workers of Dask
-=============  ======================================================================================
+=============  ============================================================================================
 
 The runs themselves are made in `hsdsl.interface.model.sweeps`.
 """

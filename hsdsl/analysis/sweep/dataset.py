@@ -25,8 +25,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.analysis.sweep import manifest as manifests
-from hsdsl.analysis.sweep.manifest import Manifest
-from hsdsl.analysis.sweep.rows import LISTS, TAG, column_of, library, schema
+from hsdsl.analysis.sweep.manifest import LISTS, TAG, Manifest, column_of, library, schema
 from hsdsl.base.atomic import replacing
 from hsdsl.base.calls import checks_arguments, checks_methods
 from hsdsl.base.errors import WARNINGS, UsageError
@@ -43,7 +42,7 @@ if TYPE_CHECKING:
 class Sweep:
     """The dataset of a sweep in a folder, with all rows or with the finished ones.
 
-    Every Parquet reader opens the folder. `hsdsl.analysis.sweep.rows` lists the columns.
+    Any reader of Parquet opens the folder. Columns are listed in `hsdsl.analysis.sweep.manifest`.
     """
 
     folder: Path

@@ -1,3 +1,4 @@
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false
 """What varies in a sweep: the product of grids, each point with one row or with several of random draws.
 
 ======================= =====================================================
@@ -15,6 +16,7 @@ order, and what else is varied does not change them. A uniform number goes throu
 from __future__ import annotations
 
 import math
+import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -175,27 +177,26 @@ def _triangular(u: Array, low: float, mode: float, high: float) -> Array:
     return np.where(u * (high - low) < mode - low, rising, falling)
 
 
+def _loguniform(u: Array, low: float, high: float) -> Array:
+    return np.exp(np.log(low) + u * (np.log(high) - np.log(low)))
+
+
 # The names of arguments, what they must fulfil, and the inverse distribution function.
-DISTRIBUTIONS: dict[str, tuple[tuple[str, ...], str, Callable[..., bool], Callable[..., Array]]] = {
-    "uniform": (("low", "high"), "low < high", lambda a, b: a < b, lambda u, a, b: a + u * (b - a)),
-    "loguniform": (
-        ("low", "high"),
-        "0 < low < high",
-        lambda a, b: 0 < a < b,
-        lambda u, a, b: np.exp(np.log(a) + u * (np.log(b) - np.log(a))),
-    ),
-    "normal": (("mean", "deviation"), "deviation > 0", lambda _, d: d > 0, _normal),
+DISTRIBUTIONS: dict[str, tuple[tuple[str, ...], str, Callable[..., bool], Callable[..., Any]]] = {
+    "uniform": (("low", "high"), "low < high", operator.lt, lambda u, low, high: low + u * (high - low)),
+    "loguniform": (("low", "high"), "0 < low < high", lambda low, high: 0 < low < high, _loguniform),
+    "normal": (("mean", "deviation"), "deviation > 0", lambda _, width: width > 0, _normal),
     "lognormal": (
         ("log_mean", "log_deviation"),
         "log_deviation > 0",
-        lambda _, d: d > 0,
-        lambda u, m, d: np.exp(_normal(u, m, d)),
+        lambda _, width: width > 0,
+        lambda *given: np.exp(_normal(*given)),
     ),
-    "exponential": (("mean",), "mean > 0", lambda m: m > 0, lambda u, m: -m * np.log1p(-u)),
+    "exponential": (("mean",), "mean > 0", lambda mean: mean > 0, lambda u, mean: -mean * np.log1p(-u)),
     "triangular": (
         ("low", "mode", "high"),
         "low <= mode <= high and low < high",
-        lambda a, m, b: a <= m <= b and a < b,
+        lambda low, mode, high: low <= mode <= high > low,
         _triangular,
     ),
 }

@@ -27,7 +27,7 @@ def lint(
     answer: Answer,
 ) -> None:
     """Look for what is legal in a model but suspicious."""
-    from hsdsl.analysis.lint import Selection, configured
+    from hsdsl.analysis.lint import configured, selected
     from hsdsl.analysis.lint import lint as findings_of
     from hsdsl.analysis.lint.fix import fix as remedy
 
@@ -37,7 +37,7 @@ def lint(
     options = {key: text.split(",") for key, text in (("select", select), ("ignore", ignore)) if text is not None}
 
     def look(path: Path) -> tuple[dict[str, Any], str]:
-        selection = Selection.of(**{**configured(path), **options})
+        selection = selected(**{**configured(path), **options})
         result, remedied = remedy(path, selection) if fix else (findings_of(path, selection), 0)
         shown = report.add(result.findings, result.ignored)
         parts = [f"{count} {what}" for count, what in ((remedied, "fixed"), (len(result.ignored), "ignored")) if count]

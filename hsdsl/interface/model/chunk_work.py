@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.analysis.sweep.dataset import encoded
-from hsdsl.analysis.sweep.manifest import Manifest
-from hsdsl.analysis.sweep.rows import library, refused, table
+from hsdsl.analysis.sweep.manifest import Manifest, library, refused, table
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
 from hsdsl.interface.model.ensemble import NothingToRunError

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.store.sidecar import forget_sidecar
-from hsdsl.analysis.store.table import write_csv
+from hsdsl.analysis.store.table import forget_sidecar, write_csv
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import without_memory
 from hsdsl.engine.execution import Array, RunWarning, Samples, Stop

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 from hsdsl.analysis.sweep import Recording, Sweep, variation
 from hsdsl.analysis.sweep import manifest as manifests
 from hsdsl.analysis.sweep.dataset import Run, damaged, run_here, write_chunk
-from hsdsl.analysis.sweep.manifest import Manifest
-from hsdsl.analysis.sweep.rows import library
+from hsdsl.analysis.sweep.manifest import Manifest, library
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import INITIAL, without_memory

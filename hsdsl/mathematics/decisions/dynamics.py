@@ -101,22 +101,7 @@ class Dynamics:
         placed = placed if holds else sp.Not(placed)
         if len(placed.atoms(sp.core.relational.Relational)) > MOST_COMPARISONS:
             return None
-        clauses = [self._clause(c) for c in sp.Or.make_args(sp.to_dnf(placed, simplify=False))]
-        return [clause for clause in clauses if clause is not None]
-
-    def _clause(self, clause: Any) -> Clause | None:
-        found: list[Constraint] = []
-        for literal in sp.And.make_args(clause):
-            if literal == sp.false:
-                return None
-            if literal == sp.true or isinstance(literal, sp.Ne):
-                continue
-            if isinstance(literal, sp.Eq):
-                found.append(zero(literal.lhs - literal.rhs))
-                continue
-            less, more = (literal.lts, literal.gts)
-            found.append(Constraint(less - more, "< 0" if literal.is_Relational and literal.rel_op in "<>" else "<= 0"))
-        return tuple(found)
+        return alternatives(placed)
 
     def guard(self, edge: Edge, pointing_out: bool = True) -> list[Clause] | None:
         """The guard (M2) as alternatives: on the surface, in the domain, `if` holds, the flow does not point back.
@@ -251,6 +236,23 @@ class Dynamics:
     def _moving(self) -> frozenset[Any]:
         """The inputs that are interpolated between samples: what depends on them has a rate of its own."""
         return frozenset(symbol(given.name) for given in self.system.inputs if given.hold == "linear")
+
+
+def alternatives(condition: Any) -> list[Clause]:
+    """A condition as alternatives: each a list of constraints that hold together."""
+    found: list[Clause] = []
+    for clause in sp.Or.make_args(sp.to_dnf(condition, simplify=False)):
+        literals = sp.And.make_args(clause)
+        if sp.false not in literals:
+            known = (literal for literal in literals if literal != sp.true and not isinstance(literal, sp.Ne))
+            found.append(tuple(map(_constraint, known)))
+    return found
+
+
+def _constraint(literal: Any) -> Constraint:
+    if isinstance(literal, sp.Eq):
+        return zero(literal.lhs - literal.rhs)
+    return Constraint(literal.lts - literal.gts, "< 0" if literal.rel_op in "<>" else "<= 0")
 
 
 def bounding(mode: Mode) -> Iterator[tuple[Surface, Edge | None]]:

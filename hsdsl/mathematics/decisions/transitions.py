@@ -49,53 +49,35 @@ def uncrossed(dynamics: Dynamics, edge: Edge) -> tuple[str, Proof] | None:
         where = "where `if` holds" if edge.condition is not None else "of the mode"
         return f"its surface does not meet the domain {where}", proof
     cut = pieces(residual, dynamics.flow(mode))
-    found = [_Part(proof, piece, domain, inside).outcome() for piece in cut] if cut else [None]
+    found = [_outcome(proof, piece, domain, inside) for piece in cut] if cut else [None]
     if None in found:
         return None
     along = " or runs along it" if "along" in found else ""
     return f"wherever its surface meets the domain, the flow points back inside{along}", proof
 
 
-@dataclass(frozen=True)
-class _Part:
-    """The surface of an edge on one piece."""
-
-    proof: Proof
-    piece: SmoothPiece
-    domain: Clause
-    inside: list[Clause]
-
-    def outcome(self) -> str | None:
-        """Say what the flow does wherever the surface is met: ``inward`` or ``along``; None where it may go out."""
-        dynamics, piece = self.proof.dynamics, self.piece
-        surface = [(zero(piece.residual), *clause, *piece.closed) for clause in self.inside]
-        for expr in (piece.residual, *piece.flow.values()):
-            broken = breaks(expr)
-            if broken is None or not all(self.proof.never(surface, *clause) for clause in broken):
-                return None
-        expr, first = piece.residual, None
-        for _ in range(DEEPEST):
-            expr = dynamics.along(expr, piece.flow)
-            if expr is None or not self.proof.never(surface, positive(expr)):
-                return None
-            surface = [(*clause, zero(expr)) for clause in surface]
-            if self.proof.never(surface):
-                return "inward"
-            first = expr if first is None else first
-            if expr.is_zero or not self._within(surface):
-                break
-        return "along" if self._attracts(surface, first) else None
-
-    def _within(self, surface: list[Clause]) -> bool:
-        """Whether the piece goes on around every point of the surface where r' = 0."""
-        return all(self.proof.never(surface, zero(side)) for side in (*self.piece.sides, *self.piece.zeros))
-
-    def _attracts(self, surface: list[Clause], first: Any) -> bool:
-        """Whether r falls, or stays, wherever it is positive, and nothing else ends the domain where r' = 0."""
-        if not all(self.proof.never(surface, zero(other.expr)) for other in self.domain):
-            return False
-        beyond = (*self.domain, *self.piece.closed, positive(self.piece.residual), positive(first))
-        return self.proof.never([beyond])
+def _outcome(proof: Proof, piece: SmoothPiece, domain: Clause, inside: list[Clause]) -> str | None:
+    """Say what the flow does on a piece where the surface is met: ``inward``, ``along``; None where it may go out."""
+    surface = [(zero(piece.residual), *clause, *piece.closed) for clause in inside]
+    for expr in (piece.residual, *piece.flow.values()):
+        broken = breaks(expr)
+        if broken is None or not all(proof.never(surface, *clause) for clause in broken):
+            return None
+    expr, first = piece.residual, None
+    for _ in range(DEEPEST):
+        expr = proof.dynamics.along(expr, piece.flow)
+        if expr is None or not proof.never(surface, positive(expr)):
+            return None
+        surface = [(*clause, zero(expr)) for clause in surface]
+        if proof.never(surface):
+            return "inward"
+        first = expr if first is None else first
+        if expr.is_zero or not all(proof.never(surface, zero(end)) for end in (*piece.sides, *piece.zeros)):
+            break
+    if not all(proof.never(surface, zero(other.expr)) for other in domain):
+        return None  # something else ends the domain where r' = 0
+    beyond = (*domain, *piece.closed, positive(piece.residual), positive(first))
+    return "along" if proof.never([beyond]) else None  # r falls, or stays, wherever it is positive
 
 
 def fires(dynamics: Dynamics, edge: Edge, *more: Constraint) -> Answer:
@@ -314,8 +296,7 @@ def commute(dynamics: Dynamics, first: Edge, second: Edge, overlaps: Sequence[Cl
     return proof
 
 
-@dataclass(frozen=True)
-class Arrival:
+class Arrival(NamedTuple):
     """A mode, and its states as expressions of those before."""
 
     mode: Mode
