@@ -169,10 +169,6 @@ def _mapping_or_not(value: Any) -> str:
     return "<mapping>" if isinstance(value, dict) else "<expression>"
 
 
-def _kind_of_samples(value: Any) -> str:
-    return "<list>" if isinstance(value, list) else _mapping_or_not(value)
-
-
 def _kind_of_input(value: Any) -> str:
     if not isinstance(value, dict):
         return "<expression>"
@@ -367,7 +363,7 @@ class MultiplesDocument(Document):
 
 Samples = Annotated[
     AsExpression | Annotated[Items[Expression], Tag("<list>")] | Annotated[MultiplesDocument, Tag("<mapping>")],
-    Discriminator(_kind_of_samples),
+    Discriminator(lambda value: "<list>" if isinstance(value, list) else _mapping_or_not(value)),
 ]
 
 
@@ -543,13 +539,9 @@ class AutomatonFile(Document):
     )
 
 
-def _kind_of_automaton(value: Any) -> str:
-    return "<file>" if isinstance(value, dict) and "file" in value else "<mapping>"
-
-
 Automaton = Annotated[
     Annotated[AutomatonDocument, Tag("<mapping>")] | Annotated[AutomatonFile, Tag("<file>")],
-    Discriminator(_kind_of_automaton),
+    Discriminator(lambda value: "<file>" if isinstance(value, dict) and "file" in value else "<mapping>"),
 ]
 
 

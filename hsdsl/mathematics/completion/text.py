@@ -243,12 +243,9 @@ def _transition(edge: Edge) -> dict[str, str]:
 
 
 def _flow(mode: Mode) -> dict[str, str]:
-    return {name: text_of(_reduced(f)) for name, f in zip(mode.states, mode.flow, strict=True)}
-
-
-def _reduced(value: sp.Expr) -> sp.Expr:
-    """The same expression, with common factors cancelled where that is cheap and makes it shorter."""
-    return value if value.count_ops() > LONG else min((value, sp.cancel(value)), key=sp.count_ops)
+    """The flow as text, with common factors cancelled where that is cheap and makes it shorter."""
+    pairs = [(f, f if f.count_ops() > LONG else sp.cancel(f)) for f in mode.flow]
+    return {name: text_of(min(pair, key=sp.count_ops)) for name, pair in zip(mode.states, pairs, strict=True)}
 
 
 def _rest(mode: Mode, system: HybridSystem) -> Iterator[str]:
