@@ -17,11 +17,11 @@ import sympy as sp
 
 from hsdsl.base.functions import atan2, below, floor, sign
 from hsdsl.language.expression.algebra import lie_derivative
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
 from hsdsl.mathematics.completion.contact import zero_surface
 from hsdsl.mathematics.completion.nearby import cancelled, slopes_of_inputs
-from hsdsl.mathematics.completion.printer import text_of
 
 PART = sp.Rational(1, 1024)  # of the run: a surface's size alone, zero where all states in it are, bounds no rate
 JUMP = sp.Rational(1, 2**26)  # of the size of a surface: the root of the round-off; steps leave it by less

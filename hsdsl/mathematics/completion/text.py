@@ -14,13 +14,13 @@ import sympy as sp
 
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.source import Mapping, Node, Text, child
-from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
+from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
 from hsdsl.mathematics.completion.contact import Contact, contact
 from hsdsl.mathematics.completion.nearby import LONG, Slopes, cancelled, slopes_of_inputs
 from hsdsl.mathematics.completion.overlay import MOST_SETS, depends_on, neighbours
-from hsdsl.mathematics.completion.printer import inequality, text_of, wall
 from hsdsl.mathematics.completion.sliding import Sliding, slidings, with_entries
 
 WIDTH, INDENT = 120, 6  # of a line, and of the transitions in a mode that is written
@@ -225,6 +225,22 @@ def _onto_guard(mode: Mode, found: Contact, depth: sp.Expr = sp.S.Zero) -> tuple
     slopes = [sp.diff(r, symbol(name)) for name in mode.states]
     size = sum(slope**2 for slope in slopes)
     return tuple(cancelled(x - off * slope / size) for x, slope in zip(found.landing, slopes, strict=True))
+
+
+def inequality(surface: Surface) -> str:
+    """The text of a guard."""
+    return _between(surface, ">=", "<=")
+
+
+def wall(surface: Surface) -> str:
+    """The text of a wall, whose surface is negative where the inequality holds."""
+    return _between(surface, "<=", ">=")
+
+
+def _between(surface: Surface, of_difference: str, otherwise: str) -> str:
+    """The sides of a surface, with the sign for a residual that is their difference or with the other one."""
+    sign = of_difference if surface.residual == surface.left - surface.right else otherwise
+    return f"{text_of(surface.left)} {sign} {text_of(surface.right)}"
 
 
 def _transition(edge: Edge) -> dict[str, str]:

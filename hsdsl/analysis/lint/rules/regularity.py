@@ -10,9 +10,9 @@ from hsdsl.analysis.lint.finding import Alike, Finding, Severity
 from hsdsl.analysis.lint.source_expressions import SourceExpression
 from hsdsl.analysis.lint.subject import Subject
 from hsdsl.base.names import shown
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import Mode
-from hsdsl.mathematics.completion.printer import text_of
 from hsdsl.mathematics.decisions.dynamics import Clause, Dynamics
 from hsdsl.mathematics.decisions.question import UNKNOWN, Answer, Constraint, positive, zero
 from hsdsl.mathematics.decisions.singularities import divisors, infinite_slopes, jumps, kinks, without_value
