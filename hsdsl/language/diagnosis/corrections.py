@@ -109,19 +109,15 @@ def _below_empty(parent: Mapping, fields: frozenset[str], findings: Findings) ->
     for key, value in parent:
         if key in fields:
             section = str(key) if key in _SECTIONS and is_empty(value) else ""
-        elif section and (isinstance(value, Scalar) or section in _OF_MAPPINGS) and not _misnamed(key, parent, fields):
-            below.setdefault(section, []).append(key)
+        elif section and (isinstance(value, Scalar) or section in _OF_MAPPINGS):
+            lacking = _REQUIRED & fields - set(parent.entries)  # it may rather be a field by another name
+            if fields.isdisjoint(OTHER_NAMES.get(key, ())) and closest(key, lacking) is None:
+                below.setdefault(section, []).append(key)
     for section, strays in below.items():
         inner = Mapping({}, parent.entries[section][0].place)
         parent.entries[section] = (parent.entries[section][0], inner)
         message = f"`{shown(strays[0])}` is at the level of `{section}`, which is empty"
         _move(parent, strays, inner, message, f"under `{section}`", findings)
-
-
-def _misnamed(key: str, parent: Mapping, fields: frozenset[str]) -> bool:
-    """Whether a key is rather a field of the mapping by another name: another tool's, or a required one misspelt."""
-    lacking = _REQUIRED & fields - set(parent.entries)
-    return not fields.isdisjoint(OTHER_NAMES.get(key, ())) or closest(key, lacking) is not None
 
 
 def _among_modes(modes: Mapping, findings: Findings) -> None:
@@ -355,22 +351,19 @@ def _correct_spelling(root: Mapping, modes: Mapping, findings: Findings) -> None
     for name, mode in modes:
         flow = child(mode, "flow")
         alone = [key for key in keys(flow) if counts[str(key)] == 1 and is_identifier(key)]
-        if alone and isinstance(flow, Mapping):
-            words = (word for part in _expressions(mode) for word in _words(part))
-            used = dict.fromkeys((*given.get(str(name), ()), *words))
-            here = known.union(map(str, keys(flow)), _defined(mode))
-            unknown = [word for word in used if counts[word] > 1 and word not in here]
-            _rename(flow, alone, unknown, str(name), findings)
-
-
-def _rename(flow: Mapping, alone: list[Key], unknown: list[str], mode: str, findings: Findings) -> None:
-    for key in alone:
-        meant = closest(key, unknown)
-        if meant is not None:
-            unknown.remove(meant)
-            message = f"the flow of '{shown(mode)}' says '{shown(key)}', and the rest of the model '{shown(meant)}'"
-            findings.add(key.place.diagnostic("HS111", message, f"did you mean '{shown(meant)}'?"))
-            flow.rename(str(key), meant)
+        if not alone or not isinstance(flow, Mapping):
+            continue
+        words = (word for part in _expressions(mode) for word in _words(part))
+        used = dict.fromkeys((*given.get(str(name), ()), *words))
+        here = known.union(map(str, keys(flow)), _defined(mode))
+        unknown = [word for word in used if counts[word] > 1 and word not in here]
+        for key in alone:
+            meant = closest(key, unknown)
+            if meant is not None:
+                unknown.remove(meant)
+                message = f"the flow of '{shown(name)}' says '{shown(key)}', and the rest of the model '{shown(meant)}'"
+                findings.add(key.place.diagnostic("HS111", message, f"did you mean '{shown(meant)}'?"))
+                flow.rename(str(key), meant)
 
 
 def _defined(node: Node) -> Iterator[str]:

@@ -58,28 +58,19 @@ def define_parameter(
     bounds = [symbols.number(s, scope, finite_now=True) if s is not None else None for s in (entry.min, entry.max)]
     if value is None:
         return None, None
-    _check_bounds(symbols, name, scalar, value, *bounds)
-    least, most = (None if bound is None else bound.expr for bound in bounds)
-    parameter = Parameter(name, value.expr, scalar.value, None, least, most, symbols.text(entry.about))
-    return Value(symbol(name), value.number), parameter
-
-
-def _check_bounds(
-    symbols: SymbolTable, name: str, scalar: Scalar, value: Value, least: Value | None, most: Value | None
-) -> None:
+    least, most = bounds
     message, hint = None, None
     if least is not None and most is not None and least.number > most.number:
         message, hint = f"the least value of '{name}' is above its largest", "exchange `min` and `max`"
     elif least is not None and value.number < least.number:
-        message = f"'{name}' is {_number(value)}, below its least value {_number(least)}"
+        message = f"'{name}' is {float(value.number):.6g}, below its least value {float(least.number):.6g}"
     elif most is not None and value.number > most.number:
-        message = f"'{name}' is {_number(value)}, above its largest value {_number(most)}"
+        message = f"'{name}' is {float(value.number):.6g}, above its largest value {float(most.number):.6g}"
     if message:
         symbols.report(scalar.place, "HS309", message, hint)
-
-
-def _number(value: Value) -> str:
-    return f"{float(value.number):.6g}"
+    low, high = (None if bound is None else bound.expr for bound in bounds)
+    parameter = Parameter(name, value.expr, scalar.value, None, low, high, symbols.text(entry.about))
+    return Value(symbol(name), value.number), parameter
 
 
 def define_lets(symbols: SymbolTable) -> None:

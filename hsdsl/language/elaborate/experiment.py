@@ -98,15 +98,21 @@ def elaborate_experiment(symbols: SymbolTable) -> Experiment:
     end = symbols.parameter_scope(sentence, "to end with an event, let a transition lead to a mode with final: true")
     method = document.method  # checked where methods are known, with its place
     until = _setting(symbols, end, "until", document.until)
-    given = document.samples
+    given: Any = document.samples
     every = given.every if isinstance(given, MultiplesDocument) else None
+    samples: Any = None if every else given
+    if isinstance(given, list):
+        times = [symbols.number(scalar, scope, finite_now=True) for scalar in given]
+        samples = tuple(time.expr for time in times if time is not None)
+    elif samples is not None:
+        samples = _setting(symbols, scope, "samples", samples)
     numbers = {key: _setting(symbols, scope, key, getattr(document, key)) for key in (*_OWN, "max_transitions")}
     return Experiment(
         until=until,
         scheme=symbols.text(document.scheme),
         completion=symbols.text(document.completion),
         method=Key.at(method.value, method.place) if method and method.value != ABSENT else None,
-        samples=None if every else _samples(symbols, scope, given),
+        samples=samples,
         every=_setting(symbols, scope, "every", every),
         scale=_scale(symbols, scope, document.scale),
         **numbers,
@@ -148,13 +154,6 @@ def _scale(symbols: SymbolTable, scope: Scope, given: dict[Key, Scalar]) -> tupl
             symbols.report(key.place, "HS322", f"the model has no state '{shown(key)}'", meant(key, states))
     sizes = {str(key): _setting(symbols, scope, f"scale.{key}", scalar) for key, scalar in given.items()}
     return tuple((name, size) for name, size in for_all(sizes, states).items() if size is not None)
-
-
-def _samples(symbols: SymbolTable, scope: Scope, given: Any) -> Any:
-    if not isinstance(given, list):
-        return _setting(symbols, scope, "samples", given)
-    values = [symbols.number(scalar, scope, finite_now=True) for scalar in given]
-    return tuple(v.expr for v in values if v is not None)
 
 
 _WORDS = ("initial.mode", "experiment.scheme", "experiment.method")

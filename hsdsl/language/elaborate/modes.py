@@ -307,8 +307,13 @@ def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
         return None
     if label.value in symbols.document.modes:
         return label.value
-    if symbols.parts:
-        return _product(symbols, label)
+    if symbols.parts:  # then it names a product mode
+        try:
+            numbers_of(symbols.parts, label.value)
+        except ValueError as problem:
+            symbols.report(label.place, "HS303", f"there is no mode '{shown(label.value)}': {problem}")
+            return None
+        return label.value
     message = f"there is no mode '{shown(label.value)}'"
     guarded = _GUARDED.fullmatch(label.value)
     hint = did_you_mean(label.value, symbols.document.modes)
@@ -316,16 +321,6 @@ def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
         hint = f"write {guarded.group(1)} alone, and if: {shown(guarded.group(2))}"
     symbols.report(label.place, "HS303", message, hint)
     return None
-
-
-def _product(symbols: SymbolTable, label: Scalar) -> str | None:
-    """The product mode that a label names."""
-    try:
-        numbers_of(symbols.parts, label.value)
-    except ValueError as problem:
-        symbols.report(label.place, "HS303", f"there is no mode '{shown(label.value)}': {problem}")
-        return None
-    return label.value
 
 
 def _check_reset(

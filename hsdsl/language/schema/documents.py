@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, cast
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from hsdsl.base.defaults import MOST_WAITING
-from hsdsl.base.errors import Findings
 from hsdsl.base.names import did_you_mean, shown
 from hsdsl.language.schema.fields import (
     AnyKey,
@@ -43,7 +42,7 @@ from hsdsl.language.schema.fields import (
     required,
     shaped_as_list,
 )
-from hsdsl.language.source.nodes import ABSENT, Mapping, Node, Scalar, Sequence, absent, keys
+from hsdsl.language.source.nodes import ABSENT, Mapping, Node, Scalar, Sequence, absent
 
 KINDS = ("point", "line", "circle", "spring", "box")
 
@@ -167,10 +166,6 @@ Shape = Annotated[
 
 def _mapping_or_not(value: Any) -> str:
     return "<mapping>" if isinstance(value, dict) else "<expression>"
-
-
-def _kind_of_samples(value: Any) -> str:
-    return "<list>" if isinstance(value, list) else _mapping_or_not(value)
 
 
 def _kind_of_input(value: Any) -> str:
@@ -367,7 +362,7 @@ class MultiplesDocument(Document):
 
 Samples = Annotated[
     AsExpression | Annotated[Items[Expression], Tag("<list>")] | Annotated[MultiplesDocument, Tag("<mapping>")],
-    Discriminator(_kind_of_samples),
+    Discriminator(lambda value: "<list>" if isinstance(value, list) else _mapping_or_not(value)),
 ]
 
 
@@ -543,13 +538,9 @@ class AutomatonFile(Document):
     )
 
 
-def _kind_of_automaton(value: Any) -> str:
-    return "<file>" if isinstance(value, dict) and "file" in value else "<mapping>"
-
-
 Automaton = Annotated[
     Annotated[AutomatonDocument, Tag("<mapping>")] | Annotated[AutomatonFile, Tag("<file>")],
-    Discriminator(_kind_of_automaton),
+    Discriminator(lambda value: "<file>" if isinstance(value, dict) and "file" in value else "<mapping>"),
 ]
 
 
@@ -638,17 +629,3 @@ def plain(node: Node) -> Any:
     if isinstance(node, Mapping):
         return {key: plain(value) for key, value in node}
     return [plain(item) for item in node.items] if isinstance(node, Sequence) else node
-
-
-def read(root: Node, findings: Findings) -> ModelDocument:
-    """The document of a YAML file; of one with faults, which go to ``findings``, what can still be read.
-
-    Raises ModelError: when too little is left to be called a model.
-    """
-    kind = SystemDocument if {"system", "automata"} & set(map(str, keys(root))) else ModelDocument
-    try:
-        return kind.model_validate(plain(root))
-    except ValidationError:
-        from hsdsl.language.diagnosis.documents import recovered
-
-        return recovered(root, findings, kind)

@@ -53,28 +53,23 @@ def _single(value: Any, expected: str) -> Scalar:
     return value
 
 
-def _expression(value: Any, kind: str = "a number or an expression") -> Scalar:
-    if isinstance(value, (dict, list)):
-        raise _unexpected("an expression", value)
-    if is_empty(value):
-        raise refuse("HS121", f"{kind} is missing here", kind)
-    return _single(value, "an expression")
+def _expressed(kind: str, listed: str = "an expression") -> Callable[[Any], Scalar]:
+    """A validator for an expression of a kind; ``listed`` is what a list of them should have been."""
+
+    def check(value: Any) -> Scalar:
+        if isinstance(value, (dict, list)):
+            raise _unexpected(listed if isinstance(value, list) else "an expression", value)
+        if is_empty(value):
+            raise refuse("HS121", f"{kind} is missing here", kind)
+        return _single(value, "an expression")
+
+    return check
 
 
-def _condition(value: Any) -> Scalar:
-    if isinstance(value, list):
-        raise _unexpected("a condition", value)
-    return _expression(value, "a condition, such as v > 0")
-
-
-def _inequality(value: Any) -> Scalar:
-    if isinstance(value, list):
-        raise _unexpected("one inequality", value)
-    return _expression(value, "an inequality, such as x >= 1")
-
-
-def _equation(value: Any) -> Scalar:
-    return _expression(value, "an equation, such as m*a == force")
+_expression = _expressed("a number or an expression")
+_condition = _expressed("a condition, such as v > 0", "a condition")
+_inequality = _expressed("an inequality, such as x >= 1", "one inequality")
+_equation = _expressed("an equation, such as m*a == force")
 
 
 def _text(value: Any) -> Scalar | None:

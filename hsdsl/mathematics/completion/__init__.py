@@ -2,8 +2,7 @@
 
 `contact` is motion along the guard of an edge that leads back to its own mode, the limit of ever faster transitions;
 `nearby` has what it depends on. `overlay` has the motions of all edges of a mode in one, also along several guards.
-`sliding` is motion on a surface that two modes press on. `text` writes these into a model file, with expressions by
-`printer`.
+`sliding` is motion on a surface that two modes press on. `text` writes these into a model file.
 """
 
 from __future__ import annotations

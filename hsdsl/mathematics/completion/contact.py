@@ -21,6 +21,7 @@ from sympy.core.relational import Relational
 from hsdsl.base.functions import absolute, maximum, minimum, power, rewritten, sign
 from hsdsl.base.names import memory, without_memory
 from hsdsl.language.expression.algebra import derivative, lie_derivative
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.system import TIME, Edge, Mode, Surface
 from hsdsl.mathematics.completion.nearby import (
     NO_SLOPES,
@@ -42,7 +43,6 @@ from hsdsl.mathematics.completion.nearby import (
     symbols,
     value_at,
 )
-from hsdsl.mathematics.completion.printer import text_of
 
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
 

@@ -14,13 +14,13 @@ import sympy as sp
 
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.source import Mapping, Node, Text, child
-from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
+from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
 from hsdsl.mathematics.completion.contact import Contact, contact
 from hsdsl.mathematics.completion.nearby import LONG, Slopes, cancelled, slopes_of_inputs
 from hsdsl.mathematics.completion.overlay import MOST_SETS, depends_on, neighbours
-from hsdsl.mathematics.completion.printer import inequality, text_of, wall
 from hsdsl.mathematics.completion.sliding import Sliding, slidings, with_entries
 
 WIDTH, INDENT = 120, 6  # of a line, and of the transitions in a mode that is written
@@ -227,6 +227,22 @@ def _onto_guard(mode: Mode, found: Contact, depth: sp.Expr = sp.S.Zero) -> tuple
     return tuple(cancelled(x - off * slope / size) for x, slope in zip(found.landing, slopes, strict=True))
 
 
+def inequality(surface: Surface) -> str:
+    """The text of a guard."""
+    return _between(surface, ">=", "<=")
+
+
+def wall(surface: Surface) -> str:
+    """The text of a wall, whose surface is negative where the inequality holds."""
+    return _between(surface, "<=", ">=")
+
+
+def _between(surface: Surface, of_difference: str, otherwise: str) -> str:
+    """The sides of a surface, with the sign for a residual that is their difference or with the other one."""
+    sign = of_difference if surface.residual == surface.left - surface.right else otherwise
+    return f"{text_of(surface.left)} {sign} {text_of(surface.right)}"
+
+
 def _transition(edge: Edge) -> dict[str, str]:
     """The fields of a transition; one with the name that it would have anyway gets none."""
     fields = {} if "->" in edge.name else {"name": edge.name}
@@ -243,12 +259,9 @@ def _transition(edge: Edge) -> dict[str, str]:
 
 
 def _flow(mode: Mode) -> dict[str, str]:
-    return {name: text_of(_reduced(f)) for name, f in zip(mode.states, mode.flow, strict=True)}
-
-
-def _reduced(value: sp.Expr) -> sp.Expr:
-    """The same expression, with common factors cancelled where that is cheap and makes it shorter."""
-    return value if value.count_ops() > LONG else min((value, sp.cancel(value)), key=sp.count_ops)
+    """The flow as text, with common factors cancelled where that is cheap and makes it shorter."""
+    pairs = [(f, f if f.count_ops() > LONG else sp.cancel(f)) for f in mode.flow]
+    return {name: text_of(min(pair, key=sp.count_ops)) for name, pair in zip(mode.states, pairs, strict=True)}
 
 
 def _rest(mode: Mode, system: HybridSystem) -> Iterator[str]:

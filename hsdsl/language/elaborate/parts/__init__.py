@@ -24,7 +24,7 @@ from hsdsl.language.expression.algebra import NO_VALUE, ZERO, whole
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state
 from hsdsl.language.schema.documents import PartModeDocument, SystemDocument
 from hsdsl.language.source import Key
-from hsdsl.language.system import Initial, Mode, Parameter, Shape, started
+from hsdsl.language.system import Initial, Mode, Parameter, started
 
 __all__ = ["FINAL", "MODE", "Parts"]
 
@@ -45,7 +45,11 @@ class Parts:
 
     def __init__(self, symbols: SymbolTable, document: SystemDocument) -> None:
         self.symbols = symbols
-        self._refuse_modes(document)
+        for key in ("modes", "initial"):
+            if key in document.model_fields_set and getattr(document, key):
+                place = next(iter(document.modes)).place if key == "modes" else document.initial.mode.place
+                message = f"a model has either `modes` or a `system`; here is `{key}` besides `system`"
+                symbols.report(place, "HS353", message, "give the parts their modes and initial values")
         self.roster = roster_of(symbols, document)
         self.board = Board(symbols, self.roster, {str(key): scalar for key, scalar in document.let.items()})
         instances = self.roster.instances.values()
@@ -61,8 +65,8 @@ class Parts:
         self._solve(document)
         self.outputs, values = self._outputs(document)
         symbols.all_outputs = self.outputs
-        self.scene: tuple[Shape, ...]
-        self.scene, scene = self._scene()
+        self.scene, numbers = elaborate_scene(symbols, Names(self.board, lenient=True).scope)
+        scene = tuple(0 if scalar is None else value and value.expr for scalar, value in numbers)
         self._check_lets(document)
         self.modes: tuple[Mode, ...] = composed(self.board, values, scene)
         for k, part in enumerate(self.parts):
@@ -98,14 +102,6 @@ class Parts:
         self.board.forget()
         unknowns = dict.fromkeys(map(str, solve.unknowns))
         values |= unknowns if found is None else with_solutions(placeholders(solve), found)
-
-    def _refuse_modes(self, document: SystemDocument) -> None:
-        """Report `modes` or `initial` next to a system."""
-        for key in ("modes", "initial"):
-            if key in document.model_fields_set and getattr(document, key):
-                place = next(iter(document.modes)).place if key == "modes" else document.initial.mode.place
-                message = f"a model has either `modes` or a `system`; here is `{key}` besides `system`"
-                self.symbols.report(place, "HS353", message, "give the parts their modes and initial values")
 
     def _parameters_of(self, one: Instance) -> list[Parameter]:
         """The parameters of an instance: those that are given to it, else those of its automaton."""
@@ -150,12 +146,6 @@ class Parts:
                 return None
             values.append(value)
         return self.board.picked(one, values)
-
-    def _scene(self):
-        """The shapes of the file, and their numbers."""
-        scope = Names(self.board, lenient=True).scope
-        shapes, numbers = elaborate_scene(self.symbols, scope)
-        return shapes, tuple(0 if scalar is None else value and value.expr for scalar, value in numbers)
 
     def _check_lets(self, document: SystemDocument) -> None:
         """Work out every `let`, also those that nothing uses."""
