@@ -1,4 +1,4 @@
-"""``hsdsl run``: simulate a model, summarise the run, and save it."""
+"""``hsdsl run``: simulate a model, summarise the run, save it and draw it."""
 
 from __future__ import annotations
 
@@ -12,17 +12,29 @@ from typer import Exit, Option
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
 from hsdsl.base.names import visible
-from hsdsl.base.progress import running
+from hsdsl.base.progress import counted, running
 from hsdsl.engine import ahead
 from hsdsl.interface.cli.console import progress, say
-from hsdsl.interface.cli.options import Answer, EngineName, Experiment, Model, Phases, option
-from hsdsl.interface.cli.shown import needed, shown_of, write_film
-from hsdsl.interface.cli.texts import PICTURES, STATE, check_target, known_names, pairs_of
+from hsdsl.interface.cli.options import (
+    PICTURES,
+    STATE,
+    Answer,
+    EngineName,
+    Experiment,
+    Model,
+    Phases,
+    check_target,
+    known_names,
+    option,
+    pairs_of,
+)
 from hsdsl.language.files import ModelFiles, read_bytes
 
 if TYPE_CHECKING:
     from hsdsl.engine.execution import Execution, Stop
+    from hsdsl.interface.model import Model
     from hsdsl.interface.model.stream import Streamed
+
 
 STOPPED = 3
 PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
@@ -191,3 +203,38 @@ def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
         },
         "seconds": {"simulate": run.seconds},
     }
+
+
+def shown_of(
+    model: Model,
+    names: list[str] | None,
+    pairs: list[tuple[str, str]] | None,
+    plot: Path | None,
+    animate: Path | None,
+    speed: float | None,
+) -> dict[str, Any]:
+    """What of the run is shown; refuse what cannot be drawn before the run."""
+    if pairs is not None and plot is None:
+        raise UsageError("--phase is for a picture: give --plot FILE too")
+    if speed is not None and animate is None:
+        raise UsageError("--speed is of a film: give --animate FILE too")
+    if animate is not None:
+        from hsdsl.analysis.plot.animation import check
+
+        check(animate)
+        model.check_scene()
+    return {"columns": names, "phases": pairs}
+
+
+def needed(shown: dict[str, Any]) -> list[str] | None:
+    """The states and outputs that files and pictures need; None for all."""
+    if shown["columns"] is None:
+        return None
+    return [*shown["columns"], *(name for pair in shown["phases"] or () for name in pair)]
+
+
+def write_film(model: Model, path: Path, speed: float | None, settings: dict[str, Any], quiet: bool) -> None:
+    """Write the film."""
+    with progress(quiet) as show:
+        model.animate(path, speed=speed, progress=counted(show, "frames"), **(settings | {"watch": None}))
+    say(f"wrote {path}")
