@@ -201,7 +201,7 @@ def stability(
 
 
 def _report_map(found: Any, out: Path | None, plot: Path | None, answer: Answer) -> None:
-    from hsdsl.interface.chart.stability.table import as_csv, as_plain, as_text
+    from hsdsl.interface.chart.stability import as_csv, as_plain, as_text
 
     write_table(out, lambda: as_csv(found))
     if plot is not None:
