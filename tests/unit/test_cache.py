@@ -23,9 +23,9 @@ from engines import alike, needs_compiler
 
 import hsdsl
 from hsdsl.base import cache
+from hsdsl.base.atomic import is_locked
 from hsdsl.base.errors import ModelError
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.base.unfinished import is_locked
 from hsdsl.engine.runtime import kernel, library
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.language.files import ModelFiles

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from engines import needs_compiler
 
-from hsdsl.base.numbers.bernstein import around_middle, from_powers
+from hsdsl.base.numbers.enclosures import around_middle, from_powers
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.compiler import FLAGS, find_compiler
 from hsdsl.engine.simulate.verdict import expansions

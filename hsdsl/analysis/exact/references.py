@@ -14,8 +14,8 @@ from typing import Any, Protocol
 
 from hsdsl.analysis.exact.residual import residual
 from hsdsl.analysis.store import load
-from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_arguments
 from hsdsl.engine.execution import Execution, Point
 from hsdsl.mathematics.program import Program
 

@@ -13,8 +13,7 @@ from hsdsl.analysis.fitting.data import Measurements
 from hsdsl.analysis.report.alike import condensed
 from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import number
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called, counted, visible
+from hsdsl.base.names import called, checks_methods, counted, visible
 from hsdsl.engine.execution import Array, Execution
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hsdsl.analysis.metrics.rounding import UNIT
-from hsdsl.base.numbers.bernstein import from_powers
+from hsdsl.base.numbers.enclosures import from_powers
 from hsdsl.engine.execution import Array
 
 

@@ -11,7 +11,7 @@ from hsdsl.analysis.metrics.geometry import Array, Space
 from hsdsl.analysis.metrics.interval import CERTIFIED, INFINITE, SAMPLED, SEARCHED, Interval, up_to_hops
 from hsdsl.analysis.metrics.routes import Route
 from hsdsl.analysis.metrics.search import TOLERANCE, End, SearchResult
-from hsdsl.base.calls import checks_methods
+from hsdsl.base.names import checks_methods
 
 ROUNDING = 16 * 2.0**-53  # of a few sums, relative to themselves
 CLOSED = 1e-9  # relative: such a gap counts as none

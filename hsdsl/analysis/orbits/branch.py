@@ -14,8 +14,7 @@ from hsdsl.analysis.orbits.continuation import Bifurcation, Point
 from hsdsl.analysis.orbits.orbit import Orbit
 from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import number
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called
+from hsdsl.base.names import called, checks_methods
 from hsdsl.engine.execution import Array
 
 

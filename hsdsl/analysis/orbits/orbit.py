@@ -10,8 +10,7 @@ import numpy as np
 
 from hsdsl.analysis.orbits.shooting import Closed
 from hsdsl.analysis.sensitivity.result import Sensitivity
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called
+from hsdsl.base.names import called, checks_methods
 from hsdsl.engine.execution import Array, Execution
 
 LEAST_MARGIN = 1e-8  # multipliers are not known better than this

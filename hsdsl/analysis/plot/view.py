@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from hsdsl.analysis.plot.curves import GuardLine
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import SINCE, did_you_mean, without_memory
+from hsdsl.base.names import SINCE, checks_methods, did_you_mean, without_memory
 from hsdsl.base.numbers.decimals import number_of
 from hsdsl.engine.execution import Execution
 from hsdsl.mathematics.program import ModeProgram, Program

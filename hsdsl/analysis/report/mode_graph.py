@@ -9,7 +9,7 @@ from html import escape
 from hsdsl.analysis.report.graph_layout import STUB, Box, Layout, Line, laid_out
 from hsdsl.analysis.report.visited import as_written, visited_part
 from hsdsl.base.names import shown, visible, without_memory
-from hsdsl.base.written import event_text
+from hsdsl.base.parts import event_text
 from hsdsl.engine.execution import Execution
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 

@@ -9,7 +9,7 @@ from hsdsl.analysis.report import mode_graph
 from hsdsl.analysis.report.mathml import Mathematics
 from hsdsl.analysis.report.visited import visited_part
 from hsdsl.base.names import called, counted, shown, visible_lines, without_memory
-from hsdsl.base.written import written_edges, written_modes
+from hsdsl.base.parts import written_edges, written_modes
 from hsdsl.language.elaborate.functions import named_functions
 from hsdsl.language.expression.scope import state
 from hsdsl.language.system import Edge, HybridSystem, Mode

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from hsdsl.base.written import inner_modes, written_edges
+from hsdsl.base.parts import inner_modes, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 

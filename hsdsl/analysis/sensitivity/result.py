@@ -23,7 +23,7 @@ from hsdsl.analysis.sensitivity.state_names import (
 )
 from hsdsl.analysis.sensitivity.ties import Tie, ties
 from hsdsl.analysis.sensitivity.touching import touched
-from hsdsl.base.calls import checks_methods
+from hsdsl.base.names import checks_methods
 from hsdsl.base.parts import numbered, present, product_name
 from hsdsl.engine.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.engine.simulate import Prepared

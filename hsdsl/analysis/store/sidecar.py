@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 from hsdsl.analysis.report import as_json, dumps
-from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_arguments
 from hsdsl.engine.execution import Execution, Samples
 
 FORMAT, VERSION = "hsdsl table", 2  # sidecars of version 1 name neither

@@ -20,9 +20,8 @@ from hsdsl.analysis.sweep import manifest as manifests
 from hsdsl.analysis.sweep.manifest import Manifest
 from hsdsl.analysis.sweep.rows import TAG, column_of, library, schema
 from hsdsl.base.atomic import replacing
-from hsdsl.base.calls import checks_arguments, checks_methods
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import called, did_you_mean, visible
+from hsdsl.base.names import called, checks_arguments, checks_methods, did_you_mean, visible
 from hsdsl.engine.execution import Array
 
 

@@ -9,10 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called, visible
-from hsdsl.base.shown import shown
+from hsdsl.base.names import called, checks_methods, visible
 from hsdsl.engine.execution.parts import COMPLETE
+from hsdsl.engine.execution.records import shown
 from hsdsl.engine.execution.run import Execution
 from hsdsl.engine.execution.samples import Array
 

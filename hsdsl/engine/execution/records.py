@@ -1,9 +1,10 @@
-"""Records: frozen dataclasses with fields made on first use, and equality of recorded data."""
+"""Records: frozen dataclasses with fields made on first use, equality of recorded data, and how it shows itself."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
+from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -51,6 +52,20 @@ class Deferred:
     def __getstate__(self) -> dict[str, Any]:
         """Give every field: what makes them does not travel."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # pyright: ignore[reportArgumentType]
+
+
+# how runs show and save themselves: functions of the analysis; their data does not import its pictures
+HOMES = {
+    "axes": "hsdsl.analysis.plot",
+    "ensemble_html": "hsdsl.analysis.plot.notebook",
+    "run_html": "hsdsl.analysis.plot.notebook",
+    "save": "hsdsl.analysis.store",
+}
+
+
+def shown(name: str, *given: Any, **options: Any) -> Any:
+    """Call the function of this name, imported where it is called."""
+    return getattr(import_module(HOMES[name]), name)(*given, **options)
 
 
 def same(a: Any, b: Any) -> bool:

@@ -12,12 +12,10 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import visible, without_memory
-from hsdsl.base.shown import shown
+from hsdsl.base.names import checks_methods, visible, without_memory
 from hsdsl.engine.execution.parts import REASONS, Arc, Point, RunWarning, Stop, Transition, Verdict
-from hsdsl.engine.execution.records import Deferred, same
+from hsdsl.engine.execution.records import Deferred, same, shown
 from hsdsl.engine.execution.samples import Array, Samples
 from hsdsl.engine.execution.sampling import ArcTable, Sampler, Side, evaluate, sample
 

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy.typing as npt
 
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import did_you_mean
+from hsdsl.base.names import checks_methods, did_you_mean
 from hsdsl.engine.execution.records import Deferred
 
 Array = npt.NDArray[Any]

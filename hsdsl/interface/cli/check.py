@@ -12,7 +12,7 @@ from typer import Argument, Exit, Option
 from hsdsl import __version__
 from hsdsl.base.errors import Diagnostic, ModelError, UsageError
 from hsdsl.base.names import counted, did_you_mean, visible
-from hsdsl.base.written import written_edges, written_modes
+from hsdsl.base.parts import written_edges, written_modes
 from hsdsl.interface.cli.console import (
     MODEL_ERRORS,
     WRONG_USAGE,

@@ -16,9 +16,8 @@ from hsdsl.analysis.metrics.curves import CurveDistance
 from hsdsl.analysis.metrics.interval import Interval
 from hsdsl.analysis.metrics.points import SpaceMetric, SpacePoint
 from hsdsl.analysis.metrics.table import CurvePair, between, check_same_model
-from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import called
+from hsdsl.base.names import called, checks_arguments
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import parameters_of

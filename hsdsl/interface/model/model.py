@@ -8,13 +8,12 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.base.calls import checks_arguments, checks_methods
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits
-from hsdsl.base.names import NO_FILE, called, did_you_mean, visible
+from hsdsl.base.names import NO_FILE, called, checks_arguments, checks_methods, did_you_mean, visible
 from hsdsl.base.numbers.arithmetic import FLOAT64
+from hsdsl.base.parts import written_modes
 from hsdsl.base.progress import counted, counted_runs, in_notebook, running
-from hsdsl.base.written import written_modes
 from hsdsl.engine.execution import Ensemble, Execution
 from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import ARGUMENTS, Options, arguments_of, overrides_of

@@ -17,8 +17,7 @@ from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import counted, did_you_mean
 from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
-from hsdsl.base.parts import meant_alone, numbers_of
-from hsdsl.base.written import written_edges
+from hsdsl.base.parts import meant_alone, numbers_of, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline

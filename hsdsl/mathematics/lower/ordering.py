@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from heapq import heapify, heappop, heappush
 
-from hsdsl.base.sparsity import filled
+from hsdsl.base.graphs import filled
 
 LEAST = 16  # unknowns: of fewer the dense elimination, which exchanges rows, is as fast
 SPARSE = 4  # the dense factors have at least so many times as many entries
