@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from hsdsl.engine.execution import Array, Execution, Samples
-from hsdsl.engine.execution.sampling import evaluate
+from hsdsl.engine.execution.run import evaluate
 
 POINTS = 4000  # that a curve should have at least, where its pieces are not straight
 CELLS = 3000  # of the picture's width and height: two points in one cell look like one

@@ -11,8 +11,8 @@ import numpy as np
 
 from hsdsl.base.numbers import decimals
 from hsdsl.engine.execution import Array, Execution, Samples
-from hsdsl.engine.execution.samples import optional
-from hsdsl.engine.execution.sampling import evaluate, find, within
+from hsdsl.engine.execution.records import optional
+from hsdsl.engine.execution.run import evaluate, find, within
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 

@@ -28,7 +28,7 @@ import numpy as np
 from hsdsl.analysis.sweep.manifest import Manifest
 from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.engine.execution import LEFT, Array, Ensemble
-from hsdsl.engine.execution.samples import optional
+from hsdsl.engine.execution.records import optional
 from hsdsl.engine.simulate.stops import limit
 
 FIXED = ("row", "stop", "message", "verdict", "warnings", "time", "mode", "transitions")

@@ -148,7 +148,7 @@ def check_target(
     if not path.parent.is_dir():
         raise UsageError(f"{option} {path}: there is no folder {path.parent}")
     if path.suffix.lower() == ".parquet":
-        from hsdsl.engine.execution.samples import optional
+        from hsdsl.engine.execution.records import optional
 
         optional("pyarrow", f"{option} {path}")
 

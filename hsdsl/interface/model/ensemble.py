@@ -15,7 +15,7 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution import Array, Ensemble, Execution, TransitionTable
-from hsdsl.engine.execution.sampling import columns_by_name
+from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import KEYS, Options
 from hsdsl.engine.preparation.settings import check_memory, setting_columns, whole

@@ -17,8 +17,8 @@ from hsdsl.analysis.store.table import write_csv
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import without_memory
 from hsdsl.engine.execution import Array, RunWarning, Samples, Stop
-from hsdsl.engine.execution.samples import split
-from hsdsl.engine.execution.sampling import columns_by_name
+from hsdsl.engine.execution.records import split
+from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation.options import check_arguments
 from hsdsl.engine.preparation.settings import whole
 from hsdsl.engine.simulate.plan import Prepared, Watch

@@ -62,7 +62,7 @@ def _place(cluster: str | None, processes: int) -> Generator[Run]:
     if cluster is None:
         yield partial(run_here, processes=processes if can_fork() else 1)
         return
-    from hsdsl.engine.execution.samples import optional
+    from hsdsl.engine.execution.records import optional
 
     optional("distributed", "a sweep on a cluster", "cluster")
     from hsdsl.analysis.sweep.cluster import connected
