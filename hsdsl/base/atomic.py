@@ -124,20 +124,6 @@ def locked(folder: Path) -> Generator[None]:
             os.close(descriptor)
 
 
-def is_locked(folder: Path) -> bool:
-    """Whether another process locks a folder at this moment; those who look do not see each other."""
-    with suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            if fcntl is not None:
-                fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-        finally:
-            os.close(descriptor)
-    return False
-
-
 def _claimed(folder: Path) -> tuple[Path, int]:
     while True:
         path = folder / f"{BEFORE}{secrets.token_hex(6)}{AFTER}"

@@ -151,13 +151,6 @@ def can_keep(kind: str, key: str) -> bool:
     return all(private(place) is None for place in (folder(), entry.parent, entry))
 
 
-def is_made(kind: str, key: str) -> bool:
-    """Whether another process makes an entry at this moment."""
-    from hsdsl.base.atomic import is_locked
-
-    return is_locked(folder() / kind / key)
-
-
 def _checksum(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()[:40]
 

@@ -38,6 +38,12 @@ class Deferred:
         made.__dict__.update({**known, **now} if known else now, _later=later)
         return made
 
+    def attached(self, **now: Any) -> Self:
+        """Make the same one, with other values of fields that no other field follows from."""
+        made = object.__new__(type(self))
+        made.__dict__.update(self.__dict__, **now)
+        return made
+
     def _elsewhere(self, name: str) -> str:
         """Where the value of a public name is that is no attribute, as a hint."""
         return ""
@@ -55,7 +61,8 @@ class Deferred:
     def __dir__(self) -> list[str]:
         """List the public names: fields, made or deferred, properties and methods."""
         own = {field.name for field in fields(self)}  # pyright: ignore[reportArgumentType]
-        return sorted(name for name in own.union(dir(type(self))) if not name.startswith("_") and name != "deferred")
+        hidden = ("attached", "deferred")
+        return sorted(name for name in own.union(dir(type(self))) if not name.startswith("_") and name not in hidden)
 
     def __getstate__(self) -> dict[str, Any]:
         """Give every field: what makes them does not travel."""

@@ -38,12 +38,13 @@ from math import inf, isfinite
 import numpy as np
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.engine.execution import Array
+from hsdsl.engine.execution import Array, Execution
 from hsdsl.engine.integrators import AUTO, METHODS, ButcherTableau, Method
 from hsdsl.engine.kernel import Kernel
 from hsdsl.engine.simulate import Prepared, Settings
 from hsdsl.engine.simulate.input_segments import Timeline
-from hsdsl.engine.simulate.review import BecomesStiff
+from hsdsl.engine.simulate.plan import Watch
+from hsdsl.engine.simulate.review import Judge
 from hsdsl.mathematics.program import Program
 
 LEAST_STEPS = 1000
@@ -105,8 +106,19 @@ def _adaptive(
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 
-def judged(prepared: Prepared, plain: Prepared | None = None) -> Prepared:
-    """The run, which ends with `BecomesStiff` where it comes to a stiff stretch, if `auto` has chosen its method.
+def run(prepared: Prepared, watch: Watch | None, seconds: Mapping[str, float]) -> tuple[Prepared, Execution]:
+    """Run to the end; by the method for stiff modes from the start where the run has come to a stiff stretch."""
+    judge = judge_of(prepared)
+    if judge is not None:
+        made, stiff = prepared.judged(judge, watch, seconds)
+        if made is not None:
+            return prepared, made
+        prepared = instead(prepared, stiff)
+    return prepared, prepared.simulate(watch, seconds)
+
+
+def judge_of(prepared: Prepared, plain: Prepared | None = None) -> Judge | None:
+    """What finds stiff stretches of a run under way; None unless `auto` has chosen an explicit method.
 
     Of a run with more states ``plain`` is the one that the choice was made for: its modes are judged.
     """
@@ -114,8 +126,8 @@ def judged(prepared: Prepared, plain: Prepared | None = None) -> Prepared:
     settings, digits = prepared.settings, prepared.arithmetic.digits
     chosen = settings.tolerance is not None and plain.settings.method_chosen is not None
     if chosen and digits is None and settings.method is not None and not settings.method.implicit:
-        prepared.judges.append(partial(_judge, plain, prepared.program))
-    return prepared
+        return partial(_judge, plain, prepared.program)
+    return None
 
 
 def _judge(
@@ -141,22 +153,18 @@ def _judge(
 
 def settled(prepared: Prepared) -> Prepared:
     """The run by the method that it ends with: it is made once for that, in constant memory."""
-    judged(prepared)
-    try:
-        if prepared.plan is not None and prepared.judges:
-            prepared.stream(lambda chunk: None)
-    except BecomesStiff as found:
-        return instead(prepared, found)
-    prepared.judges.clear()
-    return prepared
+    judge = judge_of(prepared)
+    if prepared.plan is None or judge is None:
+        return prepared
+    _, stiff = prepared.stream(lambda chunk: None, None, judge)
+    return prepared if stiff is None else instead(prepared, stiff)
 
 
-def instead(prepared: Prepared, found: BecomesStiff) -> Prepared:
+def instead(prepared: Prepared, stiff: Stiffness) -> Prepared:
     """The same run by the method for stiff modes."""
     settings = prepared.settings
     method = METHODS["radau"].for_tolerance(settings.tolerance, prepared.arithmetic)
-    settings = replace(settings, method=method, method_chosen=f"{method.name}: {found}")
-    return prepared.prepared_with(settings)
+    return prepared.prepared_with(replace(settings, method=method, method_chosen=f"{method.name}: {stiff}"))
 
 
 def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]) -> bool:

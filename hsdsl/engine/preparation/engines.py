@@ -1,7 +1,7 @@
 """The choice of the loop that runs a model.
 
 ======== ==========================================================================
-auto     ``c`` where it can serve, ``python`` where it cannot or has ended before the model is compiled
+auto     ``c`` where it can serve, ``python`` where it cannot
 c        the compiled loop, or a refusal that says why not
 python   the readable one
 ======== ==========================================================================
@@ -11,19 +11,15 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean
-from hsdsl.engine import ahead
-from hsdsl.engine.runtime import kernel, programs
+from hsdsl.engine.runtime import kernel
 from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.engine.runtime.structures import SCHEMES
 from hsdsl.engine.simulate import Settings
-from hsdsl.engine.simulate.plan import Pending
-from hsdsl.mathematics.program import Program
 
 ENGINES = ("auto", "c", "python")
 
@@ -35,29 +31,12 @@ def check(engine: str) -> None:
 
 
 def choose(
-    engine: str,
-    settings: Settings,
-    precision: int | None,
-    make: Callable[[], CompiledModel],
-    program: Program | None = None,
-) -> CompiledModel | Pending | None:
+    engine: str, settings: Settings, precision: int | None, make: Callable[[], CompiledModel]
+) -> CompiledModel | None:
     """The compiled model that a run is for, None where the Python loop is to run it.
-
-    Of a ``program`` that other processes may compile at the moment it need not be there yet.
 
     Raises UsageError: ``c`` is given and cannot serve.
     """
-    take = partial(_taken, engine, settings, precision, make)
-    if program is not None and engine == "auto" and _refusal(settings, precision) is None:
-        with suppress(NoCompiler):  # what needs the compiler says so
-            elsewhere = programs.under_way(program)
-            return Pending(lambda: ahead.compiling() or elsewhere(), take)
-    return take()
-
-
-def _taken(
-    engine: str, settings: Settings, precision: int | None, make: Callable[[], CompiledModel]
-) -> CompiledModel | None:
     if engine == "python":
         return None
     why = _refusal(settings, precision)

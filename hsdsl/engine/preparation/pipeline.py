@@ -219,17 +219,14 @@ class Pipeline:
             raise self._compiled
         return self._compiled
 
-    def prepare(self, arguments: Mapping[str, Any], wait: bool = True) -> Prepared:
-        """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run.
-
-        Unless it may ``wait``, the Python loop makes the run while another process compiles the model.
-        """
+    def prepare(self, arguments: Mapping[str, Any]) -> Prepared:
+        """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run."""
         parameters, initial = (overrides_of(arguments, group, self.program) for group in ("parameters", "initial"))
         engine, precision = arguments.get("engine", "auto"), arguments.get("precision")
         options = self.resolve(arguments.get("settings"), {key: arguments.get(key) for key in KEYS})
         engines.check(engine)
         if options.values["completion"].value == "auto" and self.sliding is not self:
-            return self.sliding.prepare(arguments, wait)
+            return self.sliding.prepare(arguments)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
         with applied(None if self._files is None else self._files.limits):
             settings = settings_of(options, values, recorded(parameters, initial, options))
@@ -246,8 +243,7 @@ class Pipeline:
         settings = following_digits(settings, options, values.kernel.arithmetic)
         start = cache(partial(self._moved, parameters, initial, arithmetic_of(precision), settings.until))
         problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x, waits, start)
-        awaited = None if wait or self._compiled is not None else self.program
-        return prepare(problem, engines.choose(engine, settings, precision, self._compile, awaited))
+        return prepare(problem, engines.choose(engine, settings, precision, self._compile))
 
     def _moved(
         self, parameters: Mapping[str, Any], initial: Mapping[str, Any], arithmetic: Arithmetic, until: Number

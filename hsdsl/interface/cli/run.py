@@ -76,7 +76,7 @@ def run(
         _check_files(out, plot, animate, outputs)
         text = read_bytes(model)
         if outputs is None and plot is None and animate is None and experiment.in_numbers():
-            ahead.begin(ModelFiles.read(model, None, text), engine != "python" and precision is None)
+            ahead.begin(ModelFiles.read(model, None, text))
         from hsdsl.interface.model import load
 
         loaded = load(model, text=text)

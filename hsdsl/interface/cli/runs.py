@@ -51,7 +51,7 @@ def plot(
     phase: Phases = None,
     labels: Annotated[list[str] | None, Option("--label", metavar="TEXT", help=LABEL)] = None,
     title: Annotated[str | None, option("TEXT", TITLE)] = None,
-    model: Annotated[Path | None, option("OF_MODEL", OF_MODEL, complete=model_files)] = None,
+    model: Annotated[Path | None, option("MODEL", OF_MODEL, complete=model_files)] = None,
     answer: Answer,
 ) -> None:
     """Draw runs in one picture."""

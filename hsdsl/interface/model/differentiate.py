@@ -23,7 +23,6 @@ from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.preparation.settings import arithmetic_of
 from hsdsl.engine.preparation.values import Values, initial_layout, initial_state, start_of_parts, with_parameters
 from hsdsl.engine.preparation.visible import visible_run
-from hsdsl.engine.simulate.review import BecomesStiff
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.engine.simulate.verdict.agreement import SAFE
 from hsdsl.interface.model.call_cache import CallCache, call_key
@@ -56,10 +55,11 @@ class Differentiator:
         firsts = tuple(map(str, firsts))
         key = call_key(*wrt, None, *firsts, None, *arguments, None, *arguments.values())
         ready = self._prepared.find(key)
-        if ready is None:
+        if ready is not None:
+            run = ready.setting.augmented.simulate()
+        else:
             check_arguments(arguments, "a sensitivity", REFUSED)
-            ready = self._ready(wrt, arguments, firsts)
-        ready, run = self._run(ready)
+            ready, run = self._run(self._ready(wrt, arguments, firsts))
         if not ready.entries and (run.stop.reason == "not_finite" or run.enters_beyond):
             ready, run = self._run(self._with_entries(ready))
         self._prepared.keep(key, ready)
@@ -101,12 +101,14 @@ class Differentiator:
 
     def _run(self, ready: _Ready) -> tuple[_Ready, Execution]:
         """Run the augmented system; by the method for stiff modes where it comes to a stiff stretch."""
-        try:
-            return ready, ready.setting.augmented.simulate()
-        except BecomesStiff as found:
-            plain = automatic.instead(ready.setting.plain, found)
+        judge = automatic.judge_of(ready.setting.augmented, ready.setting.plain)
+        if judge is not None:
+            run, stiff = ready.setting.augmented.judged(judge)
+            if run is not None:
+                return ready, run
+            plain = automatic.instead(ready.setting.plain, stiff)
             ready = self._prepare(replace(ready, setting=replace(ready.setting, plain=plain)))
-            return ready, ready.setting.augmented.simulate()
+        return ready, ready.setting.augmented.simulate()
 
     def _with_entries(self, ready: _Ready) -> _Ready:
         return self._prepare(replace(ready, entries=True))
@@ -141,7 +143,6 @@ class Differentiator:
             "precision": ready.call.get("precision"),
         }
         prepared = self._written(ready, method).prepare(arguments)
-        automatic.judged(prepared, ready.setting.plain)
         return replace(ready, setting=replace(ready.setting, augmented=prepared))
 
     def _written(self, ready: _Ready, method: str) -> Pipeline:

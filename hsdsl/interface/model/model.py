@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,7 +22,6 @@ from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.preparation.visible import visible_run, with_output_function
 from hsdsl.engine.simulate import Prepared
 from hsdsl.engine.simulate.recorder import Progress
-from hsdsl.engine.simulate.review import BecomesStiff
 from hsdsl.interface.model.call_cache import CallCache, call_key
 from hsdsl.mathematics.program import Program
 
@@ -197,8 +196,7 @@ class Model:
         settings : mapping, optional
             Settings below the ones above but above the file's (what ``--set experiment.NAME`` reaches).
         engine : {"auto", "c", "python"}
-            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler, unless the
-            run is made sooner while another process compiles the model.
+            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler.
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
         outputs : sequence of str, optional
@@ -208,37 +206,23 @@ class Model:
 
         Raises UsageError: a name, value or combination that cannot be served.
         """
-        arguments = (
-            until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions, completion,
-            parameters, initial, settings, engine, precision,
-        )  # fmt: skip
+        given = locals()
+        call = {name: given[name] for name in ARGUMENTS}
         if outputs is not None:
-            return self._reduced_run(outputs, dict(zip(ARGUMENTS, arguments, strict=True)), watch)
-        key = call_key(*arguments)
+            return self._reduced_run(outputs, call, watch)
+        key = call_key(*call.values())
         ready = self._prepared.find(key)
-        if ready is None:
-            call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
-            ready = self._kept(key, automatic.judged(self.pipeline.prepare(call, wait=False)))
         with in_notebook() as show:
             watch = watch or (show and partial(running, show))
-            try:
+            if ready is not None:
                 run = ready.simulate(watch, self.pipeline.seconds)
-            except BecomesStiff as found:
-                ready = self._kept(key, automatic.instead(ready, found))
-                run = ready.simulate(watch, self.pipeline.seconds)
+            else:
+                ready, run = automatic.run(self.pipeline.prepare(call), watch, self.pipeline.seconds)
+                self._prepared.keep(key, ready)
         run = visible_run(run, ready)
-        run.__dict__["differentiation"] = partial(self._differentiate, arguments)
-        run.__dict__["look"] = partial(self.look, parameters)
-        return run
+        return run.attached(differentiation=partial(self._differentiate, call), look=partial(self.look, parameters))
 
-    def _kept(self, key: Hashable | None, ready: Prepared) -> Prepared:
-        """A run to be made, kept for the same call; one that compiled code is still made for is prepared anew then."""
-        if ready.pending is None:
-            self._prepared.keep(key, ready)
-        return ready
-
-    def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
-        call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
+    def _differentiate(self, call: dict[str, Any], wrt: str | Sequence[str]) -> Sensitivity:
         return self._sliding_for(call)._differentiator.of_run(call, wrt)
 
     def _flat(self, what: str) -> None:
@@ -458,11 +442,13 @@ class Model:
 
         self._flat("rows in a file while a run goes on")
         target = check(path, every, columns, arguments, self)
-        prepared = automatic.judged(self.pipeline.prepare(arguments | {"engine": "c"}))
-        try:
-            return stream(prepared, target, every, columns, watch)
-        except BecomesStiff as found:
-            return stream(automatic.instead(prepared, found), target, every, columns, watch)
+        prepared = self.pipeline.prepare(arguments | {"engine": "c"})
+        judge = automatic.judge_of(prepared)
+        made, stiff = stream(prepared, target, every, columns, watch, judge)
+        if made is None:
+            made, _ = stream(automatic.instead(prepared, stiff), target, every, columns, watch)
+        assert made is not None
+        return made
 
     def ensemble(
         self,
