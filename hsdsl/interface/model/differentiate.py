@@ -20,8 +20,14 @@ from hsdsl.engine.integrators import AUTO, METHODS
 from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.settings import arithmetic_of
-from hsdsl.engine.preparation.values import Values, initial_layout, initial_state, start_of_parts, with_parameters
+from hsdsl.engine.preparation.values import (
+    Values,
+    arithmetic_of,
+    initial_layout,
+    initial_state,
+    start_of_parts,
+    with_parameters,
+)
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.engine.simulate.verdict.agreement import SAFE

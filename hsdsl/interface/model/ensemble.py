@@ -18,9 +18,16 @@ from hsdsl.engine.execution import Array, Ensemble, Execution, TransitionTable
 from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import KEYS, Options
-from hsdsl.engine.preparation.settings import check_memory, setting_columns, whole
-from hsdsl.engine.preparation.values import InstanceTable, evaluate_parameters, initial_columns, start_of_parts
-from hsdsl.engine.preparation.waiting import check_alone
+from hsdsl.engine.preparation.values import (
+    InstanceTable,
+    check_alone,
+    check_memory,
+    evaluate_parameters,
+    initial_columns,
+    setting_columns,
+    start_of_parts,
+    whole,
+)
 from hsdsl.engine.simulate import Prepared, Settings
 from hsdsl.engine.simulate.ensemble import Instances, Kept
 from hsdsl.engine.simulate.state_layouts import StateLayouts

@@ -14,8 +14,7 @@ from hsdsl.base.names import INITIAL
 from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.engine.execution import Array
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
-from hsdsl.engine.preparation.settings import whole
-from hsdsl.engine.preparation.values import InstanceTable
+from hsdsl.engine.preparation.values import InstanceTable, whole
 from hsdsl.mathematics.program import Program
 
 

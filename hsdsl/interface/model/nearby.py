@@ -15,8 +15,7 @@ from hsdsl.base.names import called
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
-from hsdsl.engine.preparation.settings import whole
-from hsdsl.engine.preparation.values import with_parameters
+from hsdsl.engine.preparation.values import whole, with_parameters
 from hsdsl.interface.model.differentiate import located_arguments, start_by, varied
 from hsdsl.interface.model.distances import distance_of_runs
 

@@ -21,8 +21,7 @@ from hsdsl.base.parts import meant_alone, numbers_of, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.settings import whole
-from hsdsl.engine.preparation.values import with_parameters
+from hsdsl.engine.preparation.values import whole, with_parameters
 from hsdsl.interface.model.differentiate import FINEST
 
 if TYPE_CHECKING:

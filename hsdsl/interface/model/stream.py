@@ -20,7 +20,7 @@ from hsdsl.engine.execution import Array, RunWarning, Samples, Stop
 from hsdsl.engine.execution.records import split
 from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation.options import check_arguments
-from hsdsl.engine.preparation.settings import whole
+from hsdsl.engine.preparation.values import whole
 from hsdsl.engine.simulate.plan import Prepared, Watch
 from hsdsl.engine.simulate.remarks import loop_remarks, warnings_of
 from hsdsl.engine.simulate.review import Judge
