@@ -214,10 +214,10 @@ def checks_arguments(function: Callable[P, R], name: str = "", elsewhere: Elsewh
     return checked
 
 
-def checks_methods(kind: C, elsewhere: Elsewhere = nowhere) -> C:
+def checks_methods(kind: C, elsewhere: Elsewhere = nowhere, name: str = "") -> C:
     """Let a class and its methods raise UsageError for arguments that are none of theirs."""
     for key, value in list(vars(kind).items()):
         if isinstance(value, FunctionType) and (key == "__init__" or not key.startswith("_")):
-            name = kind.__name__ if key == "__init__" else f"{kind.__name__}.{key}"
-            setattr(kind, key, checks_arguments(value, name, elsewhere))
+            of = name or kind.__name__
+            setattr(kind, key, checks_arguments(value, of if key == "__init__" else f"{of}.{key}", elsewhere))
     return kind

@@ -10,7 +10,7 @@ import numpy as np
 from hsdsl.analysis.metrics import Interval
 from hsdsl.engine.execution import Execution, Verdict
 from hsdsl.interface.chart.scene import Array, Result, Scene, sampled
-from hsdsl.interface.model.distances import distance
+from hsdsl.interface.model.distances import distance_of_runs
 
 FINER = 8  # points of the exact curve from sample to sample
 SAME_END = 1e-9  # of the run: ends nearer than this are one
@@ -193,4 +193,4 @@ def rho(scene: Scene, execution: Execution, seconds: float) -> Interval | None:
     """Return the distance to the exact execution; None where the run does not get to its end."""
     if not execution.stop.complete:
         return None
-    return distance(execution, scene.exact, model=scene.model, seconds=seconds)
+    return distance_of_runs(execution, scene.exact, model=scene.model, seconds=seconds).interval

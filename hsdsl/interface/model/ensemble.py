@@ -1,10 +1,15 @@
-"""``Model.ensemble``: many runs of one model, by the compiled loop on all cores, or one after the other in Python."""
+"""``Model.ensemble``: many runs of one model, by the compiled loop on all cores, or one after the other in Python.
+
+A request has what every run shares, the arrays that vary, and the times of samples; prepared, it has numbers of every
+instance. What runs keep is put into arrays.
+"""
 
 from __future__ import annotations
 
 import math
+import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -13,11 +18,12 @@ import numpy as np
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
-from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.engine.execution import Array, Ensemble, Execution, TransitionTable
+from hsdsl.base.names import INITIAL
+from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
+from hsdsl.engine.execution import Array, Ensemble, Execution, Transition, TransitionTable
 from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation import automatic
-from hsdsl.engine.preparation.options import KEYS, Options
+from hsdsl.engine.preparation.options import KEYS, Options, check_arguments, overrides_of
 from hsdsl.engine.preparation.values import (
     InstanceTable,
     check_alone,
@@ -28,14 +34,15 @@ from hsdsl.engine.preparation.values import (
     start_of_parts,
     whole,
 )
+from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate import Prepared, Settings
-from hsdsl.engine.simulate.ensemble import Instances, Kept
+from hsdsl.engine.simulate.compiled import CompiledPlan
+from hsdsl.engine.simulate.ensemble import CompiledEnsemble, Instances, Kept, Logged
 from hsdsl.engine.simulate.state_layouts import StateLayouts
-from hsdsl.interface.model.ensemble_request import EnsembleRequest
-from hsdsl.interface.model.workers import ArrayRecorder, Progress, run_compiled, run_in_turn
+from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
-    from hsdsl.interface.model import Model
+    from hsdsl.interface.model.runs import Runs
 
 
 class NothingToRunError(UsageError):
@@ -50,7 +57,7 @@ class NothingToRunError(UsageError):
 class SingleRuns:
     """Single runs of the instances of an ensemble, by their places."""
 
-    model: Model
+    model: Runs
     request: EnsembleRequest
 
     def __call__(self, place: tuple[int, ...]) -> Execution:
@@ -67,7 +74,7 @@ class SingleRuns:
 class PreparedEnsemble:
     """An ensemble that can start: ``places`` are the numbers of the instances that are not refused."""
 
-    model: Model
+    model: Runs
     request: EnsembleRequest
     base: Prepared
     columns: InstanceTable
@@ -159,7 +166,7 @@ class PreparedEnsemble:
         return TransitionTable(first, made["time"], known[number], made["entry"] != 0, before, after)
 
 
-def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble:
+def prepare_ensemble(model: Runs, request: EnsembleRequest) -> PreparedEnsemble:
     """Compute the numbers of every instance.
 
     Raises UsageError: none of them can be run.
@@ -207,7 +214,7 @@ def _settings(columns: InstanceTable, base: Settings, options: Options) -> dict[
 
 
 def run_ensemble(
-    model: Model,
+    model: Runs,
     call: dict[str, Any],
     samples: Any,
     transition_times: int,
@@ -219,5 +226,227 @@ def run_ensemble(
     if threads is not None:
         whole(threads, "threads", least=1)
     request = EnsembleRequest.of(model.program, call, samples, transition_times, every_transition)
-    completion = model.resolve(call.get("settings"), {"completion": call.get("completion")}).values["completion"].value
-    return prepare_ensemble(model.sliding if completion == "auto" else model, request).run(threads or cores(), progress)
+    return prepare_ensemble(model.sliding_for(call), request).run(threads or cores(), progress)
+
+
+@dataclass(frozen=True)
+class EnsembleRequest:
+    """The arguments of an ensemble: ``call`` has those of every single run, and ``varied`` the arrays by name.
+
+    The arrays are flattened; ``shape`` is their common shape.
+    """
+
+    call: dict[str, Any]
+    varied: dict[str, Array]
+    shape: tuple[int, ...]
+    samples: int | Array | str | None
+    transition_times: int
+    every_transition: bool = False
+
+    @staticmethod
+    def of(
+        program: Program, call: dict[str, Any], samples: Any, transition_times: int, every_transition: bool = False
+    ) -> EnsembleRequest:
+        """Sort the arguments.
+
+        Raises UsageError: an argument that a run does not take, a value that is no number, no expression and no array
+        of numbers, arrays without a common shape, or samples that are neither a number of them nor times.
+        """
+        check_arguments(call, "an ensemble", without=("samples", "precision"))
+        whole(transition_times, "transition_times", least=0)
+        varied: dict[str, Array] = {}
+        for group, prefix in (("parameters", ""), ("initial", INITIAL)):
+            given = overrides_of(call, group, program)
+            varied |= {prefix + name: _array(name, value) for name, value in given.items() if np.ndim(value) > 0}
+            call = call | {group: {name: _plain(value) for name, value in given.items() if np.ndim(value) == 0}}
+        try:
+            common = np.broadcast_arrays(*varied.values())
+        except ValueError:
+            shapes = ", ".join(f"{name} has {array.shape}" for name, array in varied.items())
+            several = [name for name, array in varied.items() if array.ndim == 1]
+            hint = f"for every combination give columns and rows: {several[0]} as array[:, None]" if several else None
+            raise UsageError(f"the arrays of an ensemble have no common shape: {shapes}", hint) from None
+        shape = common[0].shape if common else ()
+        flat = {name: array.reshape(-1) for name, array in zip(varied, common, strict=True)}
+        return EnsembleRequest(call, flat, shape, _samples(samples), transition_times, every_transition)
+
+    def arrays(self, initial: bool) -> dict[str, list[float]]:
+        """The columns of initial states or of parameters, by name."""
+        columns = ((name, array) for name, array in self.varied.items() if name.startswith(INITIAL) == initial)
+        return {name.removeprefix(INITIAL): array.tolist() for name, array in columns}
+
+    def single(self, index: int) -> dict[str, Any]:
+        """The arguments of the single run of one instance."""
+        own = {"parameters": dict(self.call["parameters"]), "initial": dict(self.call["initial"])}
+        for name, array in self.varied.items():
+            group = "initial" if name.startswith(INITIAL) else "parameters"
+            own[group][name.removeprefix(INITIAL)] = float(array[index])
+        return self.call | own
+
+    def times(self, until: Array, table: InstanceTable) -> tuple[int, Callable[[], Array]]:
+        """The number of samples of an instance, and what makes their times, shape (instances, samples).
+
+        Behind the last sample of an instance that has fewer than others is not-a-number.
+        """
+        given = self.samples
+        if given is None:
+            return 0, lambda: np.empty((len(until), 0))
+        if isinstance(given, str):
+            return _times_every(np.array(table.expression(given, "the time between samples"), float), until)
+        if isinstance(given, int):
+            return given, lambda: _evenly(until, given)
+        return len(given), lambda: np.tile(given, (len(until), 1))
+
+
+def _evenly(until: Array, count: int) -> Array:
+    return np.concatenate([until[:, None] * np.arange(count - 1) / (count - 1), until[:, None]], axis=1)
+
+
+def _times_every(step: Array, until: Array) -> tuple[int, Callable[[], Array]]:
+    """Multiples of each instance's step up to its end."""
+    if wrong := [value for value in step[np.isfinite(until)].tolist() if not value > 0]:
+        raise UsageError(f"the time between samples must be positive, not {wrong[0]:g}")
+    with np.errstate(invalid="ignore"):
+        count = np.floor(until / step * (1 + TIE)) + 1
+    most = int(min(np.nanmax(count, initial=0), 2**62))
+
+    def times() -> Array:
+        times = step[:, None] * np.arange(most)
+        return np.where(np.arange(most) < count[:, None], np.minimum(times, until[:, None]), math.nan)
+
+    return most, times
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def _array(name: str, value: Any) -> Array:
+    if np.ma.is_masked(value):
+        raise UsageError(f"{name}: elements of the array are masked, and have no value", "leave those instances out")
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name}: expected a number, an expression or an array of numbers") from None
+
+
+def _samples(given: Any) -> int | Array | str | None:
+    """A number of samples, their times, or the time between them as an expression of parameters."""
+    if given is None or isinstance(given, str):
+        return given
+    if np.ndim(given) == 1 and not isinstance(given, str):
+        times = np.asarray(given, dtype=float)
+        if np.isfinite(times).all() and (times >= 0).all() and (np.diff(times) >= 0).all():
+            return times
+    elif isinstance(given, int) and not isinstance(given, bool) and given >= 2:
+        return given
+    raise UsageError("samples of an ensemble are times from 0 on that never decrease, or a whole number of at least 2")
+
+
+SLICE = 32  # instances that a thread takes at a time
+INTERVAL = 0.1  # seconds between looks at how far it is
+Progress = Callable[[int, int], None]
+
+
+def run_compiled(
+    plan: CompiledPlan,
+    instances: Instances,
+    kept: Kept,
+    names: tuple[str, ...],
+    threads: int,
+    progress: Progress | None,
+) -> None:
+    """Run all instances on so many threads; at Ctrl-C finished ones are kept."""
+    ensemble, count = CompiledEnsemble(plan, instances, kept, names), len(instances.settings)
+    firsts, failed = iter(range(0, count, SLICE)), list[BaseException]()
+
+    def work() -> None:
+        try:
+            place = ensemble.place()
+            while not ensemble.stopped and (first := next(firsts, None)) is not None:  # one at a time: the GIL
+                ensemble.work(first, min(first + SLICE, count), place)
+        except BaseException as error:
+            failed.append(error)
+            ensemble.stop()
+
+    workers = [threading.Thread(target=work, daemon=True) for _ in range(min(threads, max(1, -(-count // SLICE))))]
+    for worker in workers:
+        worker.start()
+    try:
+        for worker in workers:
+            while worker.is_alive():
+                worker.join(INTERVAL)
+                if progress is not None:
+                    progress(int(np.count_nonzero(kept.reason >= 0)), count)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        ensemble.stop()
+        for worker in workers:
+            worker.join()
+    if failed:
+        raise failed[0]
+
+
+def run_in_turn(
+    runs: Sequence[Callable[[], Execution]], record: Callable[[int, Execution], None], progress: Progress | None
+) -> None:
+    """Run all instances one after the other and record each; at Ctrl-C those that are done are kept."""
+    try:
+        for i, run in enumerate(runs):
+            execution = run()
+            if execution.stop.reason == "interrupted":
+                return
+            record(i, execution)
+            if progress is not None:
+                progress(i + 1, len(runs))
+    except KeyboardInterrupt:
+        return
+
+
+@dataclass(frozen=True, eq=False)
+class ArrayRecorder:
+    """Arrays for executions; ``kinds`` are the layouts of states, ``names`` those of all states."""
+
+    instances: Instances
+    kept: Kept
+    names: tuple[str, ...]
+    kinds: list[tuple[str, ...]]
+    program: Program
+
+    def __call__(self, i: int, execution: Execution) -> None:
+        """Record the execution of an instance."""
+        kept, last = self.kept, execution.arcs[-1]
+        n, end = len(last.states), execution.times[-1]
+        kept.stop[i] = execution.stop.reason
+        modes = self.program.mode_names
+        kept.noted[i] = execution.noted(execution) if execution.noted else ""
+        kept.mode[i] = modes.index(last.mode)
+        kept.kind[i] = self.kinds.index(last.states)
+        kept.transitions[i] = len(execution.transitions)
+        kept.ended[i] = end
+        kept.final[i, :n] = execution.values[-1, :n]
+        kept.outputs[i] = execution.outputs[-1]
+        times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
+        kept.crossed[i, : len(times)] = times
+        inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
+        samples = execution.sample(self.instances.time[i][inside])
+        for k, name in enumerate(self.names):
+            if name in samples.states:
+                kept.states[i, k, inside] = samples[name]
+        kept.results[i, inside] = samples.output_columns
+        if kept.logs:
+            kept.log[i] = self._logged(execution.transitions, modes)
+
+    def _logged(self, transitions: Sequence[Transition], modes: tuple[str, ...]) -> Logged:
+        nan = float("nan")
+        table = np.zeros(len(transitions), structures.TRANSITION)
+        before, after = np.full((2, len(transitions), self.kept.width), nan)
+        for k, made in enumerate(transitions):
+            source = modes.index(made.source)
+            edges = [edge.name for edge in self.program.modes[source].edges]
+            resumed = nan if made.resumed is None else made.resumed
+            table[k] = made.time, resumed, source, edges.index(made.edge), made.entry, len(made.alternatives)
+            before[k, : len(made.before)] = list(made.before.values())
+            after[k, : len(made.after or ())] = list((made.after or {}).values())
+        return table, before, after

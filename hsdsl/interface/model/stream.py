@@ -28,7 +28,7 @@ from hsdsl.engine.simulate.state_layouts import StateLayouts
 from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
-    from hsdsl.interface.model.model import Model
+    from hsdsl.interface.model.runs import Runs
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ class Rows:
 
 
 def check(
-    path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, arguments: Mapping[str, Any], model: Model
+    path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, arguments: Mapping[str, Any], model: Runs
 ) -> Path:
     """Refuse arguments that a streamed run does not take, and return the path of its rows."""
     check_arguments(arguments, "a streamed run", without=("samples", "precision"))
