@@ -213,6 +213,11 @@ class Pipeline:
         states = program.all_states if program.parts else ()
         return resolve({FILE: in_file, "--set": settings or {}, "the call": call or {}}, states)
 
+    def slides(self, arguments: Mapping[str, Any]) -> bool:
+        """Whether a run with these arguments slides on surfaces that two modes press on: its completion is `auto`."""
+        call = {"completion": arguments.get("completion")}
+        return self.resolve(arguments.get("settings"), call).values["completion"].value == "auto"
+
     def values(self, arithmetic: Arithmetic) -> Values:
         """The numbers of the model in an arithmetic, without overrides."""
         if arithmetic.digits not in self.kernels:

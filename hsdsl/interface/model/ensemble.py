@@ -226,7 +226,8 @@ def run_ensemble(
     if threads is not None:
         whole(threads, "threads", least=1)
     request = EnsembleRequest.of(model.program, call, samples, transition_times, every_transition)
-    return prepare_ensemble(model.sliding_for(call), request).run(threads or cores(), progress)
+    model = model.sliding if model.pipeline.slides(call) else model
+    return prepare_ensemble(model, request).run(threads or cores(), progress)
 
 
 @dataclass(frozen=True)

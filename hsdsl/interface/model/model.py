@@ -117,7 +117,7 @@ class Model(Runs):
 
         with in_notebook() as show:
             progress = progress or counted_runs(show)
-            return Orbits(self.sliding_for(arguments), section, laps, period, progress, arguments).find()
+            return Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments).find()
 
     def continuation(
         self,
@@ -149,7 +149,7 @@ class Model(Runs):
 
         with in_notebook() as show:
             progress = progress or counted_runs(show, parameter)
-            orbits = Orbits(self.sliding_for(arguments), section, laps, period, progress, arguments)
+            orbits = Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments)
             return orbits.continued(parameter, start, end)
 
     def orbital_stability(
@@ -187,7 +187,7 @@ class Model(Runs):
         self._flat("orbital stability from runs nearby")
         with in_notebook() as show:
             progress = progress or counted(show, "runs")
-            return orbital_stability(self.sliding_for(arguments), wrt, radii, samples, seed, progress, arguments)
+            return orbital_stability(self._sliding_for(arguments), wrt, radii, samples, seed, progress, arguments)
 
     def fit(
         self,
@@ -219,11 +219,11 @@ class Model(Runs):
 
         Raises UsageError: an unknown name or column, or a run that does not reach the measurements.
         """
-        from hsdsl.interface.model.differentiate import fit
+        from hsdsl.interface.model.fits import fit
 
         with in_notebook() as show:
             progress = progress or (show and (lambda runs, _, squares: show(lambda: f"{runs} runs, {squares:.6g}")))
-            return fit(self.sliding_for(arguments), data, wrt, sigma, weights, progress, arguments)
+            return fit(self._sliding_for(arguments), data, wrt, sigma, weights, progress, arguments)
 
     def stream(
         self,

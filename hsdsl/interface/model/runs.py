@@ -53,7 +53,6 @@ class Runs:
         self.pipeline = of if isinstance(of, Pipeline) else Pipeline(of)
         self._smaller: dict[tuple[str, ...], Self] = {}
         self._prepared: CallCache[Prepared] = CallCache(MOST_PREPARED)
-        self._slides: CallCache[bool] = CallCache(MOST_PREPARED)  # whether runs of a call slide
 
     @cached_property
     def _differentiator(self) -> Differentiator:
@@ -168,17 +167,11 @@ class Runs:
         return run.attached(differentiation=partial(self._differentiate, call), look=partial(self.look, parameters))
 
     def _differentiate(self, call: dict[str, Any], wrt: str | Sequence[str]) -> Sensitivity:
-        return self.sliding_for(call)._differentiator.of_run(call, wrt)
+        return self._sliding_for(call)._differentiator.of_run(call, wrt)
 
-    def sliding_for(self, arguments: Mapping[str, Any]) -> Self:
+    def _sliding_for(self, arguments: Mapping[str, Any]) -> Self:
         """The model that a run with these arguments is of: with modes of sliding where its completion is `auto`."""
-        settings, completion = arguments.get("settings"), arguments.get("completion")
-        key = call_key(settings, completion)
-        slides = self._slides.find(key)
-        if slides is None:
-            slides = self.resolve(settings, {"completion": completion}).values["completion"].value == "auto"
-            self._slides.keep(key, slides)
-        return self.sliding if slides else self
+        return self.sliding if self.pipeline.slides(arguments) else self
 
     def _reduced_run(
         self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
@@ -207,7 +200,7 @@ class Runs:
 
         Raises UsageError: an unknown name, or an argument that cannot be served.
         """
-        return self.sliding_for(arguments)._differentiator.sensitivity(wrt, arguments)
+        return self._sliding_for(arguments)._differentiator.sensitivity(wrt, arguments)
 
     @cached_property
     def sliding(self) -> Self:
