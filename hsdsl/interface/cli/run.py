@@ -32,7 +32,6 @@ from hsdsl.language.files import ModelFiles, read_bytes
 
 if TYPE_CHECKING:
     from hsdsl.engine.execution import Execution, Stop
-    from hsdsl.interface.model import Model
     from hsdsl.interface.model.stream import Streamed
 
 
@@ -82,12 +81,14 @@ def run(
         loaded = load(model, text=text)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
-        shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
+        shown = {"columns": names, "phases": pairs_of(phase, loaded.columns)}
+        _check_drawn(loaded, shown["phases"], plot, animate, speed)
+        needed = names and [*names, *(name for pair in shown["phases"] or () for name in pair)]
         result: Any
         with progress(answer.hidden) as show:
             settings["watch"] = show and partial(running, show)
             if every is None:
-                result = loaded.simulate(**settings, outputs=needed(shown))
+                result = loaded.simulate(**settings, outputs=needed)
             elif out is None or plot or animate or estimate or precision is not None:
                 raise UsageError(EVERY_ALONE)
             else:
@@ -96,7 +97,10 @@ def run(
         if every is None:
             _answer(loaded, result, shown, estimate, explain, out, plot, settings["parameters"], answer)
             if animate is not None:
-                write_film(loaded, animate, speed, settings, answer.hidden)
+                with progress(answer.hidden) as show:
+                    given: dict[str, Any] = settings | {"watch": None, "speed": speed, "progress": counted(show, "frames")}
+                    loaded.animate(animate, **given)
+                say(f"wrote {animate}")
         else:
             _answer_streamed(result, model, answer)
     _leave(result.stop, answer)
@@ -205,15 +209,8 @@ def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
     }
 
 
-def shown_of(
-    model: Model,
-    names: list[str] | None,
-    pairs: list[tuple[str, str]] | None,
-    plot: Path | None,
-    animate: Path | None,
-    speed: float | None,
-) -> dict[str, Any]:
-    """What of the run is shown; refuse what cannot be drawn before the run."""
+def _check_drawn(loaded: Any, pairs: Any, plot: Path | None, animate: Path | None, speed: float | None) -> None:
+    """Refuse before the run what cannot be drawn of it."""
     if pairs is not None and plot is None:
         raise UsageError("--phase is for a picture: give --plot FILE too")
     if speed is not None and animate is None:
@@ -222,19 +219,4 @@ def shown_of(
         from hsdsl.analysis.plot.animation import check
 
         check(animate)
-        model.check_scene()
-    return {"columns": names, "phases": pairs}
-
-
-def needed(shown: dict[str, Any]) -> list[str] | None:
-    """The states and outputs that files and pictures need; None for all."""
-    if shown["columns"] is None:
-        return None
-    return [*shown["columns"], *(name for pair in shown["phases"] or () for name in pair)]
-
-
-def write_film(model: Model, path: Path, speed: float | None, settings: dict[str, Any], quiet: bool) -> None:
-    """Write the film."""
-    with progress(quiet) as show:
-        model.animate(path, speed=speed, progress=counted(show, "frames"), **(settings | {"watch": None}))
-    say(f"wrote {path}")
+        loaded.check_scene()
