@@ -70,21 +70,17 @@ class _Copy(Generic[Result]):
 
 
 _begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
-_seen: list[ModelFiles] = []
 
 
 def begin(files: ModelFiles) -> None:
     """Begin to lower a model in another process, where that saves time: see :func:`taken`."""
-    if files in _seen:
-        return
-    _seen.append(files)
     if _saves_time() and not program_cache.is_kept(files):
         with suppress(OSError):  # there may be no more processes
             _begun.append((files, _copy(lambda: _lowered(files))))
 
 
 def begin_run(words: list[str]) -> None:
-    """Begin with the model of a command line that runs it as it is, before what reads other command lines is loaded."""
+    """Begin with the model of a command line that runs it as it is, before what reads command lines is loaded."""
     match words:
         case ["run", model, *options] if set(options) <= {"--json", "--quiet", "-q"} and os.path.isfile(model):
             with suppress(UsageError):  # which the command reports

@@ -25,7 +25,6 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="there is no oth
 def loaded(monkeypatch, tmp_path):
     """Begin although much is loaded in this process, with nothing in the cache."""
     monkeypatch.setattr(ahead, "_saves_time", lambda: True)
-    monkeypatch.setattr(ahead, "_seen", [])
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
 
 
@@ -105,7 +104,6 @@ def test_another_model_is_not_taken_for_it_and_nothing_is_left():
 def test_a_plain_run_begins_before_its_words_are_read(options, monkeypatch):
     model = str(MODELS / "thermostat.yaml")
     ahead.begin_run(["run", model, *options])
-    ahead.begin(ModelFiles.read(Path(model)))  # as the command does
     assert len(ahead._begun) == 1
     assert ahead.taken(ModelFiles.read(Path(model))) and not ahead._begun
 

@@ -15,7 +15,6 @@ from hsdsl.analysis.metrics.table import CURVE_METRICS
 from hsdsl.base.errors import CODES, WARNINGS, ModelError, UsageError
 from hsdsl.base.limits import DEFAULT, NUMBERS, Limits, applied
 from hsdsl.base.names import did_you_mean, without_memory
-from hsdsl.base.numbers.decimals import number_of
 from hsdsl.engine.integrators import METHODS
 from hsdsl.interface.cli.console import errors_reported, print_json
 
@@ -213,12 +212,6 @@ class Experiment(NamedTuple):
         """Arguments of `Model.simulate`."""
         given = self._asdict()
         return values_of(given.pop("overrides")) | with_method(given) | more
-
-    def in_numbers(self) -> bool:
-        """Whether all values are numbers, and no expressions of the model's parameters."""
-        given = [self.until, self.step, self.tolerance, self.relaxation]
-        texts = [text for text in given if text] + [o.partition("=")[2] for o in self.overrides or ()]
-        return None not in map(number_of, texts)
 
 
 class Located(NamedTuple):

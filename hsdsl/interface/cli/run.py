@@ -13,7 +13,6 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
 from hsdsl.base.names import visible
 from hsdsl.base.progress import counted, running
-from hsdsl.engine import ahead
 from hsdsl.interface.cli.console import progress, say
 from hsdsl.interface.cli.options import (
     PICTURES,
@@ -28,7 +27,6 @@ from hsdsl.interface.cli.options import (
     option,
     pairs_of,
 )
-from hsdsl.language.files import ModelFiles, read_bytes
 
 if TYPE_CHECKING:
     from hsdsl.engine.execution import Execution, Stop
@@ -73,12 +71,9 @@ def run(
     """Simulate a model and summarise what happened."""
     with answer.reporting():
         _check_files(out, plot, animate, outputs)
-        text = read_bytes(model)
-        if outputs is None and plot is None and animate is None and experiment.in_numbers():
-            ahead.begin(ModelFiles.read(model, None, text))
         from hsdsl.interface.model import load
 
-        loaded = load(model, text=text)
+        loaded = load(model)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
         shown = {"columns": names, "phases": pairs_of(phase, loaded.columns)}
@@ -98,8 +93,8 @@ def run(
             _answer(loaded, result, shown, estimate, explain, out, plot, settings["parameters"], answer)
             if animate is not None:
                 with progress(answer.hidden) as show:
-                    given: dict[str, Any] = settings | {"watch": None, "speed": speed, "progress": counted(show, "frames")}
-                    loaded.animate(animate, **given)
+                    settings["watch"] = None
+                    loaded.animate(animate, speed=speed, progress=counted(show, "frames"), **settings)
                 say(f"wrote {animate}")
         else:
             _answer_streamed(result, model, answer)

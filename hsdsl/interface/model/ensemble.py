@@ -10,8 +10,8 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,7 +39,6 @@ from hsdsl.engine.simulate import Prepared, Settings
 from hsdsl.engine.simulate.compiled import CompiledPlan
 from hsdsl.engine.simulate.ensemble import CompiledEnsemble, Instances, Kept, Logged
 from hsdsl.engine.simulate.state_layouts import StateLayouts
-from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
     from hsdsl.interface.model.runs import Runs
@@ -54,27 +53,9 @@ class NothingToRunError(UsageError):
 
 
 @dataclass(frozen=True, eq=False)
-class SingleRuns:
-    """Single runs of the instances of an ensemble, by their places."""
-
-    model: Runs
-    request: EnsembleRequest
-
-    def __call__(self, place: tuple[int, ...]) -> Execution:
-        """Run one."""
-        shape = self.request.shape
-        return self.numbered(int(np.ravel_multi_index(place, shape)) if shape else 0)
-
-    def numbered(self, index: int) -> Execution:
-        """Run the one with this number."""
-        return self.model.simulate(**self.request.single(index))
-
-
-@dataclass(frozen=True, eq=False)
 class PreparedEnsemble:
     """An ensemble that can start: ``places`` are the numbers of the instances that are not refused."""
 
-    model: Runs
     request: EnsembleRequest
     base: Prepared
     columns: InstanceTable
@@ -87,11 +68,6 @@ class PreparedEnsemble:
         """The states of all modes."""
         return tuple(dict.fromkeys(name for kind in self.kinds for name in kind))
 
-    @property
-    def again(self) -> SingleRuns:
-        """Single runs."""
-        return SingleRuns(self.model, self.request)
-
     def run(self, threads: int, progress: Progress | None) -> Ensemble:
         """Run all instances."""
         began, program = time.perf_counter(), self.base.program
@@ -100,13 +76,60 @@ class PreparedEnsemble:
         crossings, logs = self.request.transition_times, self.request.every_transition
         kept = Kept(len(self.places), width, len(program.outputs), len(self.names), samples, crossings, logs)
         if plan is None:
-            again = [partial(self.again.numbered, place) for place in self.places]
-            run_in_turn(again, ArrayRecorder(self.instances, kept, self.names, self.kinds, program), progress)
+            with suppress(KeyboardInterrupt):  # those that are done are kept
+                self._run_in_turn(kept, progress)
         else:
             run_compiled(plan, self.instances, kept, self.names, threads, progress)
         for i in np.flatnonzero(kept.stop == "stuck").tolist():  # only the message of such a run tells its reason
-            kept.stop[i] = self.again.numbered(self.places[i]).stop.reason
+            kept.stop[i] = self.request.run(self.places[i]).stop.reason
         return self._ensemble(kept, time.perf_counter() - began)
+
+    def _run_in_turn(self, kept: Kept, progress: Progress | None) -> None:
+        """Run all instances one after the other, and record each."""
+        for i, place in enumerate(self.places):
+            execution = self.request.run(place)
+            if execution.stop.reason == "interrupted":
+                return
+            self._record(kept, i, execution)
+            if progress is not None:
+                progress(i + 1, len(self.places))
+
+    def _record(self, kept: Kept, i: int, execution: Execution) -> None:
+        """Record the execution of an instance."""
+        last, program = execution.arcs[-1], self.base.program
+        n, end = len(last.states), execution.times[-1]
+        kept.stop[i] = execution.stop.reason
+        modes = program.mode_names
+        kept.noted[i] = execution.noted(execution) if execution.noted else ""
+        kept.mode[i] = modes.index(last.mode)
+        kept.kind[i] = self.kinds.index(last.states)
+        kept.transitions[i] = len(execution.transitions)
+        kept.ended[i] = end
+        kept.final[i, :n] = execution.values[-1, :n]
+        kept.outputs[i] = execution.outputs[-1]
+        times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
+        kept.crossed[i, : len(times)] = times
+        inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
+        samples = execution.sample(self.instances.time[i][inside])
+        for k, name in enumerate(self.names):
+            if name in samples.states:
+                kept.states[i, k, inside] = samples[name]
+        kept.results[i, inside] = samples.output_columns
+        if kept.logs:
+            kept.log[i] = self._logged(kept.width, execution.transitions)
+
+    def _logged(self, width: int, transitions: Sequence[Transition]) -> Logged:
+        nan, program = float("nan"), self.base.program
+        table = np.zeros(len(transitions), structures.TRANSITION)
+        before, after = np.full((2, len(transitions), width), nan)
+        for k, made in enumerate(transitions):
+            source = program.mode_names.index(made.source)
+            edges = [edge.name for edge in program.modes[source].edges]
+            resumed = nan if made.resumed is None else made.resumed
+            table[k] = made.time, resumed, source, edges.index(made.edge), made.entry, len(made.alternatives)
+            before[k, : len(made.before)] = list(made.before.values())
+            after[k, : len(made.after or ())] = list((made.after or {}).values())
+        return table, before, after
 
     def _ensemble(self, kept: Kept, seconds: float) -> Ensemble:
         shape, settings = self.request.shape, self.base.settings
@@ -147,7 +170,7 @@ class PreparedEnsemble:
             seconds={"simulate": seconds},
             refusals={tuple(map(int, np.unravel_index(k, shape))): why for k, why in refused},
             transition_table=self._transition_table(kept, placed(kept.transitions, 0)) if kept.logs else None,
-            again=self.again,
+            again=self.request,
             title=self.base.program.title,
         )
 
@@ -166,12 +189,13 @@ class PreparedEnsemble:
         return TransitionTable(first, made["time"], known[number], made["entry"] != 0, before, after)
 
 
-def prepare_ensemble(model: Runs, request: EnsembleRequest) -> PreparedEnsemble:
+def prepare_ensemble(request: EnsembleRequest) -> PreparedEnsemble:
     """Compute the numbers of every instance.
 
     Raises UsageError: none of them can be run.
     """
-    pipeline, call = model.pipeline, request.call
+    model, call = request.model, request.call
+    pipeline = model.pipeline
     values = pipeline.values(FLOAT64)
     columns = InstanceTable(values, [()] * math.prod(request.shape))
     evaluate_parameters(columns, call["parameters"], request.arrays(initial=False))
@@ -201,7 +225,7 @@ def prepare_ensemble(model: Runs, request: EnsembleRequest) -> PreparedEnsemble:
         time=times()[places],
     )
     kinds = list(StateLayouts(model.program, base.states).kinds)
-    return PreparedEnsemble(model, request, base, columns, places, instances, kinds)
+    return PreparedEnsemble(request, base, columns, places, instances, kinds)
 
 
 def _settings(columns: InstanceTable, base: Settings, options: Options) -> dict[int, Settings]:
@@ -225,18 +249,19 @@ def run_ensemble(
     """Run many instances of a model; see `Model.ensemble`."""
     if threads is not None:
         whole(threads, "threads", least=1)
-    request = EnsembleRequest.of(model.program, call, samples, transition_times, every_transition)
     model = model.sliding if model.pipeline.slides(call) else model
-    return prepare_ensemble(model, request).run(threads or cores(), progress)
+    request = EnsembleRequest.of(model, call, samples, transition_times, every_transition)
+    return prepare_ensemble(request).run(threads or cores(), progress)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnsembleRequest:
     """The arguments of an ensemble: ``call`` has those of every single run, and ``varied`` the arrays by name.
 
-    The arrays are flattened; ``shape`` is their common shape.
+    The arrays are flattened; ``shape`` is their common shape. Called with a place there it runs that instance.
     """
 
+    model: Runs
     call: dict[str, Any]
     varied: dict[str, Array]
     shape: tuple[int, ...]
@@ -246,7 +271,7 @@ class EnsembleRequest:
 
     @staticmethod
     def of(
-        program: Program, call: dict[str, Any], samples: Any, transition_times: int, every_transition: bool = False
+        model: Runs, call: dict[str, Any], samples: Any, transition_times: int, every_transition: bool = False
     ) -> EnsembleRequest:
         """Sort the arguments.
 
@@ -257,7 +282,7 @@ class EnsembleRequest:
         whole(transition_times, "transition_times", least=0)
         varied: dict[str, Array] = {}
         for group, prefix in (("parameters", ""), ("initial", INITIAL)):
-            given = overrides_of(call, group, program)
+            given = overrides_of(call, group, model.program)
             varied |= {prefix + name: _array(name, value) for name, value in given.items() if np.ndim(value) > 0}
             call = call | {group: {name: _plain(value) for name, value in given.items() if np.ndim(value) == 0}}
         try:
@@ -269,12 +294,20 @@ class EnsembleRequest:
             raise UsageError(f"the arrays of an ensemble have no common shape: {shapes}", hint) from None
         shape = common[0].shape if common else ()
         flat = {name: array.reshape(-1) for name, array in zip(varied, common, strict=True)}
-        return EnsembleRequest(call, flat, shape, _samples(samples), transition_times, every_transition)
+        return EnsembleRequest(model, call, flat, shape, _samples(samples), transition_times, every_transition)
 
     def arrays(self, initial: bool) -> dict[str, list[float]]:
         """The columns of initial states or of parameters, by name."""
         columns = ((name, array) for name, array in self.varied.items() if name.startswith(INITIAL) == initial)
         return {name.removeprefix(INITIAL): array.tolist() for name, array in columns}
+
+    def __call__(self, place: tuple[int, ...]) -> Execution:
+        """Run the instance at a place."""
+        return self.run(int(np.ravel_multi_index(place, self.shape)) if self.shape else 0)
+
+    def run(self, index: int) -> Execution:
+        """Run the instance with this number by itself."""
+        return self.model.simulate(**self.single(index))
 
     def single(self, index: int) -> dict[str, Any]:
         """The arguments of the single run of one instance."""
@@ -387,67 +420,3 @@ def run_compiled(
             worker.join()
     if failed:
         raise failed[0]
-
-
-def run_in_turn(
-    runs: Sequence[Callable[[], Execution]], record: Callable[[int, Execution], None], progress: Progress | None
-) -> None:
-    """Run all instances one after the other and record each; at Ctrl-C those that are done are kept."""
-    try:
-        for i, run in enumerate(runs):
-            execution = run()
-            if execution.stop.reason == "interrupted":
-                return
-            record(i, execution)
-            if progress is not None:
-                progress(i + 1, len(runs))
-    except KeyboardInterrupt:
-        return
-
-
-@dataclass(frozen=True, eq=False)
-class ArrayRecorder:
-    """Arrays for executions; ``kinds`` are the layouts of states, ``names`` those of all states."""
-
-    instances: Instances
-    kept: Kept
-    names: tuple[str, ...]
-    kinds: list[tuple[str, ...]]
-    program: Program
-
-    def __call__(self, i: int, execution: Execution) -> None:
-        """Record the execution of an instance."""
-        kept, last = self.kept, execution.arcs[-1]
-        n, end = len(last.states), execution.times[-1]
-        kept.stop[i] = execution.stop.reason
-        modes = self.program.mode_names
-        kept.noted[i] = execution.noted(execution) if execution.noted else ""
-        kept.mode[i] = modes.index(last.mode)
-        kept.kind[i] = self.kinds.index(last.states)
-        kept.transitions[i] = len(execution.transitions)
-        kept.ended[i] = end
-        kept.final[i, :n] = execution.values[-1, :n]
-        kept.outputs[i] = execution.outputs[-1]
-        times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
-        kept.crossed[i, : len(times)] = times
-        inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
-        samples = execution.sample(self.instances.time[i][inside])
-        for k, name in enumerate(self.names):
-            if name in samples.states:
-                kept.states[i, k, inside] = samples[name]
-        kept.results[i, inside] = samples.output_columns
-        if kept.logs:
-            kept.log[i] = self._logged(execution.transitions, modes)
-
-    def _logged(self, transitions: Sequence[Transition], modes: tuple[str, ...]) -> Logged:
-        nan = float("nan")
-        table = np.zeros(len(transitions), structures.TRANSITION)
-        before, after = np.full((2, len(transitions), self.kept.width), nan)
-        for k, made in enumerate(transitions):
-            source = modes.index(made.source)
-            edges = [edge.name for edge in self.program.modes[source].edges]
-            resumed = nan if made.resumed is None else made.resumed
-            table[k] = made.time, resumed, source, edges.index(made.edge), made.entry, len(made.alternatives)
-            before[k, : len(made.before)] = list(made.before.values())
-            after[k, : len(made.after or ())] = list((made.after or {}).values())
-        return table, before, after
