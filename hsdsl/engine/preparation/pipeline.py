@@ -167,7 +167,7 @@ class Pipeline:
         if SLIDING in self._part:
             return self
         files, part = self._files, (*self._part, SLIDING)
-        cached = None if files is None else program_cache.find(files, part)
+        cached = self._kept(part)
         if cached is not None:
             program, files = cached
             whole = len(program.modes) == len(self.program.modes)
@@ -193,6 +193,9 @@ class Pipeline:
         """Keep a program for later runs."""
         if self._files is not None and _method_exists(program):
             program_cache.keep(self._files, program, part)
+
+    def _kept(self, part: program_cache.Part) -> tuple[Program, ModelFiles] | None:
+        return None if self._files is None else program_cache.find(self._files, part)
 
     @property
     def columns(self) -> list[str]:
@@ -314,7 +317,7 @@ class Pipeline:
     def derived(self, name: tuple[str, ...], make: Callable[[], HybridSystem]) -> Pipeline:
         """The pipeline of a system made of this one, whose program is kept under a name of its own."""
         part = (*self._part, name)
-        cached = None if self._files is None else program_cache.find(self._files, part)
+        cached = self._kept(part)
         if cached is not None:
             program, files = cached
             return Pipeline(None, 0.0, files, program, part)
@@ -324,7 +327,7 @@ class Pipeline:
         """The pipeline of these states and outputs with what they need; this one where that is the whole model."""
         began = time.perf_counter()
         part = (*self._part, names)
-        cached = None if self._files is None else program_cache.find(self._files, part)
+        cached = self._kept(part)
         if cached is not None:
             program, files = cached
             whole = program.left_out == self.program.left_out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, nan
 
 import numpy as np
@@ -158,10 +158,6 @@ class Judgement:
     transitions: int | None
     why: str = ""
     rho: Interval | None = None
-
-    def with_rho(self, rho: Interval | None) -> Judgement:
-        """Add a distance of executions."""
-        return replace(self, rho=rho)
 
 
 def judge(scene: Scene, result: Result) -> Judgement:

@@ -67,7 +67,7 @@ class Differentiator:
             check_arguments(arguments, "a sensitivity", REFUSED)
             ready, run = self._run(self._ready(wrt, arguments, firsts))
         if not ready.entries and (run.stop.reason == "not_finite" or run.enters_beyond):
-            ready, run = self._run(self._with_entries(ready))
+            ready, run = self._run(self._prepare(replace(ready, entries=True)))
         self._prepared.keep(key, ready)
         return Sensitivity(
             ready.labels, run, ready.setting, firsts, lambda first: self.sensitivity(wrt, arguments, first)
@@ -115,9 +115,6 @@ class Differentiator:
             plain = automatic.instead(ready.setting.plain, stiff)
             ready = self._prepare(replace(ready, setting=replace(ready.setting, plain=plain)))
         return ready, ready.setting.augmented.simulate()
-
-    def _with_entries(self, ready: _Ready) -> _Ready:
-        return self._prepare(replace(ready, entries=True))
 
     def _prepare(self, ready: _Ready) -> _Ready:
         """Prepare the run of the augmented system with the numbers and the method of the plain one."""
