@@ -55,7 +55,7 @@ ON = 2.0**-26  # of what the way's first step moves a surface by: a state so nea
 OTHER_STAGES = "dop853"
 SHORT = (20, 30, 40)  # halvings of the run: the lengths of first steps that are tried
 LAST = 16  # of these, at which a mode must be stiff
-MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longer to look at than to run
+MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longer to examine than to run
 
 
 @dataclass(frozen=True)
@@ -142,9 +142,9 @@ def _judge(
     if here is None:
         return None
     try:
-        look = _Look(plain.kernel, plain.timeline, index, float(t), np.array(here))
-        decay = look.decay()
-        if decay * float(step) < 1 or look.straight(decay) * decay < APART:
+        flight = _Flight(plain.kernel, plain.timeline, index, float(t), np.array(here))
+        decay = flight.decay()
+        if decay * float(step) < 1 or flight.straight(decay) * decay < APART:
             return None
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
         return None
@@ -170,7 +170,7 @@ def instead(prepared: Prepared, stiff: Stiffness) -> Prepared:
 def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]) -> bool:
     """Whether the flow has finite derivatives at the start: the square root of 0 has none, and so no Taylor series."""
     try:
-        return bool(np.isfinite(_Look(kernel, timeline, mode, 0.0, np.array(x, float)).jacobian()).all())
+        return bool(np.isfinite(_Flight(kernel, timeline, mode, 0.0, np.array(x, float)).jacobian()).all())
     except DOMAIN_ERRORS:
         return False
 
@@ -196,7 +196,7 @@ def _near(program: Program, mode: int, x: Sequence[Number]) -> Iterator[tuple[in
 
 
 def _in_mode(program: Program, mode: int, values: Mapping[str, Number]) -> list[float] | None:
-    """The values of a mode's states; None where one is missing, or where there are none or too many to look at."""
+    """The values of a mode's states; None where one is missing, or where there are none or too many to examine."""
     states = program.modes[mode].states
     if not 0 < len(states) <= MOST_STATES or not values.keys() >= set(states):
         return None
@@ -208,25 +208,25 @@ def stiffness(
 ) -> Stiffness | None:
     """The stiffness of a mode near x at a time, None where it is not stiff."""
     try:
-        look = _Look(kernel, timeline, mode, t, np.array(x, float))
+        flight = _Flight(kernel, timeline, mode, t, np.array(x, float))
         stiff = None
         for count in range(STEPS):
-            decay = look.decay()
+            decay = flight.decay()
             if decay * (until - t) < LEAST_STEPS * REACH:
                 return None
-            straight = look.straight(decay)
+            straight = flight.straight(decay)
             if count >= STEPS - LAST and straight * decay < APART:
                 return None
             stiff = Stiffness(name, t, 1 / decay, straight)
-            look.step(min(LENGTH / decay, straight))
-            if look.has_ended():
+            flight.step(min(LENGTH / decay, straight))
+            if flight.has_ended():
                 return None
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
         return None  # unknown
     return stiff
 
 
-class _Look:
+class _Flight:
     """A mode's flow and Jacobian as arrays, with the inputs of a time, and a point on the way from there."""
 
     x: Array
@@ -238,7 +238,7 @@ class _Look:
         self.t, self.x = t, x
         self._scales: Array = np.abs(x)
         self._before = self._mode.surfaces(t, *x.tolist())
-        self._touched: set[int] | None = None
+        self._left: set[int] | None = None
 
     def flow(self, t: float, x: Array) -> Array:
         return np.array(self._flow(t, *x.tolist()), float)
@@ -250,10 +250,10 @@ class _Look:
         """Whether the flight from the start of the way has ended; surfaces that the state was on do not end it."""
         place = self.t, *self.x.tolist()
         now, fires = self._mode.surfaces(*place), self._mode.conditions
-        if self._touched is None:
+        if self._left is None:
             both = enumerate(zip(self._before, now, strict=True))
-            self._touched = {k for k, (a, b) in both if abs(a) <= ON * abs(b - a)}
-        crossed = (k for k, r in enumerate(now) if r > 0 and k not in self._touched)
+            self._left = {k for k, (a, b) in both if abs(a) <= ON * abs(b - a)}
+        crossed = (k for k, r in enumerate(now) if r > 0 and k not in self._left)
         return self.t > self._end or any(k >= len(fires) or fires[k](*place)[0] for k in crossed)
 
     def decay(self) -> float:

@@ -409,7 +409,7 @@ def orbital_stability(
     ways = directions(len(by), whole(samples, "samples", 1), seed)
     total, done = len(radii) * len(ways), 0
 
-    def look(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
+    def moved_run(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
         nonlocal done
         moved = {label: number + shift[label] for label, number in known.items()}
         other = model.simulate(**varied(call, by, moved, model.program))
@@ -420,7 +420,7 @@ def orbital_stability(
         return (*found, tuple(made.edge for made in other.transitions))
 
     title = called(run.title, run.model)
-    return sampled([t.label for t in by], scales, list(radii), ways, look, title)
+    return sampled([t.label for t in by], scales, list(radii), ways, moved_run, title)
 
 
 def _distance(run: Execution, other: Execution, model: Runs) -> tuple[float, float]:
