@@ -105,11 +105,7 @@ def same(a: Any, b: Any) -> bool:
             and len(left) == len(right)
             and all(same(x, y) for x, y in zip(left, right, strict=True))
         )
-    return bool(a == b) or _both_nan(a, b)
-
-
-def _both_nan(a: Any, b: Any) -> bool:
-    return bool(a != a) and bool(b != b)  # the one value that differs from itself
+    return bool(a == b) or (bool(a != a) and bool(b != b))  # not-a-number alone differs from itself
 
 
 def _same_arrays(a: Any, b: Any) -> bool:

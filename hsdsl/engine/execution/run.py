@@ -230,7 +230,7 @@ def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
     with np.errstate(invalid="ignore", over="ignore"):
         values = _states(execution, at)
         outputs = _outputs(execution, at, values)
-    columns, present = _by_name(execution, at, values)
+    columns, present = columns_by_name(values, table.layout[at.arc], table.layouts, execution.states)
     return Samples(
         time=times,
         mode=table.mode[at.arc],
@@ -277,12 +277,6 @@ def _outputs(execution: Execution, at: _Places, values: Array) -> Array:
         except DOMAIN_ERRORS:
             outputs[i] = float("nan")
     return outputs
-
-
-def _by_name(execution: Execution, at: _Places, values: Array) -> tuple[Array, Array]:
-    """Sort the states into one column a name, and say where a mode has them."""
-    table = execution.arc_table
-    return columns_by_name(values, table.layout[at.arc], table.layouts, execution.states)
 
 
 def columns_by_name(

@@ -32,7 +32,7 @@ from hsdsl.interface.model.differentiate import FINEST, located_arguments, start
 from hsdsl.interface.model.distances import distance_of_runs
 
 if TYPE_CHECKING:
-    from hsdsl.engine.execution import Array, Transition
+    from hsdsl.engine.execution import Array
     from hsdsl.interface.model.runs import Runs
 
 
@@ -151,7 +151,8 @@ class Orbits:
     def guesses(self, run: Execution) -> list[Guess]:
         """States after the section's transitions in a run, those first that a lap changes least."""
         passed = [made for made in run.transitions if made.edge == self.edge and made.after is not None]
-        places = [self._entered_by(made) for made in passed]
+        parts = self.model.program.parts
+        places = [(made.target, tuple(made.after or {})) if parts else self._entered() for made in passed]
         points = [np.array([(made.after or {})[x] for x in states], float)
                   for made, (_, states) in zip(passed, places, strict=True)]  # fmt: skip
         times = [float(made.time) for made in passed]
@@ -173,18 +174,12 @@ class Orbits:
         lasting = [(change, guess) for change, guess in found if guess.time > least]
         return [_with_sizes(guess, run) for _, guess in sorted(lasting, key=lambda each: each[0])[:MOST_GUESSES]]
 
-    def _entered_by(self, made: Transition) -> Entered:
-        """The mode and the states that a transition of the section leads to."""
-        if not self.model.program.parts:
-            return self._entered()
-        return made.target, tuple(made.after or {})
-
     def find(self) -> Orbit:
         """Find the orbit that the model's own run comes closest to.
 
         Raises UsageError: the run does not pass the section, or no orbit is found.
         """
-        run = self.model.simulate(scheme="located", **self._run_arguments())
+        run = self.model.simulate(**located_arguments(self.model.pipeline, self.arguments))
         self._stiff = run.method == "radau"
         guesses = self.guesses(run)
         ending = "" if run.stop.complete else f"; the run stops at t = {run.times[-1]:g}: {run.stop.message}"
@@ -222,11 +217,6 @@ class Orbits:
         passed = [float(made.time) for made in run.transitions if made.edge == self.edge]
         lasted = np.diff(passed)
         return len(lasted) > 1 and bool(np.all(np.diff(lasted) < 0))
-
-    def _run_arguments(self) -> dict[str, Any]:
-        from hsdsl.interface.model.differentiate import located_arguments
-
-        return {k: v for k, v in located_arguments(self.model.pipeline, self.arguments).items() if k != "scheme"}
 
     def shoot(self, guess: Guess, parameters: Mapping[str, Any]) -> Orbit:
         """Find the orbit near a guess.
