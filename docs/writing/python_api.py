@@ -118,8 +118,7 @@ def _entry(name: str, thing: Any, members: str) -> Iterator[str]:
     if name in MADE:
         yield _signature(thing.__name__, thing)
     yield _described(thing)
-    bases = [base for base in reversed(thing.__mro__) if base is thing or (members == "*" and base.__name__ == "Runs")]
-    own = [key for base in bases for key, value in vars(base).items() if not key.startswith("_") and _is_member(value)]
+    own = [key for key, value in vars(thing).items() if not key.startswith("_") and _is_member(value)]
     for member in own if members == "*" else members.split():
         value = inspect.getattr_static(thing, member)
         value = getattr(value, "__func__", value)
