@@ -23,7 +23,7 @@ of the model's parameters as well, such as `"40*pi"`. Errors are [`ModelError`](
 [`UsageError`](#hsdslusageerror), of a request; their sentences are those of the command line.
 
 """
-RUN = "hsdsl.engine.execution.parts."
+RUN = "hsdsl.engine.execution.records."
 # heading: names, each with its members where it is a class
 SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
     "Load a model": (("hsdsl.load", ""), ("hsdsl.loads", ""), ("hsdsl.Limits", "")),
@@ -41,7 +41,7 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
             " sample_times",
         ),
         *((RUN + name, "") for name in ("Transition", "Stop", "Verdict", "Point", "Arc")),
-        ("hsdsl.engine.execution.samples.Samples", "only columns to_pandas names labels"),
+        ("hsdsl.engine.execution.records.Samples", "only columns to_pandas names labels"),
         ("hsdsl.interface.model.estimate.Estimate", "*"),
         ("hsdsl.interface.model.stream.Streamed", ""),
         ("hsdsl.store.load", ""),

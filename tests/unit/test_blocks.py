@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import hsdsl
+from hsdsl.base.graphs import variation
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.base.sparsity import variation
 from hsdsl.engine.integrators import radau
 from hsdsl.engine.integrators.implicit import Derivatives
 from hsdsl.engine.integrators.radau import Steps

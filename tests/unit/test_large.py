@@ -14,7 +14,7 @@ from engines import needs_compiler
 from scipy.special import jv
 
 import hsdsl
-from hsdsl.base.sparsity import elimination
+from hsdsl.base.graphs import elimination
 from hsdsl.engine.backends.c import model_parts, model_source
 from hsdsl.engine.backends.c.pieces import LONGEST
 from hsdsl.engine.integrators.sparse import sparse_factored, sparse_factored_complex

@@ -267,7 +267,7 @@ def test_what_cannot_be_run_is_refused_before_a_folder_is_made(model, tmp_path, 
 
 
 def test_a_process_that_dies_loses_nothing(model, tmp_path, monkeypatch):
-    from hsdsl.interface.model.chunk_work import ChunkWork
+    from hsdsl.interface.model.sweeps import ChunkWork
 
     made, fuse = ChunkWork.__call__, tmp_path / "fuse"
     fuse.touch()
@@ -284,7 +284,7 @@ def test_a_process_that_dies_loses_nothing(model, tmp_path, monkeypatch):
 
 
 def test_a_chunk_that_ends_every_process_ends_the_sweep(model, tmp_path, monkeypatch):
-    from hsdsl.interface.model.chunk_work import ChunkWork
+    from hsdsl.interface.model.sweeps import ChunkWork
 
     made = ChunkWork.__call__
     monkeypatch.setattr(ChunkWork, "__call__", lambda self, k: os._exit(1) if k == 3 else made(self, k))

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from hsdsl.analysis.store import load
-from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_arguments
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.execution import Arc, Array, Execution, Point, Transition

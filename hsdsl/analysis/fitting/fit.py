@@ -14,9 +14,8 @@ import numpy as np
 
 from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import condensed, number
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import called, counted, did_you_mean, shown, visible
+from hsdsl.base.names import called, checks_methods, counted, did_you_mean, shown, visible
 from hsdsl.engine.execution import HYBRID_TIME, Array, Execution
 
 

@@ -29,8 +29,8 @@ from hsdsl.analysis.metrics.interval import (
 )
 from hsdsl.analysis.metrics.local import Neighbours, Route, search_nonaffine
 from hsdsl.analysis.metrics.search import TOLERANCE, End, Query, SearchResult, search
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_methods
 from hsdsl.engine.execution import Array
 
 __all__ = ["PathPiece", "PointDistance", "SpacePoint", "coordinates", "distance", "distances"]

@@ -30,8 +30,7 @@ from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, Orbit, multipliers_of
 from hsdsl.analysis.orbits.section import CLOSED, Closed, NoReturn, Return, gap
 from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import number
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called
+from hsdsl.base.names import called, checks_methods
 from hsdsl.engine.execution import Array
 from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
 

@@ -13,8 +13,7 @@ from hsdsl.analysis.orbits.section import Closed
 from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import condensed, number, values
 from hsdsl.analysis.sensitivity.result import Sensitivity
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called, seen
+from hsdsl.base.names import called, checks_methods, seen
 from hsdsl.engine.execution import Array, Execution
 
 LEAST_MARGIN = 1e-8  # multipliers are not known better than this

@@ -8,12 +8,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import SINCE, did_you_mean, without_memory
+from hsdsl.base.names import SINCE, checks_methods, did_you_mean, without_memory
 from hsdsl.base.numbers.decimals import number_of
 from hsdsl.engine.execution import Array, Execution, Samples
-from hsdsl.engine.execution.sampling import evaluate
+from hsdsl.engine.execution.run import evaluate
 from hsdsl.mathematics.program import ModeProgram, Program
 
 POINTS = 4000  # that a curve should have at least, where its pieces are not straight

@@ -15,7 +15,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from hsdsl.base.names import shown, visible, without_memory
-from hsdsl.base.written import event_text, inner_modes, written_edges
+from hsdsl.base.parts import event_text, inner_modes, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 

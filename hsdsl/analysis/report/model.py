@@ -17,7 +17,7 @@ from hsdsl.analysis.report import mode_graph
 from hsdsl.analysis.report.mode_graph import visited_part
 from hsdsl.base.names import called, counted, shown, visible, visible_lines, without_memory
 from hsdsl.base.numbers import decimals
-from hsdsl.base.written import written_edges, written_modes
+from hsdsl.base.parts import written_edges, written_modes
 from hsdsl.language.elaborate.definitions import named_functions
 from hsdsl.language.expression import plain
 from hsdsl.language.expression.algebra import cases

@@ -23,8 +23,7 @@ from hsdsl.analysis.sensitivity.targets import (
     still_rate_name,
 )
 from hsdsl.analysis.sensitivity.ties import Tie, landing, parted, ties, touched
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called, seen
+from hsdsl.base.names import called, checks_methods, seen
 from hsdsl.base.parts import numbered, present, product_name
 from hsdsl.engine.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.engine.simulate import Prepared

@@ -22,10 +22,9 @@ from hsdsl.analysis.store.table import (
     write_parquet,
     write_sidecar,
 )
-from hsdsl.base.atomic import replacing, unplaced
-from hsdsl.base.calls import checks_arguments
+from hsdsl.base.atomic import locked, replacing, unplaced
 from hsdsl.base.errors import UsageError
-from hsdsl.base.unfinished import locked
+from hsdsl.base.names import checks_arguments
 from hsdsl.engine.execution import Execution
 
 __all__ = ["forget_sidecar", "load", "read_sidecar", "save"]

@@ -21,8 +21,8 @@ from typing import Any, BinaryIO, Literal, Union, cast, get_args, get_origin, ge
 
 import numpy as np
 
-from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_arguments
 from hsdsl.base.numbers import decimals
 from hsdsl.engine.execution import Arc, Array, Execution, Kind, Point, RunWarning, Stop, Transition, Verdict
 from hsdsl.language.files import open_regular

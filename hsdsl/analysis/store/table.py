@@ -20,12 +20,12 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 
 from hsdsl.analysis.report import as_json, dumps
-from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_arguments
 from hsdsl.base.numbers import decimals
 from hsdsl.engine.execution import Array, Execution, Samples
-from hsdsl.engine.execution.samples import optional
-from hsdsl.engine.execution.sampling import evaluate, find, within
+from hsdsl.engine.execution.records import optional
+from hsdsl.engine.execution.run import evaluate, find, within
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 

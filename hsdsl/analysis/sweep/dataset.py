@@ -27,9 +27,8 @@ import numpy as np
 from hsdsl.analysis.sweep import manifest as manifests
 from hsdsl.analysis.sweep.manifest import LISTS, TAG, Manifest, column_of, library, schema
 from hsdsl.base.atomic import replacing
-from hsdsl.base.calls import checks_arguments, checks_methods
 from hsdsl.base.errors import WARNINGS, UsageError
-from hsdsl.base.names import SINCE, called, counted, did_you_mean, shown, visible
+from hsdsl.base.names import SINCE, called, checks_arguments, checks_methods, counted, did_you_mean, shown, visible
 from hsdsl.base.processes import Lost, in_processes
 from hsdsl.engine.execution import Array
 

@@ -48,7 +48,7 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean, shown
 from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.engine.execution import LEFT, Array, Ensemble
-from hsdsl.engine.execution.samples import optional
+from hsdsl.engine.execution.records import optional
 from hsdsl.engine.simulate.stops import limit
 
 FILE, FORMAT, VERSION = "_sweep.json", "hsdsl sweep", 1

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from hsdsl.base.graphs import Variation
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.base.sparsity import Variation
 from hsdsl.engine.integrators.linear import ComplexFactors, Factors, Matrix, Vector
 from hsdsl.engine.integrators.sparse import ComplexSparseFactors, SparseFactors
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
+from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
-from hsdsl.base.sparsity import Elimination, Variation
 from hsdsl.engine.kernel import Routine
 
 if TYPE_CHECKING:

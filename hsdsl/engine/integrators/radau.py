@@ -17,8 +17,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 
+from hsdsl.base.graphs import Elimination
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.base.sparsity import Elimination
 from hsdsl.engine.integrators.blocks import BlockFactors, ComplexBlockFactors, linked
 from hsdsl.engine.integrators.collocation import coefficients
 from hsdsl.engine.integrators.implicit import RADAU as RADAU

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hsdsl.base.graphs import Elimination
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.base.sparsity import Elimination
 from hsdsl.engine.integrators.linear import Singular, Vector
 
 

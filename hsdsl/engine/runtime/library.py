@@ -12,11 +12,11 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 from hsdsl.base import limits
-from hsdsl.base.cache import can_keep, find, is_made, keep, key_of, making
+from hsdsl.base.cache import find, keep, key_of, making
 from hsdsl.base.names import shown
 from hsdsl.engine.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
 
@@ -107,31 +107,6 @@ def _loaded(path: Path) -> ctypes.CDLL | None:
         return ctypes.CDLL(str(path))
     except OSError:
         return None  # made for something else than what runs now: it is made again
-
-
-def is_missing(content: str) -> bool:
-    """Whether the library of ``content`` is not there, and no process makes it.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    key = _key(content, find_compiler())
-    return not _shipped(content).exists() and find(KIND, key) is None and not is_made(KIND, key)
-
-
-def can_be_kept(content: str) -> bool:
-    """Whether the library of ``content`` will be there for other processes.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    return can_keep(KIND, _key(content, find_compiler()))
-
-
-def made_elsewhere(content: str) -> Callable[[], bool]:
-    """A function that says whether another process compiles ``content`` at the moment.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    return partial(is_made, KIND, _key(content, find_compiler()))
 
 
 def _key(content: str, compiler: Compiler) -> str:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
 
 from hsdsl.base import limits
 from hsdsl.engine.runtime.compiler import NoCompiler, TooSlow
-from hsdsl.engine.runtime.library import LOOP, can_be_kept, is_missing, load, loop, made_elsewhere
+from hsdsl.engine.runtime.library import load
 from hsdsl.mathematics.program import Program
 
 SYMBOL = "hs_the_model"
@@ -22,30 +21,6 @@ def compiled(program: Program) -> ctypes.CDLL:
         return load(_content(program), SYMBOL, lambda: _source(program))
     except TooSlow as error:
         raise NoCompiler(f"{error}; {_longest(program)}") from None
-
-
-def keep(program: Program) -> bool:
-    """Compile a program and the loop for the cache, unless they are there or other processes do; False if it is closed.
-
-    Raises NoCompiler: there is no compiler, or it fails.
-    """
-    content = _content(program)
-    if not can_be_kept(content):
-        return False
-    if is_missing(content):
-        compiled(program)
-    if is_missing(LOOP[0]):
-        loop()
-    return True
-
-
-def under_way(program: Program) -> Callable[[], bool]:
-    """A function that says whether other processes compile a program, or the loop, at the moment.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    looks = made_elsewhere(_content(program)), made_elsewhere(LOOP[0])
-    return lambda: any(look() for look in looks)
 
 
 def _content(program: Program) -> str:

@@ -6,8 +6,8 @@ from bisect import bisect_right
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_methods
 from hsdsl.base.numbers.arithmetic import TIE, Number
 from hsdsl.engine.execution import Execution, Transition
 from hsdsl.engine.simulate.stops import show

@@ -21,13 +21,13 @@ from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.interface.model.differentiate import start_by, varied
 
 if TYPE_CHECKING:
-    from hsdsl.interface.model.model import Model
+    from hsdsl.interface.model.runs import Runs
 
 REFUSED = ("step", "scheme", "samples", "precision", "until")
 
 
 def fit(
-    model: Model,
+    model: Runs,
     data: Any,
     wrt: str | Sequence[str],
     sigma: Mapping[str, float] | float | None,
@@ -56,7 +56,7 @@ def fit(
     return replace(fitted(objective, bounds, bool(sigma), scales), units=model.program.units)
 
 
-def _evaluate(model: Model, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:
+def _evaluate(model: Runs, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:
     labels = [t.label for t in by]
 
     def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:

@@ -19,8 +19,7 @@ from typing import Any
 import sympy as sp
 
 from hsdsl.base.functions import absolute, below, floor, maximum, minimum, rebuilt, replaced, sign
-from hsdsl.base.graphs import closure
-from hsdsl.base.sparsity import filled
+from hsdsl.base.graphs import closure, filled
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 from hsdsl.mathematics import program as lowered

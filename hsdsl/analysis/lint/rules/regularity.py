@@ -10,12 +10,22 @@ from hsdsl.analysis.lint.finding import Alike, Finding, Severity
 from hsdsl.analysis.lint.source_expressions import SourceExpression
 from hsdsl.analysis.lint.subject import EdgePart, ModePart, Subject
 from hsdsl.base.names import shown
-from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.system import Mode
-from hsdsl.mathematics.decisions.dynamics import Clause, Dynamics, at
-from hsdsl.mathematics.decisions.search import UNKNOWN, Answer, Constraint, positive, zero
-from hsdsl.mathematics.decisions.singularities import divisors, infinite_slopes, jumps, kinks, without_value
+from hsdsl.language.source import Scalar
+from hsdsl.language.system import Mode, Surface
+from hsdsl.mathematics.decisions.dynamics import Clause, Dynamics, Proof, at, strict, within
+from hsdsl.mathematics.decisions.mode_point import ModePoint, Unsure
+from hsdsl.mathematics.decisions.search import UNKNOWN, Answer, Constraint, negative, positive, zero
+from hsdsl.mathematics.decisions.singularities import (
+    divisors,
+    infinite_slopes,
+    jumps,
+    jumps_in_time,
+    kinks,
+    pieces,
+    without_value,
+)
+from hsdsl.mathematics.lower.straight import text_of
 
 _END = "end the domain before, with a guard or a wall"
 _NAMES = {"flow": "the flow of '{}'", "reset": "the reset of '{}'", "when": "this surface", "domain": "this wall"}

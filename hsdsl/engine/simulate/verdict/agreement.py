@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.base.names import remembered_state
-from hsdsl.base.numbers.bernstein import Array
+from hsdsl.base.numbers.enclosures import Array
 from hsdsl.engine.execution import Execution, Transition
 from hsdsl.engine.simulate.moving import ERROR_UNITS
 

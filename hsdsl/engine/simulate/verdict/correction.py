@@ -26,7 +26,7 @@ from math import comb, factorial, sqrt
 
 import numpy as np
 
-from hsdsl.base.numbers.bernstein import Array
+from hsdsl.base.numbers.enclosures import Array
 
 NODES, POWERS = 4, 6
 POLE = 1 / 5

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64
-from hsdsl.base.numbers.bernstein import Array
-from hsdsl.base.numbers.enclosures import Range, Undecided, as_range
+from hsdsl.base.numbers.enclosures import Array, Range, Undecided, as_range
 from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.verdict.agreement import SAFE, Errors

@@ -16,8 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.base.numbers.bernstein import Array
-from hsdsl.base.numbers.enclosures import Range, as_range
+from hsdsl.base.numbers.enclosures import Array, Range, as_range
 
 ORDER = 3
 EXPANSION_ROUNDOFF = 2.0**-48  # of all terms together: more than rounding makes of a coefficient

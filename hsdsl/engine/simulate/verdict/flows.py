@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import NOTHING
-from hsdsl.base.numbers.bernstein import Array
+from hsdsl.base.numbers.enclosures import Array
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.verdict.expanded import EXPANDED
 from hsdsl.engine.simulate.verdict.expansions import RESOLVED, line

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
-from hsdsl.base.numbers.bernstein import Array
-from hsdsl.base.numbers.enclosures import Range, as_range
+from hsdsl.base.numbers.enclosures import Array, Range, as_range
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.remarks import Remark, may_be_passed, of_edge, wall_of
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS

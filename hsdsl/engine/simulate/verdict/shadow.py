@@ -27,7 +27,7 @@ from functools import cached_property
 import numpy as np
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS
-from hsdsl.base.numbers.bernstein import Array
+from hsdsl.base.numbers.enclosures import Array
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.integrators import Method
 from hsdsl.engine.simulate.problem import Problem

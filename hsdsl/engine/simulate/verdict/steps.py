@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.base.numbers.bernstein import Array, around_middle, from_powers, halving
-from hsdsl.base.numbers.enclosures import Range, as_range
+from hsdsl.base.numbers.bernstein import around_middle, from_powers, halving
+from hsdsl.base.numbers.enclosures import Array, Range, as_range
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.verdict.expansions import Expansion, line, polynomial

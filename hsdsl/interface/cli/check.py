@@ -1,23 +1,111 @@
-"""Errors and findings of several models, printed in one of four formats."""
+"""``hsdsl validate``, ``lint`` and ``explain``: errors and findings of models, and their pages."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from typer import Exit
+from typer import Argument, Exit, Option
 
 from hsdsl import __version__
 from hsdsl.base.errors import Diagnostic, ModelError, UsageError
-from hsdsl.base.names import counted, visible
-from hsdsl.interface.cli.console import MODEL_ERRORS, WRONG_USAGE, print_errors, print_json, report_usage, usage_entry
-from hsdsl.interface.cli.options import Format
+from hsdsl.base.names import counted, did_you_mean, visible
+from hsdsl.base.parts import written_edges, written_modes
+from hsdsl.interface.cli.console import (
+    MODEL_ERRORS,
+    WRONG_USAGE,
+    errors_reported,
+    print_errors,
+    print_json,
+    report_usage,
+    usage_entry,
+)
+from hsdsl.interface.cli.options import Answer, Format, Formatted, Json, Models, codes, option, rule_codes
 from hsdsl.language.diagnose import as_annotation, as_sarif, finding, measured, render
 
 if TYPE_CHECKING:
     from hsdsl.analysis.lint import Ignored
+
+
+def validate(models: Models, *, format: Formatted = "text", answer: Answer) -> None:
+    """Check model files and report every error in them."""
+    report = DiagnosticReport("json" if answer.json else format, answer.quiet, "valid")
+    with answer.reporting():
+        report.examine(models, _size)
+    report.finish()
+
+
+def _size(path: Path) -> tuple[dict[str, Any], str]:
+    from hsdsl.interface.model import load
+
+    model = load(path)
+    model.resolve()
+    modes, parts = written_modes(model.system.modes), len(model.system.parts)
+    edges = sum(len(written_edges(mode.edges)) for mode in modes)
+    size = counted(parts, "part") if parts else counted(len(modes), "mode")
+    return {"valid": True}, f"valid, {size}, {counted(edges, 'transition')}"
+
+
+SELECT = "Use these rules alone: codes, beginnings of codes, families or names."
+IGNORE = "Do not use these rules."
+
+
+def lint(
+    models: Models,
+    *,
+    format: Formatted = "text",
+    select: Annotated[str | None, option("RULE,...", SELECT, complete=rule_codes)] = None,
+    ignore: Annotated[str | None, option("RULE,...", IGNORE, complete=rule_codes)] = None,
+    notes: Annotated[bool, Option("--notes", help="Show notes in full; with --select they always are.")] = False,
+    fix: Annotated[bool, Option("--fix", help="Remedy in the files what can be remedied safely.")] = False,
+    answer: Answer,
+) -> None:
+    """Look for what is legal in a model but suspicious."""
+    from hsdsl.analysis.lint import configured, selected
+    from hsdsl.analysis.lint import lint as findings_of
+    from hsdsl.analysis.lint.fix import fix as remedy
+
+    report = DiagnosticReport(
+        "json" if answer.json else format, answer.quiet, "clean", notes=notes or select is not None
+    )
+    options = {key: text.split(",") for key, text in (("select", select), ("ignore", ignore)) if text is not None}
+
+    def look(path: Path) -> tuple[dict[str, Any], str]:
+        selection = selected(**{**configured(path), **options})
+        result, remedied = remedy(path, selection) if fix else (findings_of(path, selection), 0)
+        shown = report.add(result.findings, result.ignored)
+        parts = [f"{count} {what}" for count, what in ((remedied, "fixed"), (len(result.ignored), "ignored")) if count]
+        verdict = counted(len(shown), "finding") if shown else "clean"
+        line = ", ".join([verdict, *parts]) if parts or not shown else ""
+        return {"clean": not result.findings, "fixed": remedied}, line
+
+    with answer.reporting():
+        report.examine(models, look)
+    report.finish()
+
+
+CODE = "A code such as HS111, or the name of a lint rule."
+
+
+def explain(
+    code: Annotated[str, Argument(metavar="CODE", help=CODE, autocompletion=codes)], json: Json = False
+) -> None:
+    """Explain an error, a warning of a run or a finding: its meaning, its reason, and what to write instead."""
+    from hsdsl.analysis.lint import RULES
+    from hsdsl.analysis.lint.pages import pages, titles
+
+    with errors_reported(json):
+        by_name = {rule.name: code for code, rule in RULES.items()}
+        known = by_name.get(code.lower(), code.upper())
+        if known not in titles():
+            raise UsageError(f"there is no code '{code}'", did_you_mean(known, [*titles(), *by_name]))
+        name = RULES[known].name if known in RULES else None
+        if json:
+            print_json({"code": known, "name": name, "title": titles()[known], "page": pages()[known]})
+        else:
+            print(f"{known} {name or ''}".strip() + "\n\n" + pages()[known])
 
 
 @dataclass

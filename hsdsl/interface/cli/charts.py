@@ -1,4 +1,4 @@
-"""``hsdsl chart``: speed against accuracy, ours and others'."""
+"""``hsdsl chart`` and ``stability``: speed against accuracy, ours and others', and maps of how methods fail."""
 
 from __future__ import annotations
 
@@ -10,13 +10,22 @@ from typer import Argument, Option
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.progress import Show, Text, running
-from hsdsl.interface.cli.completion import model_files
 from hsdsl.interface.cli.console import progress, say, write_table
-from hsdsl.interface.cli.options import Answer, option
-from hsdsl.interface.cli.texts import check_target, known_names, names_of
+from hsdsl.interface.cli.options import (
+    Answer,
+    Model,
+    check_target,
+    known_names,
+    model_files,
+    names_of,
+    option,
+    overriding,
+    values_of,
+)
 
 if TYPE_CHECKING:
     from hsdsl.interface.chart import Row
+
 
 MODELS = "Model files; FILE:1 is the second start of its reference."
 PEERS_HELP = "Peers to run: scipy, heyoka, diffrax, sksundae, casadi; or all."
@@ -137,3 +146,67 @@ def _numbers(text: str | None, name: str) -> tuple[float, ...]:
     if not all(0 < number < 1e300 for number in numbers):
         raise UsageError(f"{name}: expected positive numbers, got '{text}'")
     return numbers
+
+
+MAP = (
+    "Two of h, tolerance, relaxation, parameters and initial.NAME, each with its range if not the default:"
+    " h=1e-4:1e-1:20,relaxation. Values are spaced logarithmically, with :lin evenly. Left out, h,relaxation."
+)
+SET_OF_MAPS = "Override a parameter, an initial value or a setting for every run. May be repeated."
+AGAINST = "Peers, on maps of tolerance: scipy, heyoka, diffrax, sksundae, casadi; or all."
+
+
+def stability(
+    model: Model,
+    *,
+    map: Annotated[str | None, option("X,Y", MAP, "--map")] = None,
+    scheme: Annotated[str | None, option("A,B", "Our schemes; else relaxed on maps of it, and the file's.")] = None,
+    method: Annotated[str | None, option("A,B", "Our methods; else rk4 on maps of h, and auto.")] = None,
+    against: Annotated[str | None, option("A,B", AGAINST)] = None,
+    overrides: Annotated[list[str] | None, overriding(SET_OF_MAPS)] = None,
+    patience: Annotated[float, option("S", "Processor seconds of a run; a longer one is stuck.")] = 10.0,
+    processes: Annotated[int | None, option("N", "How many at a time; else as many as there are cores.")] = None,
+    rho: Annotated[bool, Option(help="Compute rho of runs that get to the end.")] = True,
+    out: Annotated[Path | None, option("FILE", "Write a line for each run: .csv.")] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw the map: .png or .svg.")] = None,
+    answer: Answer,
+) -> None:
+    """Map where methods converge, miss transitions, blow up or get stuck, against an exact or precise run."""
+    with answer.reporting():
+        from hsdsl.interface.chart import PEERS
+        from hsdsl.interface.chart.stability import stability_map
+        from hsdsl.interface.model import load
+
+        check_target(out, "--out", (".csv",))
+        check_target(plot, "--plot")
+        if not 0 < patience < 1e6 or (processes is not None and processes < 1):
+            raise UsageError("--patience and --processes: expected positive numbers")
+        options = values_of(overrides)
+        by_set: dict[str, str] = options["settings"]
+        options |= {
+            "schemes": (by_set.pop("scheme", None) if scheme is None else scheme) or (),
+            "methods": (by_set.pop("method", None) if method is None else method) or (),
+            "against": ",".join(PEERS) if against == "all" else against or (),
+        }
+        with progress(answer.hidden) as show:
+
+            def watch(done: int, count: int) -> None:
+                if show:
+                    show(lambda: f"{done} of {count} runs")
+
+            given: dict[str, Any] = {"with_rho": rho, "processes": processes, "patience": patience, "watch": watch}
+            given |= {} if map is None else {"map": map}
+            found = stability_map(load(model), **options, **given)
+        _report_map(found, out, plot, answer)
+
+
+def _report_map(found: Any, out: Path | None, plot: Path | None, answer: Answer) -> None:
+    from hsdsl.interface.chart.stability import as_csv, as_plain, as_text
+
+    write_table(out, lambda: as_csv(found))
+    if plot is not None:
+        from hsdsl.interface.chart.stability.picture import plot_stability
+
+        plot_stability(plot, found)
+        say(f"wrote {plot}")
+    answer.give(lambda: as_plain(found), lambda: as_text(found))
