@@ -21,7 +21,7 @@ allows itself.
 `crossings`         is each transition transversal, and its condition the same all around it?
 `entries`           do transitions that fire at once on entry do so all around it?
 `input_jumps`       jumps of inputs that transitions near them do not notice
-`exact_states`      states without an error
+`exact_states`      states without an error, and errors by kinks of resets
 `nearby`            where transitions take states that are moved along the guard
 `landings`          does a reset land within the error of a surface, or jump?
 `misses`            surfaces that are almost reached or passed over; `endings`: what happens at the end

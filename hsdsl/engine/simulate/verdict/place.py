@@ -118,9 +118,16 @@ class Place:
             return False
 
     def _coincide(self, j: int, k: int, error: State) -> bool:
+        """Whether surface k is a multiple of surface j around the state, as p >= 1 and 2*p >= 2 are."""
+        slopes, others = (self.kernel.gradients[i](self.t, *self.x) for i in (j, k))
+        size, product = sum(g * g for g in slopes), sum(g * h for g, h in zip(slopes, others, strict=True))
+        if not (size > 0 and product > 0):
+            return False
+        times = product / size
         for x in self.moved_by(error):
             values = self.kernel.surfaces(self.t, *x)
-            if not abs(values[j] - values[k]) <= self.surfaces.roundoff_bound(k, self.t, x):
+            near = times * self.surfaces.roundoff_bound(j, self.t, x) + self.surfaces.roundoff_bound(k, self.t, x)
+            if not abs(times * values[j] - values[k]) <= near:
                 return False
         return True
 

@@ -14,7 +14,7 @@ from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.remarks import Remark
 from hsdsl.engine.simulate.surfaces import Surfaces
 from hsdsl.engine.simulate.verdict.agreement import SAFE, Errors
-from hsdsl.engine.simulate.verdict.exact_states import exactly_known
+from hsdsl.engine.simulate.verdict.exact_states import errors_by_resets
 from hsdsl.engine.simulate.verdict.place import Place
 from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
 from hsdsl.engine.simulate.verdict.screen import Screen, screened
@@ -55,7 +55,7 @@ class RunView(RecordedRun):
         """How wrong the run is, by a shadow or a finer run; None where steps are fixed and no finer one is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
         tie = float(self.tie(self.execution.times[-1]))
-        known = float(tolerance or 0), float(self.arithmetic.unit), tie, partial(exactly_known, self)
+        known = float(tolerance or 0), float(self.arithmetic.unit), tie, partial(errors_by_resets, self)
         if self.by_shadow:
             shadow = self.screen.shadow_errors if self.screen else shadow_errors(self.problem, self.execution)
             return ErrorsByShadow(self.execution, self.execution, *known, shadow=shadow)
