@@ -126,7 +126,7 @@ def import_(
 def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool) -> str:
     """The text of the model in a file of one of the formats."""
     from hsdsl.interface.imports import sbml, spaceex
-    from hsdsl.language.files.model import read_bytes
+    from hsdsl.language.files import read_bytes
     from hsdsl.language.source.xml import read_xml
 
     root = read_xml(str(file), read_bytes(file), sbml.DEEPEST)

@@ -42,7 +42,7 @@ def sensitivity(
         check_target(plot, "--plot")
         if plot is not None and not stability:
             raise UsageError("--plot draws the distances of runs from nearby", "add --stability")
-        from hsdsl.analysis.sensitivity.summary import ALWAYS, as_json, summary
+        from hsdsl.analysis.sensitivity.result import ALWAYS, as_json, summary
         from hsdsl.interface.model import load
 
         call = located.settings(overrides, until=until, precision=precision)

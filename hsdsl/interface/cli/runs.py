@@ -64,7 +64,7 @@ def plot(
         used = None if columns is None else [*columns, *(name for pair in phase or () for name in names_of(pair))]
         executions = [drawn(path, loaded, used) for path in runs]
         from hsdsl.analysis.plot import plot
-        from hsdsl.analysis.plot.view import names_of as known_names
+        from hsdsl.analysis.plot.curves import names_of as known_names
 
         options: dict[str, Any] = {} if loaded is None else _look(loaded, executions)
         if loaded is None and len(executions) == 1:
