@@ -28,7 +28,7 @@ from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, multipliers_of
 from hsdsl.analysis.orbits.section import NoReturn, Return
 from hsdsl.analysis.orbits.shooting import CLOSED, Closed, gap
 from hsdsl.engine.execution import Array
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.engine.simulate.verdict.run_view import RunView
 
 Passage = Callable[[Array, float, float], tuple[Return, float | None, float]]
 MOST_POINTS, MOST_CORRECTIONS = 400, 8
@@ -308,6 +308,6 @@ def _grazing(previous: Solution, here: Solution) -> Bifurcation:
 def _rates(here: Solution) -> list[float]:
     """The rates at which the transitions of a period cross their guards."""
     found = here.passage.sensitivity
-    run = RecordedRun(found.setting.augmented, found.execution)
+    run = RunView(found.setting.augmented, found.execution)
     made = run.transitions[: len(sequence(here))]
     return [float(place.rate(k)) for place, k in map(run.before, made)]

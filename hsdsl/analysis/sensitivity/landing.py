@@ -13,8 +13,7 @@ from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Transition
 from hsdsl.engine.simulate.input_segments import make_timeline
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
-from hsdsl.engine.simulate.verdict.place import Place
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.run_view import Place, RunView
 
 Row = Mapping[str, Any]  # a derivative by each target
 

@@ -23,8 +23,7 @@ from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.engine.simulate.verdict.commutation import settle
-from hsdsl.engine.simulate.verdict.place import Place
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.run_view import Place, RunView
 
 POINTS, AROUND = 4, 2.0**-12  # where guards are compared: so many points, this share of sizes away
 Slopes = dict[str, Number]

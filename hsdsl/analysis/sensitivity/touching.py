@@ -7,9 +7,8 @@ from itertools import pairwise
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.near_surface import has_condition, rising_zero
-from hsdsl.engine.simulate.verdict.place import Place
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.misses import rising_zero
+from hsdsl.engine.simulate.verdict.run_view import Place, RunView
 
 
 def touched(run: RunView) -> Iterator[tuple[Number, str]]:
@@ -37,7 +36,7 @@ def _turning(run: RunView, along: Callable[[Number], Place], row: int, k: int) -
     try:
         place = rising_zero(along, lambda place: -place.rate(k))
         shift, below = run.surface_error(place, k, row), -place.value(k)
-        if has_condition(place, k) and place.conditions(
+        if place.has_condition(k) and place.conditions(
             k, run.error(place, row), run.safe_time_error(place, k, row)
         ) == {False}:
             return

@@ -15,8 +15,7 @@ from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
 from hsdsl.engine.simulate.verdict.finding import Finding
-from hsdsl.engine.simulate.verdict.place import Place
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.run_view import Place, RunView
 
 SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant

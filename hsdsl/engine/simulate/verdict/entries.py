@@ -14,7 +14,7 @@ from hsdsl.engine.execution import Transition
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.verdict.agreement import SAFE
 from hsdsl.engine.simulate.verdict.finding import Finding
-from hsdsl.engine.simulate.verdict.landings import smooth_reset
+from hsdsl.engine.simulate.verdict.resets import smooth_reset
 from hsdsl.engine.simulate.verdict.run_view import RunView
 
 

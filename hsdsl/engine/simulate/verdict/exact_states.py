@@ -7,7 +7,7 @@ the errors of the others allow, and rounds nothing to get it, the state has no e
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,12 @@ from hsdsl.base.numbers.enclosures import Range, Undecided, as_range
 from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.verdict.agreement import SAFE, Errors
-from hsdsl.engine.simulate.verdict.nearby import remembered_alike
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.verdict.run_view import RunView
 
 
-def exactly_known(run: RecordedRun, errors: Errors, wrong: Array) -> NDArray[np.bool_]:
+def exactly_known(run: RunView, errors: Errors, wrong: Array) -> NDArray[np.bool_]:
     """Return which states are known exactly, the others being ``wrong`` by so much; both of shape (rows, states)."""
     known = np.zeros(wrong.shape, dtype=bool)
     still = _without_flow(run)
@@ -36,14 +37,14 @@ def exactly_known(run: RecordedRun, errors: Errors, wrong: Array) -> NDArray[np.
     return known
 
 
-def _without_flow(run: RecordedRun) -> frozenset[str]:
+def _without_flow(run: RunView) -> frozenset[str]:
     """The states that flow in no mode."""
     modes = run.problem.program.modes
     moving = {name for mode in modes for name, still in zip(mode.states, mode.still, strict=True) if not still}
     return frozenset(run.execution.states) - moving
 
 
-def _at_start(run: RecordedRun, still: frozenset[str]) -> frozenset[str]:
+def _at_start(run: RunView, still: frozenset[str]) -> frozenset[str]:
     """Those that begin with a number which is not rounded."""
     problem = run.problem
     parameters = [
@@ -60,7 +61,7 @@ def _at_start(run: RecordedRun, still: frozenset[str]) -> frozenset[str]:
 
 
 def _behind(
-    run: RecordedRun,
+    run: RunView,
     errors: Errors,
     wrong: Array,
     made: Transition,
@@ -85,13 +86,13 @@ def _behind(
             values = place.enclosing().resets[k](*place.box(error(made.index), late))
             results = zip(edge.target_states, values, made.after.values(), strict=True)
             known = {name for name, value, x in results if name in changed and _is(value, x)}
-            names |= known | {x for x in changed - known if remembered_alike(run, chain, [x], error(chain[0].index))}
+            names |= known | {x for x in changed - known if run.remembered_alike(chain, [x], error(chain[0].index))}
         except (Undecided, *DOMAIN_ERRORS):
             pass
     return (names - _taken_from_queues(run, made)) & frozenset(made.after)
 
 
-def _taken_from_queues(run: RecordedRun, made: Transition) -> set[str]:
+def _taken_from_queues(run: RunView, made: Transition) -> set[str]:
     """The times and values of executions that were behind the first before a transition, and are the first after it."""
     target, after = run.problem.program.modes[run.index(made.target)], made.after or {}
     counts = ((queue, target.states[queue.waiting]) for queue in target.queues)
