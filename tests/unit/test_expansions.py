@@ -1,4 +1,4 @@
-"""Expansions of functions and steps in C (``expansions.c``, ``screen_parts.h``): no value is beyond what they bound.
+"""Expansions of functions and steps in C (``expansions.c``, ``screen_view.h``): no value is beyond what they bound.
 
 Those in Python (``verdict/flows.py``) are the same.
 """
@@ -22,7 +22,7 @@ from hsdsl.engine.simulate.verdict import flows
 from hsdsl.engine.simulate.verdict.flows import EXPANDED
 
 pytestmark = needs_compiler
-ONE = """#include "screen_parts.h"
+ONE = """#include "screen_view.h"
 HS_EXPORT void expand_one(int kind, int other, const hs_expansion *a, const hs_expansion *b, hs_expansion *to) {
   const hs_operation operation = {kind, 0, other};
   *to = expansion_of(&operation, a, b);
