@@ -22,7 +22,7 @@ from hsdsl.engine.execution import Transition
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
-from hsdsl.engine.simulate.verdict.commutation import settle
+from hsdsl.engine.simulate.verdict.commutation import land_after
 from hsdsl.engine.simulate.verdict.run_view import Place, RunView
 
 POINTS, AROUND = 4, 2.0**-12  # where guards are compared: so many points, this share of sizes away
@@ -125,7 +125,7 @@ def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[st
     orders: list[Order] = []
     for edge in (made.edge, *others):
         try:
-            landed = settle(run, place, run.edge_at(place, edge), since, run.tails_before(made).copy())
+            landed = land_after(run, place, run.edge_at(place, edge), since, run.tails_before(made).copy())
         except DOMAIN_ERRORS:
             landed = None
         if landed is not None:

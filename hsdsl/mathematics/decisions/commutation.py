@@ -1,8 +1,16 @@
 # pyright: basic
-"""Guards that are reached together, and whether the order of their transitions matters.
+"""Do simultaneous transitions commute?
 
-Both orders are followed twice. Numbers from one point can show that the order matters there. Expressions for all points
-of the overlap can prove that it does not.
+Where a run reaches several guards at one instant, each of their transitions may be taken first. Then all follow that
+fire at the same instant (M4, M5, M6). The transitions commute where every order leads to the same point: the order
+does not matter, as the convergence theorem asks for.
+
+This question is answered in three places, everywhere by `commute`:
+
+- here for a model, before any run. Numbers from one point can show that the order matters there. Expressions for all
+  points where guards overlap can prove that it does not;
+- in `hsdsl.engine.simulate.verdict.commutation` for what a run reached together;
+- in `hsdsl/engine/runtime/c/screen_places.c` for the same in C, which leaves undecided what it is not sure of.
 """
 
 from __future__ import annotations

@@ -98,7 +98,8 @@ static int same_point(const hs_view *v, const hs_landed *one, const hs_landed *o
   return 1;
 }
 
-/* Whether each of two edges, taken first, leads to the same point. */
+/* Whether each of two edges, taken first, leads to the same point: the question of
+   hsdsl/mathematics/decisions/commutation.py. */
 static int commute(hs_view *v, const hs_tied *tied, int one, int other) {
   hs_landed first = {0, 0, v->y}, second = {0, 0, v->z};
   hs_tied wider = *tied;

@@ -69,7 +69,7 @@ def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
         return assess(run, under_way.diagnostics)
     shown = problem.program, compiled.made, screen.margins, screen.commuting
     screens.leave(screen)
-    found = list(at_the_end(RunView(problem, execution)))
+    found = list(at_the_end(run))
     return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=(found, problem.program))
 
 

@@ -1,8 +1,4 @@
-"""Do transitions that are reached together commute?
-
-Each of them is taken first in turn, then all that fire at the same instant; where all orders lead to the same point
-the choice does not matter.
-"""
+"""Do simultaneous transitions commute? The question is that of `hsdsl.mathematics.decisions.commutation`, for a run."""
 
 from __future__ import annotations
 
@@ -33,22 +29,17 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
         if not made.alternatives:
             continue
         place, k = run.before(made)
+        error = tuple(map(abs, place.x)) if run.errors is None else run.error_before(made)
         rivals = {name: run.edge_at(place, name) for name in made.alternatives}
-        rivals = {name: other for name, other in rivals.items() if not outranked(run, place, k, other, made)}
+        rivals = {name: other for name, other in rivals.items() if not place.outranks(k, other, error)}
         if not rivals:
             continue
         if commute(run, place, [k, *rivals.values()], run.tails_before(made)):
             commuting.append(made.time)
             continue
         others = " or ".join(rivals)
-        found.append(
-            Finding(
-                "choice",
-                "left",
-                f"at t = {show(made.time)} the choice of {made.edge} rather than {others} matters: "
-                "they lead to different points",
-            )
-        )
+        choice = f"at t = {show(made.time)} the choice of {made.edge} rather than {others} matters"
+        found.append(Finding("choice", "left", f"{choice}: they lead to different points"))
     return found, together(commuting)
 
 
@@ -61,12 +52,6 @@ def together(commuting: Sequence[Number]) -> list[str]:
     return [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
 
 
-def outranked(run: RunView, place: Place, k: int, other: int, made: Transition) -> bool:
-    """Whether an edge has the surface of the one that was taken, and a lower priority: no error changes their order."""
-    error = tuple(abs(x) for x in place.x) if run.errors is None else run.safe_error(place, run.row_before(made))
-    return place.outranks(k, other, error)
-
-
 def commute(run: RunView, place: Place, tied: Sequence[int], tails: Tails, since: Number = 0) -> bool:
     """Whether each of the tied edges of a place, taken first, leads to the same point.
 
@@ -74,13 +59,13 @@ def commute(run: RunView, place: Place, tied: Sequence[int], tails: Tails, since
     """
     since = max(since, 2 * run.tie(place.t))  # what is tied may be that far apart, and off a surface by the rest
     try:
-        landed = [settle(run, place, k, since, tails.copy()) for k in tied]
+        landed = [land_after(run, place, k, since, tails.copy()) for k in tied]
     except DOMAIN_ERRORS:
         return False
-    return None not in landed and all(_same(run, landed[0], other) for other in landed[1:])
+    return None not in landed and all(_same_point(run, landed[0], other) for other in landed[1:])
 
 
-def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
+def _same_point(run: RunView, one: Landed | None, other: Landed | None) -> bool:
     if one is None or other is None or one[0] != other[0] or len(one[1]) != len(other[1]):
         return False
     names = run.problem.program.modes[run.index(one[0])].states
@@ -89,7 +74,7 @@ def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
     return all(abs(a - b) <= SAME * max(abs(a), abs(b), size) for a, b, size in pairs)
 
 
-def settle(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> Landed | None:
+def land_after(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> Landed | None:
     """Take edge k, then what fires at the same instant; None where that has no end."""
     for _ in range(LONGEST):
         target, x = place.mode.edges[k].target, place.kernel.resets[k](place.t, *place.x)
@@ -97,14 +82,14 @@ def settle(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> L
         place = run.place(target, place.t, x)
         if place.mode.final:
             return place.mode.name, place.x
-        following = _next(place, since)
+        following = _goes_at_once(place, since)
         if following is None:
             return place.mode.name, place.x
         k = following
     return None
 
 
-def _next(place: Place, since: Number) -> int | None:
+def _goes_at_once(place: Place, since: Number) -> int | None:
     """The edge that goes at once from a state."""
     surfaces, edges = place.surfaces, place.mode.edges
     beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), Arrival(since))

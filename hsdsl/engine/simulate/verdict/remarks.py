@@ -52,12 +52,13 @@ def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
 
 def at_the_end(run: RunView) -> Iterator[Remark]:
     """Walls of the final mode that a run ended in: nothing flows there, so nothing has checked them."""
-    if run.stop.reason != "final":
+    modes = run.problem.program.modes
+    if run.stop.reason != "final" or not any(mode.final and mode.walls for mode in modes):
         return
     final = run.execution.final
-    mode = run.problem.program.modes[run.index(final.mode)]
-    if tuple(final.state) != mode.states or not mode.walls:
-        return  # it has no walls, or no flow and the states of the mode before
+    mode = modes[run.index(final.mode)]
+    if tuple(final.state) != mode.states:
+        return  # it has no flow, and the states of the mode before
     place = run.place(final.mode, final.time, tuple(final.state.values()))
     for k in range(len(mode.edges), len(mode.surfaces)):
         with suppress(*DOMAIN_ERRORS):
