@@ -35,14 +35,13 @@ from hsdsl.engine.simulate.diagnostics import Diagnostics
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stall_detection import SHORT
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.commutation import choices, together
+from hsdsl.engine.simulate.verdict.commutation import choices, keep_values, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
 from hsdsl.engine.simulate.verdict.finding import Finding
 from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_the_end, remarked
 from hsdsl.engine.simulate.verdict.run_view import RunView
 from hsdsl.engine.simulate.verdict.screen import Margins, screens_of
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
-from hsdsl.engine.simulate.verdict.waiting_orders import keep_values, waiting_orders
 from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
@@ -147,10 +146,12 @@ def _departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
 
 def _findings_of(run: RunView) -> tuple[list[Finding], list[str]]:
     """What is found of a run that the screen leaves undecided, and the margins of what holds."""
-    from hsdsl.engine.simulate.verdict.entries import entries  # of few runs
     from hsdsl.engine.simulate.verdict.flows import flows, reliability
     from hsdsl.engine.simulate.verdict.misses import misses
-    from hsdsl.engine.simulate.verdict.resets import landings
+    from hsdsl.engine.simulate.verdict.resets import (
+        entries,  # of few runs
+        landings,
+    )
 
     found, margins = list(reliability(run)), list[str]()
     for hypothesis in (crossings, choices, entries, landings, misses, flows):

@@ -1,20 +1,28 @@
-"""Do simultaneous transitions commute? The question is that of `hsdsl.mathematics.decisions.commutation`, for a run."""
+"""Does the order of simultaneous transitions matter, or of executions that wait?
+
+Do simultaneous transitions commute? That question is defined in `hsdsl.mathematics.decisions.commutation`.
+
+Executions that wait are made in the order of times that an error may change. A delay that is the same for all keeps the
+order in which they began, whatever the error is.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
 from hsdsl.engine.simulate.verdict.finding import Finding
 from hsdsl.engine.simulate.verdict.run_view import Place, RunView
+from hsdsl.mathematics.program import ModeProgram, Program, Queue
 
 SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
+TIES = 4  # how much delays that are the same may differ by
 
 Landed = tuple[str, State]
 
@@ -29,7 +37,7 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
         if not made.alternatives:
             continue
         place, k = run.before(made)
-        error = tuple(map(abs, place.x)) if run.errors is None else run.error_before(made)
+        error = tuple(abs(x) for x in place.x) if run.errors is None else run.error_before(made)
         rivals = {name: run.edge_at(place, name) for name in made.alternatives}
         rivals = {name: other for name, other in rivals.items() if not place.outranks(k, other, error)}
         if not rivals:
@@ -96,3 +104,34 @@ def _goes_at_once(place: Place, since: Number) -> int | None:
     ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]
     ready = ready or surfaces.standing(place.t, place.x, since)
     return min(ready, key=lambda k: (-edges[k].priority, k), default=None)
+
+
+def keep_values(program: Program) -> bool:
+    """Whether executions that wait have values of their own."""
+    return any(len(queue.values) > 1 for mode in program.modes for queue in mode.queues)
+
+
+def waiting_orders(run: RunView) -> Iterator[str]:
+    """Say which executions of an event, of different values, may have another order."""
+    for mode in run.problem.program.modes:
+        for queue in mode.queues:
+            if len(queue.values) > 1:
+                yield from _of_queue(run, mode, queue)
+
+
+def _of_queue(run: RunView, mode: ModeProgram, queue: Queue) -> Iterator[str]:
+    values = [mode.states[i] for i in queue.values[1:]]
+    changing = {edge.name: edge.changes for edge in mode.edges if queue.waiting in edge.changes}
+    begins = {name for name, changes in changing.items() if queue.values[0] in changes}
+    own = [made for made in run.transitions if made.source == mode.name and made.edge in changing]
+    began = [made.time for made in own if made.edge in begins]
+    ends = [made for made in own if made.edge not in begins]
+    delays = [end.time - begin for end, begin in zip(ends, began, strict=False)]
+    for k, (one, other) in enumerate(pairwise(ends)):
+        tie, apart = run.tie(other.time), other.time - one.time
+        if not apart > tie or all(one.before[name] == other.before[name] for name in values):
+            continue
+        alike = k + 1 < len(delays) and abs(delays[k] - delays[k + 1]) <= TIES * tie
+        if not alike and run.errors is not None and apart <= run.late(other.time):
+            yield f"the order of executions of {one.edge} that wait until t = {show(one.time)} is within the error"
+            return

@@ -1,4 +1,4 @@
-"""Resets, and where arcs begin: is each reset continuous around its transition, and does it land on no surface?
+"""Resets, and what follows: is each continuous around its transition, and does it land on no surface?
 
 A reset may put every state of its guard onto a surface, as a touchdown puts a foot onto its lift-off guard: states
 moved by the error along the guard land on it too. Where they do not, an error decides on which side the run goes on.
@@ -8,6 +8,11 @@ A jump of an input within the error of a transition is no obstacle where the ord
 The theorem has no arc that leaves a surface tangentially, as where sliding ends. Derivatives exist all the same where
 executions from nearby leave the surface too: they reach it with the value zero and the rate zero, as states of a motion
 along it do that its end releases.
+
+A reset that puts the state outside of the next mode's domain is not what the theorem is about. Where an event is set
+off so at once on entry (M5), or a transition of another part, or by a jump of an input, it is what the model says: one
+reset after another is a reset as well. The theorem holds for it where it is continuous: the state is clearly beyond the
+surface, and clearly not beyond those that would go first. The order among these is the file's.
 """
 
 from __future__ import annotations
@@ -18,7 +23,7 @@ from itertools import pairwise
 from math import isfinite
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.base.numbers.enclosures import Range
+from hsdsl.base.numbers.enclosures import Range, Undecided, as_range
 from hsdsl.engine.execution import Arc, Transition
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.kernel import ModeKernel
@@ -58,7 +63,7 @@ def landings(run: RunView) -> tuple[list[Finding], list[str]]:
                 found.append(
                     Finding("input", "unknown", f"an input or function of time jumps within the error of {where}")
                 )
-            found += smooth_reset(run, made)
+            found += _smooth_reset(run, made)
         except DOMAIN_ERRORS:
             continue
     return found, []
@@ -129,7 +134,52 @@ def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:
     return bool(near)
 
 
-def smooth_reset(run: RunView, made: Transition) -> Iterator[Finding]:
+def entries(run: RunView) -> tuple[list[Finding], list[str]]:
+    """Findings about transitions that fired at once on entry."""
+    found: list[Finding] = []
+    if run.errors is None or not run.execution.enters_beyond:
+        return found, []
+    at_once = [made for made in run.reliable_transitions if made.entry]
+    meant = [_is_meant(run, made) for made in at_once]
+    outside = [made for made, is_meant in zip(at_once, meant, strict=True) if not is_meant]
+    undecided = [made for made, is_meant in zip(at_once, meant, strict=True) if is_meant and not _is_sure(run, made)]
+    for some, why in (
+        (outside, "the state entered {} outside its domain"),
+        (undecided, "an error in {} may keep it from that"),
+    ):
+        if some:
+            first = f"{some[0].edge} at t = {show(some[0].time)}: {why.format(some[0].source)}"
+            many = f"{len(some)} transition{'s' * (len(some) > 1)} fired at once on entry, the first {first}"
+            found.append(Finding("entry", "unknown", many))
+    for made in at_once:
+        found += _smooth_reset(run, made)
+    return found, []
+
+
+def _is_meant(run: RunView, made: Transition) -> bool:
+    """Whether the model says that a transition is set off so."""
+    place, k = run.before(made)
+    jumps = made.time > 0 and run.problem.timeline.at(made.time).start == made.time and len(run.cascade(made)) == 1
+    return bool(run.problem.program.parts or place.mode.edges[k].of_event or jumps)
+
+
+def _is_sure(run: RunView, made: Transition) -> bool:
+    """Whether the state is beyond the surface of a transition, and beyond none that goes first, within the error."""
+    place, k = run.before(made)
+    row, edges = run.row_before(made), place.mode.edges
+    try:
+        box = place.box(run.safe_error(place, row), run.late(made.time))
+        values = [as_range(r) for r in place.enclosing().surfaces(*box)]
+        tied = {name for before in run.cascade(made) for name in before.alternatives}  # `choices` decides on these
+        before = [j for j, edge in enumerate(edges) if (edge.priority, -j) > (edges[k].priority, -k)]
+        first = [j for j in before if not edges[j].conditional and edges[j].name not in tied]
+        known = {j: not run.surface_error(place, j, row) > 0 for j in (k, *first)}
+    except (Undecided, *DOMAIN_ERRORS):
+        return False
+    return (values[k].low > 0 or known[k]) and all(values[j].high < 0 or known[j] for j in first)
+
+
+def _smooth_reset(run: RunView, made: Transition) -> Iterator[Finding]:
     """Whether the reset of a transition is continuous around it: it jumps where a wider box makes it little wider."""
     place, k = run.before(made)
     if made.after is None or not place.mode.curved[k]:

@@ -31,9 +31,8 @@ from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.remarks import wall_of
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.correction import INSIDE, POLE, correction
 from hsdsl.engine.simulate.verdict.finding import times
-from hsdsl.engine.simulate.verdict.shadow import ShadowErrors, may_have_shadow, order_of
+from hsdsl.engine.simulate.verdict.shadow import INSIDE, POLE, ShadowErrors, correction, may_have_shadow, order_of
 from hsdsl.mathematics.program import ModeProgram, Program
 
 if TYPE_CHECKING:
@@ -205,8 +204,7 @@ def screened(run: Execution, finer: Execution | None) -> Screen | None:
 @cache
 def _correction() -> Any:
     """The coefficients of corrections."""
-    known = correction()
-    numbers = (*known.nodes, *known.weights.ravel(), *known.bulge, *known.slope, INSIDE, POLE)
+    numbers = (*(number for each in correction() for number in each.ravel()), INSIDE, POLE)
     return structures.Correction.from_buffer((ctypes.c_double * len(numbers))(*numbers))
 
 
