@@ -39,7 +39,10 @@ static void screen_arc(hs_view *v) {
   if (s->landing[v->arc]) s->undecided |= BIT(HS_LANDING);
   if (flown && (s->ending[v->arc] = ends_close(v, 0))) s->undecided |= BIT(HS_ENDING);
   const int leaves = v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump;
-  if (leaves && jump < s->run.transitions && !s->run.transition[jump].entry) screen_crossing(v, jump, flown);
+  if (!leaves || jump >= s->run.transitions) return;
+  bind(v, v->mode, segment_at(s->timeline, s->run.transition[jump].time));
+  if (reset_bends(v, &s->run.transition[jump], s->run.before + jump * s->model->width)) s->undecided |= BIT(HS_PARTED);
+  if (!s->run.transition[jump].entry) screen_crossing(v, jump, flown);
 }
 
 /* Whether a transition within the error of the end is undecided; the view is at the last arc. */

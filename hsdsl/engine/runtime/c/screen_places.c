@@ -239,6 +239,38 @@ static int reset_jumps(hs_view *v, const hs_transition *made, const double *x) {
   return 0;
 }
 
+/* Hold what one result in three is off the line between the others against its error: whether it is beyond that. */
+static int off_line(const hs_view *v, int mode, const double *here, const double *one, const double *other) {
+  const hs_mode *const table = &v->s->model->mode[mode];
+  const double least = hs_max(v->s->tolerance, ERROR_UNITS * HS_UNIT);
+  for (int i = 0; i < table->dimension; i++) {
+    const int state = table->state[i];
+    const double bent = fabs((one[i] - here[i]) + (other[i] - here[i])) / SAFE;
+    if (!(bent <= hs_max(v->error[state], least * hs_max(v->size[state], fabs(here[i]))))) return 1;
+  }
+  return 0;
+}
+
+/* Whether a reset may have a kink within the error of a transition, which the difference of two runs does not show. */
+static int reset_bends(hs_view *v, const hs_transition *made, const double *x) {
+  const hs_edge *const edge = &v->table->edge[made->edge];
+  if (!v->f->curved[made->edge] || v->s->model->mode[edge->target].final) return 0;
+  if (hs_changed(edge, edge->reset, v->p, made->time, x, x, v->y)) return 1;
+  for (int i = -1; i < v->n; i++) {
+    const double wide = SAFE * (i < 0 ? time_error_at(v, made->time) : v->mode_error[i]);
+    double *const ends[] = {v->z, v->slope};
+    if (wide == 0.0) continue;
+    for (int side = 0; side < 2; side++) {
+      const double by = side ? wide : -wide;
+      copy(v->x, x, v->n);
+      if (i >= 0) v->x[i] = x[i] + by;
+      if (hs_changed(edge, edge->reset, v->p, i < 0 ? made->time + by : made->time, v->x, v->x, ends[side])) return 1;
+    }
+    if (off_line(v, edge->target, v->y, v->z, v->slope)) return 1;
+  }
+  return 0;
+}
+
 /* Whether an input may jump within the error of a transition. */
 static int jumps_close(const hs_view *v, const hs_transition *made) {
   const hs_timeline *const timeline = v->s->timeline;
@@ -277,7 +309,6 @@ static void screen_crossing(hs_view *v, int64_t j, int flown) {
   const int64_t step = v->segment, row = v->last - 1;
   hs_near_surface found;
   double bend = 0.0, height = INFINITY, rate;
-  bind(v, v->mode, segment_at(s->timeline, t));
   s->crossed++;
   int bad = evaluate_surfaces(v, t, x) || v->table->flow(v->p, t, x, v->slope) ||
             near_surface(v, made->edge, t, x, &found);

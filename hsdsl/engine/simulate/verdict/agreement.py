@@ -36,8 +36,8 @@ class Errors:
         Unit round-off of the run's numbers.
     tie : float
         Times closer than this are the same instant.
-    known : callable
-        ``known(self, wrong)`` says which states have no error, where the others are ``wrong`` by so much.
+    by_resets : callable
+        ``by_resets(self, wrong)`` says what resets make of errors that are ``wrong`` without them.
     """
 
     run: Execution
@@ -45,7 +45,7 @@ class Errors:
     tolerance: float
     unit: float
     tie: float
-    known: Callable[[Errors, Array], NDArray[np.bool_]] = lambda _, wrong: wrong < 0
+    by_resets: Callable[[Errors, Array], Array] = lambda _, wrong: wrong
 
     @cached_property
     def parted(self) -> float | None:
@@ -132,8 +132,7 @@ class Errors:
         """How wrong each state is; shape (rows, states), nowhere falling, and never below what one step may do."""
         least = max(self.tolerance, ERROR_UNITS * self.unit) * self.sizes
         least[0] = 0.0
-        wrong = np.maximum(self.measured, least)
-        return np.where(self.known(self, wrong), 0.0, wrong)
+        return self.by_resets(self, np.maximum(self.measured, least))
 
     @cached_property
     def columns(self) -> dict[str, int]:

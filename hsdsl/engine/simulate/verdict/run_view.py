@@ -28,7 +28,7 @@ from hsdsl.engine.simulate.remarks import Remark, wall_of
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Surfaces, at
 from hsdsl.engine.simulate.verdict.agreement import SAFE, Errors
-from hsdsl.engine.simulate.verdict.exact_states import exactly_known
+from hsdsl.engine.simulate.verdict.exact_states import errors_by_resets
 from hsdsl.engine.simulate.verdict.screen import Screen, screened
 from hsdsl.engine.simulate.verdict.shadow import ErrorsByShadow, shadow_errors
 from hsdsl.mathematics.program import ModeProgram
@@ -342,7 +342,7 @@ class RunView:
         """How wrong the run is, by a shadow or a finer run; None where steps are fixed and no finer one is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
         tie = float(self.tie(self.execution.times[-1]))
-        known = float(tolerance or 0), float(self.arithmetic.unit), tie, partial(exactly_known, self)
+        known = float(tolerance or 0), float(self.arithmetic.unit), tie, partial(errors_by_resets, self)
         if self.by_shadow:
             shadow = self.screen.shadow_errors if self.screen else shadow_errors(self.problem, self.execution)
             return ErrorsByShadow(self.execution, self.execution, *known, shadow=shadow)
@@ -497,9 +497,16 @@ class Place:
             return False
 
     def _coincide(self, j: int, k: int, error: State) -> bool:
+        """Whether surface k is a multiple of surface j around the state, as p >= 1 and 2*p >= 2 are."""
+        slopes, others = (self.kernel.gradients[i](self.t, *self.x) for i in (j, k))
+        size, product = sum(g * g for g in slopes), sum(g * h for g, h in zip(slopes, others, strict=True))
+        if not (size > 0 and product > 0):
+            return False
+        times = product / size
         for x in self.moved_by(error):
             values = self.kernel.surfaces(self.t, *x)
-            if not abs(values[j] - values[k]) <= self.surfaces.roundoff_bound(k, self.t, x):
+            near = times * self.surfaces.roundoff_bound(j, self.t, x) + self.surfaces.roundoff_bound(k, self.t, x)
+            if not abs(times * values[j] - values[k]) <= near:
                 return False
         return True
 
