@@ -1,5 +1,5 @@
 /* How wrong a recorded run is, by the finer one or by its shadow run, which steps by Taylor series or by corrections of
-   the recorded steps. See hsdsl/engine/simulate/verdict: agreement, shadow, correction, shadow_run. */
+   the recorded steps. See hsdsl/engine/simulate/verdict: errors, shadow. */
 
 #include "screen_view.h"
 

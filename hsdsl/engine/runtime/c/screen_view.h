@@ -39,7 +39,7 @@ typedef struct {
   double *error, *size, *roundoff_floor, *time_errors; /* of all states; of each transition */
   double *lines; /* series of the shadow run */
   double *roundoff; /* what round-off of the flow may do in a step of the shadow run */
-  double *defects, *derivatives, *factors, *inverse; /* of a correction; see screen_correction.c */
+  double *defects, *derivatives, *factors, *inverse; /* of a correction; see screen_errors.c */
   int *exchanged;
   int64_t *tied; /* where the alternatives of each transition begin */
   double *mode_error; /* how wrong the states of the mode are */

@@ -8,18 +8,17 @@ allows itself: that of a shadow run, and where that does not show that the theor
 The hypotheses are checked in this order. Where the compiled `screen` leaves none undecided, that is all.
 
 1. There are finitely many transitions, none is lost in a strip, and no arc slides: `crossings`.
-2. Executions of events that wait do so in an order that the error does not change: `waiting_orders`.
-3. The errors are bounded, and a finer run makes the same transitions (`reliability` in `flows`).
-4. Each transition is transversal, and its condition the same all around it: `crossings`.
-5. Transitions that are reached together commute: `commutation`.
-6. Those that fire at once on entry do so all around it: `entries`.
-7. Resets are continuous, and land within the error of no surface: `resets`.
+2. Executions that wait go in an order that the error does not change: `commutation.waiting_orders`.
+3. The errors are bounded, and a finer run makes the same transitions: `flows.reliability`.
+4. Each transition is transversal, and its condition the same all around it: `crossings.crossings`.
+5. Simultaneous transitions commute: `commutation.choices`.
+6. Transitions that fire at once on entry do so all around it: `resets.entries`.
+7. Resets are continuous, and land within the error of no surface: `resets.landings`.
 8. No surface is almost reached, passed over or passed unseen, along steps or at the end: `misses`.
-9. The flow is continuous with bounded slopes, and does not vary where no step saw it: `flows`.
+9. The flow is continuous with bounded slopes, and does not vary where no step saw it: `flows.flows`.
 
-What they need: `run_view`, the run with its errors, and places of it; `agreement`, `shadow` and `exact_states`, these
-errors; `steps`, polynomials of many steps at once, and routines over intervals along them. `remarks` is what a run
-reports first, whatever its verdict.
+What they need: `run_view`, the run with its places; `errors` by a finer run and `shadow` by a shadow run; `steps`, which
+are polynomials, and routines over intervals along them. `remarks` is what a run reports first, whatever its verdict.
 """
 
 from __future__ import annotations
@@ -37,9 +36,8 @@ from hsdsl.engine.simulate.stall_detection import SHORT
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.verdict.commutation import choices, keep_values, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
-from hsdsl.engine.simulate.verdict.finding import Finding
 from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_the_end, remarked
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
 from hsdsl.engine.simulate.verdict.screen import Margins, screens_of
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
 from hsdsl.mathematics.program import Program

@@ -16,8 +16,7 @@ from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
-from hsdsl.engine.simulate.verdict.finding import Finding
-from hsdsl.engine.simulate.verdict.run_view import Place, RunView
+from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
 from hsdsl.mathematics.program import ModeProgram, Program, Queue
 
 SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point

@@ -18,9 +18,8 @@ from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Arc, Transition
 from hsdsl.engine.simulate.diagnostics import FREE
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.agreement import SAFE
-from hsdsl.engine.simulate.verdict.finding import Finding, times
-from hsdsl.engine.simulate.verdict.run_view import Place, RunView
+from hsdsl.engine.simulate.verdict.errors import SAFE, times
+from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
 from hsdsl.engine.simulate.verdict.screen import CROSSING_UNDECIDED
 
 BEYOND = 4  # errors behind a surface, so that no error takes a state back to it

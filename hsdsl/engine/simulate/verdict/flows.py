@@ -30,9 +30,8 @@ from hsdsl.base.numbers.bernstein import Array, around_middle
 from hsdsl.base.numbers.enclosures import ENCLOSED, Range, as_range
 from hsdsl.engine.simulate.moving import ERROR_UNITS
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.agreement import SAFE
-from hsdsl.engine.simulate.verdict.finding import Finding
-from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, RunView
+from hsdsl.engine.simulate.verdict.errors import SAFE
+from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, Finding, RunView
 from hsdsl.engine.simulate.verdict.steps import Parts, high, joined, low, steps_of, undecided
 
 HALVINGS = 14

@@ -21,11 +21,10 @@ from hsdsl.base.numbers.enclosures import Range
 from hsdsl.engine.execution import Arc
 from hsdsl.engine.simulate.remarks import Remark, may_be_passed, of_edge, wall_of
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.agreement import SAFE
 from hsdsl.engine.simulate.verdict.commutation import commute
-from hsdsl.engine.simulate.verdict.finding import Finding, times
+from hsdsl.engine.simulate.verdict.errors import SAFE, times
 from hsdsl.engine.simulate.verdict.resets import indifferent, jumps_near, leaves_along
-from hsdsl.engine.simulate.verdict.run_view import ROUNDS, Place, RunView
+from hsdsl.engine.simulate.verdict.run_view import ROUNDS, Finding, Place, RunView
 from hsdsl.engine.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 
 HALVINGS = 20

@@ -29,9 +29,8 @@ from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.agreement import SAFE
-from hsdsl.engine.simulate.verdict.finding import Finding, times
-from hsdsl.engine.simulate.verdict.run_view import ALONG, GUARD_ROUNDS, Place, RunView, moved_onto
+from hsdsl.engine.simulate.verdict.errors import SAFE, times
+from hsdsl.engine.simulate.verdict.run_view import ALONG, GUARD_ROUNDS, Finding, Place, RunView, moved_onto
 from hsdsl.engine.simulate.verdict.screen import RESET_UNDECIDED
 
 UNITS = 64  # of round-off, and less, are no jump

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import groupby
 from math import inf, isfinite
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,8 +28,7 @@ from hsdsl.engine.simulate.queues import Tails
 from hsdsl.engine.simulate.remarks import Remark, wall_of
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Surfaces, at
-from hsdsl.engine.simulate.verdict.agreement import SAFE, Errors
-from hsdsl.engine.simulate.verdict.exact_states import errors_by_resets
+from hsdsl.engine.simulate.verdict.errors import SAFE, Errors
 from hsdsl.engine.simulate.verdict.screen import Screen, screened
 from hsdsl.engine.simulate.verdict.shadow import ErrorsByShadow, shadow_errors
 from hsdsl.mathematics.program import ModeProgram
@@ -342,7 +342,7 @@ class RunView:
         """How wrong the run is, by a shadow or a finer run; None where steps are fixed and no finer one is given."""
         tolerance, finer = self.problem.settings.tolerance, self.against
         tie = float(self.tie(self.execution.times[-1]))
-        known = float(tolerance or 0), float(self.arithmetic.unit), tie, partial(errors_by_resets, self)
+        known = float(tolerance or 0), float(self.arithmetic.unit), tie, self
         if self.by_shadow:
             shadow = self.screen.shadow_errors if self.screen else shadow_errors(self.problem, self.execution)
             return ErrorsByShadow(self.execution, self.execution, *known, shadow=shadow)
@@ -528,3 +528,25 @@ def moved_onto(x: Sequence[Number], along: Sequence[Number], value: Number) -> S
     """A point moved along a direction, by what takes something linear with this slope from a value to zero."""
     size = sum(a * a for a in along)
     return tuple(a - value * g / size for a, g in zip(x, along, strict=True)) if size > 0 else tuple(x)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that keeps the theorem from holding, or from being known to hold.
+
+    Attributes
+    ----------
+    kind : str
+        Findings of one kind are named together.
+    theorem : {"left", "unknown"}
+        What it makes of the verdict.
+    sentence : str
+        For a person.
+    wall : tuple of str and number, or None
+        A wall that the run was beyond, and when.
+    """
+
+    kind: str
+    theorem: Literal["left", "unknown"]
+    sentence: str
+    wall: tuple[str, Number] | None = None

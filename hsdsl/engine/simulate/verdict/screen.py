@@ -31,7 +31,7 @@ from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.remarks import wall_of
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.finding import times
+from hsdsl.engine.simulate.verdict.errors import times
 from hsdsl.engine.simulate.verdict.shadow import INSIDE, POLE, ShadowErrors, correction, may_have_shadow, order_of
 from hsdsl.mathematics.program import ModeProgram, Program
 

@@ -55,7 +55,7 @@ from hsdsl.engine.integrators.taylor import terms
 from hsdsl.engine.simulate.moving import flow_roundoff, moved_reset, surface_roundoff
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.queues import Tails
-from hsdsl.engine.simulate.verdict.agreement import Errors
+from hsdsl.engine.simulate.verdict.errors import Errors
 
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
 MOST_CORRECTED = 5  # order of methods whose steps leave out more than corrections of them
