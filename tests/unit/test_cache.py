@@ -350,7 +350,7 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str, with_loop) ->
 PYTHON_LOOP = tuple(
     f"hsdsl.engine.simulate.{name}" for name in ("relaxed", "located", "entry", "zeno", "contact", "touching")
 )
-LOOKS = tuple(f"hsdsl.engine.simulate.verdict.{name}" for name in ("looks", "flows", "misses", "landings", "steps"))
+LOOKS = tuple(f"hsdsl.engine.simulate.verdict.{name}" for name in ("flows", "misses", "resets", "steps"))
 OTHERS = (
     "hsdsl.analysis.report.summary",
     "hsdsl.language.elaborate",

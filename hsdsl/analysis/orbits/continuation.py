@@ -32,7 +32,7 @@ from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import number
 from hsdsl.base.names import called, checks_methods
 from hsdsl.engine.execution import Array
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.engine.simulate.verdict.run_view import RunView
 
 Passage = Callable[[Array, float, float], tuple[Return, float | None, float]]
 MOST_POINTS, MOST_CORRECTIONS = 400, 8
@@ -298,7 +298,7 @@ def _grazing(previous: Solution, here: Solution) -> Bifurcation:
 def _rates(here: Solution) -> list[float]:
     """The rates at which the transitions of a period cross their guards."""
     found = here.passage.sensitivity
-    run = RecordedRun(found.setting.augmented, found.execution)
+    run = RunView(found.setting.augmented, found.execution)
     made = run.transitions[: len(sequence(here))]
     return [float(place.rate(k)) for place, k in map(run.before, made)]
 

@@ -28,10 +28,9 @@ from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.input_segments import make_timeline
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
-from hsdsl.engine.simulate.verdict.commutation import settle
-from hsdsl.engine.simulate.verdict.near_surface import has_condition, rising_zero
-from hsdsl.engine.simulate.verdict.place import Place
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.commutation import land_after
+from hsdsl.engine.simulate.verdict.misses import rising_zero
+from hsdsl.engine.simulate.verdict.run_view import Place, RunView
 
 POINTS, AROUND = 4, 2.0**-12  # where guards are compared: so many points, this share of sizes away
 Slopes = dict[str, Number]
@@ -133,7 +132,7 @@ def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[st
     orders: list[Order] = []
     for edge in (made.edge, *others):
         try:
-            landed = settle(run, place, run.edge_at(place, edge), since, run.tails_before(made).copy())
+            landed = land_after(run, place, run.edge_at(place, edge), since, run.tails_before(made).copy())
         except DOMAIN_ERRORS:
             landed = None
         if landed is not None:
@@ -296,7 +295,7 @@ def _turning(run: RunView, along: Callable[[Number], Place], row: int, k: int) -
     try:
         place = rising_zero(along, lambda place: -place.rate(k))
         shift, below = run.surface_error(place, k, row), -place.value(k)
-        if has_condition(place, k) and place.conditions(
+        if place.has_condition(k) and place.conditions(
             k, run.error(place, row), run.safe_time_error(place, k, row)
         ) == {False}:
             return

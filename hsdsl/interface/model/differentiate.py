@@ -29,7 +29,7 @@ from hsdsl.engine.preparation.values import (
 )
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
-from hsdsl.engine.simulate.verdict.agreement import SAFE
+from hsdsl.engine.simulate.verdict.errors import SAFE
 from hsdsl.interface.model.call_cache import CallCache, call_key
 from hsdsl.mathematics.program import Program
 

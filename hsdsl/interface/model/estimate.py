@@ -11,7 +11,7 @@ from hsdsl.base.names import checks_methods
 from hsdsl.base.numbers.arithmetic import TIE, Number
 from hsdsl.engine.execution import Execution, Transition
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.agreement import Errors
+from hsdsl.engine.simulate.verdict.errors import Errors
 
 SAMPLES = 1000
 

@@ -3,12 +3,6 @@
    Every hypothesis of the theorem is screened in one pass over rows, arcs and transitions. Where it is not
    sure that there is no finding, the hypothesis is undecided and the place is marked. */
 
-#include "screen_view.h"
-
-#include "screen_errors.c"
-#include "screen_shadow.c"
-#include "screen_ties.c"
-#include "screen_places.c"
 #include "screen_steps.c"
 
 /* Whether more than FREE transitions have little flow between them. */

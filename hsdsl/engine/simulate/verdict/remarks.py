@@ -1,12 +1,13 @@
-"""Surfaces passed while an `if` was false, and walls that do not hold, at the rows of a run, and where steps turn back.
+"""What a run reports first, for any verdict: remarks of the loop, of `misses` along its steps, and of its end.
 
-This is for runs whose verdict needs no closer look along the steps, as of those that are outside the theorem. A surface
-that rises where a step begins and falls where it ends is looked at on the way, at eighths.
+Surfaces passed while an `if` was false and walls that do not hold are remarked by `misses` where that takes place. For
+other runs, as those that are outside the theorem, they are searched at the rows of the run, and in eighths of steps on
+which a surface rises at first and falls at last.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -18,41 +19,75 @@ from numpy.typing import NDArray
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
 from hsdsl.base.numbers.enclosures import Array, Range, as_range
 from hsdsl.engine.kernel import ModeKernel
-from hsdsl.engine.simulate.remarks import Remark, may_be_passed, of_edge, wall_of
+from hsdsl.engine.simulate.diagnostics import Diagnostics
+from hsdsl.engine.simulate.remarks import Remark, loop_remarks, may_be_passed, of_edge, wall_of, warnings_of
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
-from hsdsl.engine.simulate.verdict.near_surface import ROUNDS
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
-from hsdsl.engine.simulate.verdict.remarked import BEYOND
-from hsdsl.engine.simulate.verdict.steps import MOST_PARTS, data_at, pieces_at, rows_by_mode
+from hsdsl.engine.simulate.verdict.crossings import sliding_spans
+from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, ROUNDS, RunView
 from hsdsl.mathematics.program import ModeProgram
 
+BEYOND = 4  # times its round-off: a wall that does not hold
 END = 1.0
 POINTS = (*(i / 8 for i in range(8)), END)  # of a step that turns back
-Spans = Iterator[tuple["Looked", float, float]]
+
+# The warnings of a `Verdict.deferred` that has its remarks and its program as `_told`.
+WARNINGS: dict[str, Callable[[Any], Any]] = {"warnings": lambda verdict: warnings_of(*verdict._told)}
 
 
-def passings(run: RecordedRun, *, walls_alone: bool = False) -> Iterator[Remark]:
-    """Remarks about both, or about walls alone."""
+def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
+    """The remarks about a run."""
+    program = run.problem.program
+    found = [*loop_remarks(program, diagnostics, run.stop)]
+    found += (Remark("sliding", " and ".join(modes), start, end) for modes, start, end in sliding_spans(run))
+    known, walls = run.remarks is not None, any(mode.walls for mode in program.modes)
+    found += run.remarks or ()
+    if (walls and (not known or run.problem.settings.scheme == "relaxed")) or (
+        not known and any(may_be_passed(program, edge) for edge in program.edges)
+    ):
+        beyond = {remark.of for remark in found if remark.kind == "beyond"}
+        found += (one for one in _passings(run, walls_alone=known) if one.kind != "beyond" or one.of not in beyond)
+    return [*found, *at_the_end(run)]
+
+
+def at_the_end(run: RunView) -> Iterator[Remark]:
+    """Walls of the final mode that a run ended in: nothing flows there, so nothing has checked them."""
+    modes = run.problem.program.modes
+    if run.stop.reason != "final" or not any(mode.final and mode.walls for mode in modes):
+        return
+    final = run.execution.final
+    mode = modes[run.index(final.mode)]
+    if tuple(final.state) != mode.states:
+        return  # it has no flow, and the states of the mode before
+    place = run.place(final.mode, final.time, tuple(final.state.values()))
+    for k in range(len(mode.edges), len(mode.surfaces)):
+        with suppress(*DOMAIN_ERRORS):
+            if place.value(k) > BEYOND * place.roundoff_bound(k):
+                yield Remark("beyond", wall_of(mode, k), final.time)
+
+
+def _passings(run: RunView, *, walls_alone: bool) -> Iterator[Remark]:
+    """Remarks about surfaces that are passed and walls that do not hold, or about walls alone."""
     broken: dict[str, Number] = {}
-    for steps in _looked(run):
-        for k in steps.watched:
-            if k < len(steps.mode.edges) and walls_alone:
-                continue
-            if k < len(steps.mode.edges):
-                name = steps.mode.edges[k].name
-                yield from (of_edge("passed", name, time) for each in _spans(steps, k) for time in _passed(*each, k))
-            else:
-                wall = wall_of(steps.mode, k)
-                for time in (time for each in _spans(steps, k) for time in _beyond(*each, k)):
-                    broken[wall] = min(time, broken.get(wall, time))
+    for index, _, rows in run.rows_by_mode():
+        for first in range(0, len(rows), MOST_PARTS):
+            steps = _Steps(run, index, rows[first : first + MOST_PARTS])
+            edges = steps.mode.edges
+            for k in steps.mode.surfaces:
+                if k >= len(edges):
+                    wall = wall_of(steps.mode, k)
+                    for time in (time for each in _spans(steps, k) for time in _beyond(*each, k)):
+                        broken[wall] = min(time, broken.get(wall, time))
+                elif not walls_alone and may_be_passed(run.problem.program, edges[k]):
+                    times = (time for each in _spans(steps, k) for time in _passed(*each, k))
+                    yield from (of_edge("passed", edges[k].name, time) for time in times)
     yield from (Remark("beyond", wall, time) for wall, time in broken.items())
 
 
 @dataclass(frozen=True)
-class Looked:
+class _Steps:
     """Steps of a run in one mode, that begin at ``rows``."""
 
-    run: RecordedRun
+    run: RunView
     index: int
     rows: NDArray[np.int64]
 
@@ -61,21 +96,15 @@ class Looked:
         """The mode."""
         return self.run.problem.program.modes[self.index]
 
-    @property
-    def watched(self) -> list[int]:
-        """The surfaces that are looked at: walls, and those that may be passed while an `if` is false."""
-        edges, program = self.mode.edges, self.run.problem.program
-        return [k for k in self.mode.surfaces if k >= len(edges) or may_be_passed(program, edges[k])]
-
     def at(self, share: Array | float) -> tuple[ModeKernel, list[Range]]:
         """The mode's routines over ranges, and time and states at a share of each step; its end is the row there."""
         execution, rows, n = self.run.execution, self.rows, len(self.mode.states)
         times = np.asarray(execution.times, dtype=float)
-        data = [Range(column, column) for column in data_at(self.run, times[rows]).T]
+        data = [Range(column, column) for column in self.run.data_at(times[rows]).T]
         if np.ndim(share) == 0 and share in (0.0, END):
             states = np.asarray(execution.values[rows + int(share), :n], dtype=float)
         else:
-            states, powers = pieces_at(execution, rows, n)
+            states, powers = self.run.pieces_at(rows, n)
             moved = np.zeros_like(states)
             for m in reversed(range(powers.shape[1])):
                 moved = (moved + powers[:, m]) * np.reshape(share, (-1, 1))
@@ -106,19 +135,13 @@ class Looked:
             total = total + np.maximum(np.abs(slope.low), np.abs(slope.high)) * size
         return BEYOND * ROUNDOFF_UNITS * max(float(self.run.arithmetic.unit), FLOAT64.unit) * total
 
-    def take(self, which: NDArray[np.bool_]) -> Looked:
+    def take(self, which: NDArray[np.bool_]) -> _Steps:
         """Some of the steps."""
         return replace(self, rows=self.rows[which])
 
 
-def _looked(run: RecordedRun) -> Iterator[Looked]:
-    for index, _, rows in rows_by_mode(run):
-        for first in range(0, len(rows), MOST_PARTS):
-            yield Looked(run, index, rows[first : first + MOST_PARTS])
-
-
-def _spans(steps: Looked, k: int) -> Spans:
-    """Steps with the shares between which they are looked at: whole, or by eighths where surface k turns back."""
+def _spans(steps: _Steps, k: int) -> Iterator[tuple[_Steps, float, float]]:
+    """Steps with the shares between which they are compared: whole, or in eighths where surface k turns back."""
     turns = (steps.rates(0.0, k) > 0) & (steps.rates(END, k) < 0)
     yield steps.take(~turns), 0.0, END
     if turns.any():
@@ -126,7 +149,7 @@ def _spans(steps: Looked, k: int) -> Spans:
         yield from ((turning, a, b) for a, b in pairwise(POINTS))
 
 
-def _passed(steps: Looked, start: float, end: float, k: int) -> Iterator[Number]:
+def _passed(steps: _Steps, start: float, end: float, k: int) -> Iterator[Number]:
     """When surface k is passed while its `if` is false; not where a step ends by its own transition."""
     run = steps.run
     steps = steps.take(steps.values(end, k) > 0)
@@ -146,17 +169,13 @@ def _passed(steps: Looked, start: float, end: float, k: int) -> Iterator[Number]
         below = steps.values(middle, k) <= 0
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     _, point = steps.at(high)
-    bound: dict[Number, ModeKernel] = {}
     for t, *x in zip(*(column.low.tolist() for column in point), strict=True):
-        segment = run.problem.timeline.at(t)
-        if segment.start not in bound:
-            bound[segment.start] = run.problem.kernel.bind(steps.index, segment.data)
         with suppress(*DOMAIN_ERRORS):
-            if not bound[segment.start].conditions[k](t, *x)[0]:
+            if not run.place(steps.index, t, tuple(x)).kernel.conditions[k](t, *x)[0]:
                 yield t
 
 
-def _beyond(steps: Looked, start: float, end: float, k: int) -> Iterator[Number]:
+def _beyond(steps: _Steps, start: float, end: float, k: int) -> Iterator[Number]:
     """The first time at which wall k does not hold at the beginning or the end of a span."""
     for share in (start, end):
         beyond = steps.take(steps.values(share, k) > 0)
