@@ -18,7 +18,8 @@ The hypotheses are checked in this order. Where the compiled `screen` leaves non
 9. The flow is continuous with bounded slopes, and does not vary where no step saw it: `flows.flows`.
 
 What they need: `run_view`, the run with its places; `errors` by a finer run and `shadow` by a shadow run; `steps`,
-which are polynomials, and routines over intervals along them. `remarks` is what a run reports first, whatever its verdict.
+which are polynomials, and routines over intervals along them. `remarks` is what a run reports first, whatever its
+verdict.
 """
 
 from __future__ import annotations
