@@ -26,8 +26,8 @@ from engines import compiled
 
 import hsdsl
 from hsdsl.interface.chart import Scene
-from hsdsl.interface.chart.judge import Judgement, judge
-from hsdsl.interface.chart.result import Attempt, Result, Tool
+from hsdsl.interface.chart.outcome import Judgement, judge
+from hsdsl.interface.chart.scene import Attempt, Result, Tool
 from hsdsl.interface.chart.stopwatch import Timed, race
 
 HERE = Path(__file__).parent

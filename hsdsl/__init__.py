@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from hsdsl.base.errors import ModelError, UsageError
     from hsdsl.base.limits import Limits
     from hsdsl.engine.execution import Execution
-    from hsdsl.interface.model import Model, load, loads
-    from hsdsl.interface.model.distances import distance
+    from hsdsl.interface.model import Model, distance, load, loads
 
 _HOMES = {
     "Execution": "hsdsl.engine.execution",
@@ -37,7 +36,7 @@ _HOMES = {
     "Model": "hsdsl.interface.model",
     "ModelError": "hsdsl.base.errors",
     "UsageError": "hsdsl.base.errors",
-    "distance": "hsdsl.interface.model.distances",
+    "distance": "hsdsl.interface.model",
     "load": "hsdsl.interface.model",
     "loads": "hsdsl.interface.model",
 }

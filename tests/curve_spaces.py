@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.analysis.metrics.budget import Budget
+from hsdsl.analysis.metrics.interval import Budget
 
 
 class Plane:

@@ -9,7 +9,7 @@ from writing.markdown import table
 
 from hsdsl.base.defaults import DEFAULT_TOLERANCE, DEFAULTS
 from hsdsl.base.functions import CONSTANTS, FUNCTIONS
-from hsdsl.language import schema
+from hsdsl.language.schema.jsonschema import json_schema
 
 LANGUAGE = """# Language
 
@@ -60,7 +60,7 @@ SCALARS = {
 
 def language() -> str:
     """Document every key of a model from the JSON Schema."""
-    document = schema.json_schema()
+    document = json_schema()
     parts = [LANGUAGE, keys_of(document)]
     for name, node in document.get("$defs", document.get("definitions", {})).items():
         parts.append(f"## {name}\n\n")

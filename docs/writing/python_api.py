@@ -23,7 +23,7 @@ of the model's parameters as well, such as `"40*pi"`. Errors are [`ModelError`](
 [`UsageError`](#hsdslusageerror), of a request; their sentences are those of the command line.
 
 """
-RUN = "hsdsl.engine.execution.parts."
+RUN = "hsdsl.engine.execution.records."
 # heading: names, each with its members where it is a class
 SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
     "Load a model": (("hsdsl.load", ""), ("hsdsl.loads", ""), ("hsdsl.Limits", "")),
@@ -41,7 +41,7 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
             " sample_times",
         ),
         *((RUN + name, "") for name in ("Transition", "Stop", "Verdict", "Point", "Arc")),
-        ("hsdsl.engine.execution.samples.Samples", "only columns to_pandas names labels"),
+        ("hsdsl.engine.execution.records.Samples", "only columns to_pandas names labels"),
         ("hsdsl.interface.model.estimate.Estimate", "*"),
         ("hsdsl.interface.model.stream.Streamed", ""),
         ("hsdsl.store.load", ""),
@@ -65,7 +65,7 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
         ("hsdsl.analysis.sensitivity.ties.Tie", ""),
         ("hsdsl.analysis.fitting.fit.Fit", "*"),
         ("hsdsl.analysis.orbits.orbit.Orbit", "*"),
-        ("hsdsl.analysis.orbits.branch.Branch", "*"),
+        ("hsdsl.analysis.orbits.continuation.Branch", "*"),
         ("hsdsl.analysis.orbits.continuation.Bifurcation", ""),
         ("hsdsl.analysis.orbits.sampling.OrbitalStability", "*"),
     ),
@@ -73,9 +73,9 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
         ("hsdsl.distance", ""),
         ("hsdsl.interface.model.distances.distance_of_runs", ""),
         ("hsdsl.analysis.metrics.interval.Interval", "width middle"),
-        ("hsdsl.analysis.metrics.paths.PointDistance", "status sentence"),
-        ("hsdsl.analysis.metrics.paths.PathPiece", ""),
-        ("hsdsl.analysis.metrics.paths.SpacePoint", ""),
+        ("hsdsl.analysis.metrics.points.PointDistance", "status sentence"),
+        ("hsdsl.analysis.metrics.points.PathPiece", ""),
+        ("hsdsl.analysis.metrics.points.SpacePoint", ""),
         ("hsdsl.exact.reference", ""),
     ),
     "Errors": (
@@ -85,7 +85,7 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
         ("hsdsl.UsageError", ""),
     ),
 }
-MADE = ("hsdsl.Limits", "hsdsl.analysis.metrics.paths.SpacePoint")  # classes that readers make themselves
+MADE = ("hsdsl.Limits", "hsdsl.analysis.metrics.points.SpacePoint")  # classes that readers make themselves
 _ROLE = re.compile(r":(?:attr|class|data|func|meth|mod):`~?\.?([^`]+)`")
 _ERROR = re.compile(r"^Raises (\w+): ", re.MULTILINE)
 _ERRORS = re.compile(r"^Raises \w+: .+?(?=\n\n|\Z)", re.MULTILINE | re.DOTALL)

@@ -15,7 +15,7 @@ from hsdsl.interface.chart import PEERS, Refused
 from hsdsl.interface.chart.outcome import WITHIN, Outcome, outcome
 from hsdsl.interface.chart.peers import prepare
 from hsdsl.interface.chart.plan import relaxation
-from hsdsl.interface.chart.result import Tool
+from hsdsl.interface.chart.scene import Tool
 
 TOLERANCES = (1e-6, 1e-9)
 STEPS = (1e-3, 1e-4)  # of the run

@@ -8,7 +8,7 @@ from typing import Any
 
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution
-from hsdsl.engine.preparation.engines import ENGINES
+from hsdsl.engine.preparation.pipeline import ENGINES
 from hsdsl.interface.model import Model
 from paper.accuracy import rho_hat
 from paper.results import Desk, Finding, say

@@ -1,9 +1,8 @@
 """What every storey may use; nothing here knows what a model is.
 
-`errors` are diagnostics with a place. `names`, `parts` and `written` say how things are called; `limits` what a model
+`errors` are diagnostics with a place. `names` and `parts` say how things are called; `limits` what a model
 may ask for; `defaults` what an experiment is unless it says otherwise. `functions` are those of the language, `graphs`
-and `sparsity` structures, `samples` inputs by rows. `numbers` is arithmetic with and without errors.
+structures and patterns, `samples` inputs by rows. `numbers` is arithmetic with and without errors.
 
-Around them: `cache`, `unfinished` and `atomic` for files that are made; `interrupts`, `processes` and `progress` for
-long work; `calls` for wrong arguments; `shown` for data that has its pictures in a storey above.
+Around them: `cache` and `atomic` for files that are made; `interrupts`, `processes` and `progress` for long work.
 """

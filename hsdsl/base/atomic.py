@@ -1,8 +1,13 @@
-"""Files written under another name and renamed into place, so that readers see whole files only."""
+"""Files written under another name, `.hsdsl-*.part`, and renamed into place, so that readers see whole files only.
+
+Who writes a file locks it, and one that nobody writes any more is removed. Folders have locks as well, for those who
+make something in them together.
+"""
 
 from __future__ import annotations
 
 import os
+import secrets
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
@@ -11,7 +16,6 @@ from pathlib import Path
 from typing import BinaryIO
 
 from hsdsl.base.errors import UsageError
-from hsdsl.base.unfinished import part_in
 
 
 @dataclass(frozen=True)
@@ -75,3 +79,87 @@ def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:
 def _sentence(path: str | os.PathLike[str], target: Path, error: OSError) -> str:
     folder = None if target.parent.is_dir() else f"there is no folder {Path(path).parent}"
     return f"cannot write {os.fspath(path)}: {folder or error.strerror or error}"
+
+
+try:
+    import fcntl
+except ImportError:  # Windows, where a file that is open cannot be removed
+    fcntl = None
+
+BEFORE, AFTER = ".hsdsl-", ".part"
+
+
+@contextmanager
+def part_in(folder: Path) -> Generator[tuple[Path, int]]:
+    """Make a file in a folder: its path and a descriptor to be closed; what has the path at the end of the block goes.
+
+    What processes that were killed have left in the folder goes first.
+
+    Raises OSError: it cannot be made.
+    """
+    _remove_left(folder)
+    path, descriptor = _claimed(folder)
+    lock = None if fcntl is None else os.dup(descriptor)  # until the file has its name
+    try:
+        yield path, descriptor
+    finally:
+        with suppress(FileNotFoundError):
+            path.unlink()
+        if lock is not None:
+            os.close(lock)
+
+
+@contextmanager
+def locked(folder: Path) -> Generator[None]:
+    """Let no other process lock a folder in the block, on systems and disks that have such locks."""
+    descriptor = None
+    with suppress(OSError):
+        if fcntl is not None:
+            descriptor = os.open(folder, os.O_RDONLY)
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if descriptor is not None:
+            os.close(descriptor)
+
+
+def _claimed(folder: Path) -> tuple[Path, int]:
+    while True:
+        path = folder / f"{BEFORE}{secrets.token_hex(6)}{AFTER}"
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        try:
+            _lock(descriptor)
+        except BlockingIOError:  # another writer took it for left, and removes it
+            os.close(descriptor)
+            continue
+        except OSError:
+            pass  # a file system without locks
+        if path.exists():
+            return path, descriptor
+        os.close(descriptor)
+
+
+def _lock(descriptor: int) -> None:
+    """Lock a file; OSError where somebody else has, or where that cannot be known."""
+    if fcntl is not None:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _remove_left(folder: Path) -> None:
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith(BEFORE) and entry.name.endswith(AFTER) and entry.is_file(follow_symlinks=False):
+                _remove_unless_written(entry.path)
+
+
+def _remove_unless_written(path: str) -> None:
+    with suppress(OSError):
+        if fcntl is None:
+            return os.unlink(path)
+        descriptor = os.open(path, os.O_WRONLY)
+        try:
+            _lock(descriptor)
+            os.unlink(path)
+        finally:
+            os.close(descriptor)

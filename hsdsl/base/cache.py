@@ -104,7 +104,7 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
 
     Raises OSError: the folder is refused or cannot be written.
     """
-    from hsdsl.base.unfinished import part_in
+    from hsdsl.base.atomic import part_in
 
     entry = folder() / kind / key
     if refusal := private(folder()) or private(entry.parent):
@@ -140,7 +140,7 @@ def forget(kind: str) -> None:
 
 def making(kind: str, key: str) -> AbstractContextManager[None]:
     """Let one process at a time make an entry, where the cache can be written: others wait and find it."""
-    from hsdsl.base.unfinished import locked
+    from hsdsl.base.atomic import locked
 
     return locked(folder() / kind / key) if can_keep(kind, key) else nullcontext()
 
@@ -149,13 +149,6 @@ def can_keep(kind: str, key: str) -> bool:
     """Whether an entry may be made and there is a folder for it."""
     entry = folder() / kind / key
     return all(private(place) is None for place in (folder(), entry.parent, entry))
-
-
-def is_made(kind: str, key: str) -> bool:
-    """Whether another process makes an entry at this moment."""
-    from hsdsl.base.unfinished import is_locked
-
-    return is_locked(folder() / kind / key)
 
 
 def _checksum(data: bytes) -> str:

@@ -1,9 +1,18 @@
-"""Directed graphs that are given by what follows each node: what can be reached, and cycles."""
+"""Directed graphs, and patterns of the matrices c I - h J of implicit steps.
+
+A graph is given by what follows each node: what can be reached, and cycles. Of a matrix there are the entries that its
+factors have, and which of its blocks are equal. In a sparse elimination rows and columns are taken in one order, pivots
+are the diagonal ones, and the pattern is symmetric: the matrices tend to a multiple of the identity as the step becomes
+short. See T. A. Davis, Direct Methods for Sparse Linear Systems, SIAM 2006, Ch. 4 (doi:10.1137/1.9780898718881).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
+from itertools import accumulate
 from typing import TypeVar
 
 T = TypeVar("T", bound=Hashable)
@@ -31,3 +40,159 @@ def cycle(following: Mapping[T, Iterable[T]]) -> list[T] | None:
         at = found.index(min(found, key=list(following).index))
         return found[at:] + found[:at]
     return None
+
+
+@dataclass(frozen=True)
+class Elimination:
+    """Entries of the factors, row by row, rows and columns numbered in the order of elimination.
+
+    Attributes
+    ----------
+    order : list of int
+        The unknown of each row.
+    start, column, diagonal : list of int
+        Row i has the entries from ``start[i]`` to ``start[i + 1]``, in these columns, which go up; ``diagonal[i]`` is
+        the one of its own.
+    place : list of int
+        For each entry of J the entry of the factors where it goes.
+    own : list of int
+        For each unknown which entry of J is the derivative of its flow by itself, -1 for none.
+    """
+
+    order: list[int]
+    start: list[int]
+    column: list[int]
+    diagonal: list[int]
+    place: list[int]
+    own: list[int]
+
+    @property
+    def size(self) -> int:
+        """How many entries the factors have."""
+        return len(self.column)
+
+
+@lru_cache(maxsize=64)
+def elimination(places: tuple[int, ...], order: tuple[int, ...]) -> Elimination:
+    """The pattern for entries of J at ``places`` of its n * n, row by row, and unknowns in an order."""
+    n = len(order)
+    position = [0] * n
+    for i, unknown in enumerate(order):
+        position[unknown] = i
+    above = _above([(position[k // n], position[k % n]) for k in places], n)
+    below: list[list[int]] = [[] for _ in range(n)]
+    for k, columns in enumerate(above):
+        for i in columns:
+            below[i].append(k)
+    rows = [[*below[i], i, *sorted(above[i])] for i in range(n)]
+    start = [0, *accumulate(map(len, rows))]
+    where = [{column: start[i] + at for at, column in enumerate(row)} for i, row in enumerate(rows)]
+    own = [-1] * n
+    for index, k in enumerate(places):
+        if k // n == k % n:
+            own[k // n] = index
+    return Elimination(
+        order=list(order),
+        start=start,
+        column=[column for row in rows for column in row],
+        diagonal=[where[i][i] for i in range(n)],
+        place=[where[position[k // n]][position[k % n]] for k in places],
+        own=own,
+    )
+
+
+@dataclass(frozen=True)
+class Variation:
+    """The blocks of J where states are derivatives of others: x' = f(x), and S' = f_x S + f_p for each column S.
+
+    J is f_x for x and again for each column, next to which it has how f_x S + f_p varies with x. So the factors of
+    c I - h f_x serve every column: each is a right-hand side more. What does not flow has no equation.
+
+    Attributes
+    ----------
+    own : int
+        How many states x has; they are the first ones.
+    columns : list of int
+        Where each column begins, and where the last one ends: behind it states do not flow.
+    rows : list of int
+        For each state of a column, from ``columns[0]`` on, which state of x it is the derivative of.
+    entries : int
+        How many entries of J are those of f_x for x; they are the first ones.
+    links : list of int
+        The entries of J that are derivatives of a column by x.
+    linked, linking : list of int
+        For each of them which state it is the derivative of, and by which.
+    itself : list of int
+        For each state which entry of J is the derivative of its flow by itself, -1 for none.
+    groups : list of int
+        Numbers of states of x that depend on each other, where f_x is dense. Rows of one group exchange places in an
+        elimination, and no others: what no other group moves stays exactly zero.
+    elimination : Elimination, optional
+        The pattern for f_x, where it is sparse.
+    """
+
+    own: int
+    columns: list[int]
+    rows: list[int]
+    entries: int
+    links: list[int]
+    linked: list[int]
+    linking: list[int]
+    itself: list[int]
+    groups: list[int]
+    elimination: Elimination | None
+
+
+@lru_cache(maxsize=64)
+def variation(
+    places: tuple[int, ...], n: int, own: int, varied: tuple[tuple[int, ...], ...], order: tuple[int, ...]
+) -> Variation:
+    """The blocks of J with entries at ``places``; ``varied`` has for each column the states of x it has derivatives of.
+
+    ``order`` is that in which f_x is eliminated, empty where it is dense.
+    """
+    inside = [k for k in places if k // n < own]
+    links = [index for index, k in enumerate(places) if k // n >= own > k % n]
+    itself = {k // n: index for index, k in enumerate(places) if k // n == k % n}
+    return Variation(
+        own=own,
+        columns=list(accumulate(map(len, varied), initial=own)),
+        rows=[row for column in varied for row in column],
+        entries=len(inside),
+        links=links,
+        linked=[places[index] // n for index in links],
+        linking=[places[index] % n for index in links],
+        itself=[itself.get(i, -1) for i in range(n)],
+        groups=[] if order else _groups([(k // n, k % n) for k in inside], own),
+        elimination=elimination(tuple(k // n * own + k % n for k in inside), order) if order else None,
+    )
+
+
+def _groups(places: Sequence[tuple[int, int]], n: int) -> list[int]:
+    """For each unknown the first one that it depends on, through others or not, and that depends on it."""
+    reached = [1 << i for i in range(n)]
+    for i, j in places:
+        reached[i] |= 1 << j
+    for k in range(n):
+        for i in range(n):
+            if reached[i] >> k & 1:
+                reached[i] |= reached[k]
+    return [next(j for j in range(n) if reached[i] >> j & reached[j] >> i & 1) for i in range(n)]
+
+
+def filled(places: Sequence[tuple[int, int]], n: int) -> int:
+    """How many entries the factors have, for entries at these rows and columns."""
+    return n + 2 * sum(map(len, _above(places, n)))
+
+
+def _above(places: Sequence[tuple[int, int]], n: int) -> list[set[int]]:
+    """The columns behind the diagonal of each row: what a row leaves goes on to the first row that it has."""
+    above: list[set[int]] = [set() for _ in range(n)]
+    for i, j in places:
+        if i != j:
+            above[min(i, j)].add(max(i, j))
+    for k in range(n):
+        if above[k]:
+            parent = min(above[k])
+            above[parent] |= above[k] - {parent}
+    return above

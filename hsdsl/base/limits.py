@@ -9,8 +9,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_methods
 
 
 @checks_methods

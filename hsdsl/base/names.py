@@ -1,11 +1,15 @@
-"""Names: which are legal, which are taken by the language, and which one was probably meant."""
+"""Names: which are legal, which are taken by the language, and which one was probably meant, also in a call."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterable, Mapping
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from functools import wraps
+from types import FunctionType
+from typing import ParamSpec, TypeVar, cast
+
+from hsdsl.base.errors import UsageError
 
 V = TypeVar("V")
 LOOKALIKES = "·²³"  # Unicode allows some of them in names; in mathematics they are operators
@@ -176,3 +180,44 @@ def shown(text: str, limit: int | None = 60) -> str:
     """A text as a sentence can carry it: in one line, and cut."""
     text = visible(" ".join(INVISIBLE.sub("\ufffd", text).split()))
     return text if limit is None or len(text) <= limit else text[: limit - 3] + "..."
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+C = TypeVar("C", bound=type)
+TAKES_ANY = 0x08  # a flag of code: `**options`, which it hands on
+Elsewhere = Callable[..., str | None]  # of a method's object and the name: the hint, where there is one
+
+
+def nowhere(*_: object) -> None:
+    """No hint."""
+
+
+def checks_arguments(function: Callable[P, R], name: str = "", elsewhere: Elsewhere = nowhere) -> Callable[P, R]:
+    """Let a function raise UsageError for an argument that it does not have; ``elsewhere`` may have a hint."""
+    code = cast(FunctionType, function).__code__
+    if code.co_flags & TAKES_ANY:
+        return function
+    own = frozenset(code.co_varnames[: code.co_argcount + code.co_kwonlyargcount])
+    others = [each for each in code.co_varnames[: len(own)] if each != "self"]
+    name = name or code.co_name
+
+    @wraps(function)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> R:
+        if not own.issuperset(kwargs):
+            key = next(key for key in kwargs if key not in own)
+            hint = (elsewhere(args[0], key) if args else None) or did_you_mean(key, others)
+            hint = hint or f"its arguments are {', '.join(others)}"
+            raise UsageError(f"{name} has no argument '{key}'", hint)
+        return function(*args, **kwargs)
+
+    return checked
+
+
+def checks_methods(kind: C, elsewhere: Elsewhere = nowhere, name: str = "") -> C:
+    """Let a class and its methods raise UsageError for arguments that are none of theirs."""
+    for key, value in list(vars(kind).items()):
+        if isinstance(value, FunctionType) and (key == "__init__" or not key.startswith("_")):
+            of = name or kind.__name__
+            setattr(kind, key, checks_arguments(value, of if key == "__init__" else f"{of}.{key}", elsewhere))
+    return kind

@@ -1,17 +1,17 @@
-"""The parts of a composed system, and what the numbers of their modes are called.
+"""The parts of a composed system, what the numbers of their modes are called, and modes and edges as the file has them.
 
 A system of parts is one mode over the states of all of them. The mode of a part with several is a number that no flow
 changes, 1 for the first: a state with the name of the part. So what a system costs grows with the sum of its parts'
-modes, and a product mode exists only where a run visits it.
+modes, and a product mode exists only where a run visits it. An event has several edges in a system, and one in a file.
 """
 
 from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from hsdsl.base.names import did_you_mean
 
@@ -200,3 +200,60 @@ def _range(indices: Sequence[str]) -> str:
     if not indices:
         return ""
     return f"[{indices[0]}]" if len(indices) == 1 else f"[{indices[0]}..{indices[-1]}]"
+
+
+class _Edge(Protocol):
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def source(self) -> Any: ...
+
+    @property
+    def target(self) -> Any: ...
+
+    @property
+    def of_event(self) -> tuple[str, ...]: ...
+
+
+class _Mode(Protocol):
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def edges(self) -> Sequence[_Edge]: ...
+
+
+E = TypeVar("E", bound=_Edge)
+M = TypeVar("M", bound=_Mode)
+
+
+def written_edges(edges: Iterable[E], also: Collection[Any] = ()) -> list[E]:
+    """The edges of a mode, of each event only its own one; of those into the modes ``also`` the first."""
+    found: dict[Any, E] = {}
+    for k, edge in enumerate(edges):
+        key = (edge.name,) if edge.of_event else k
+        if not _is_inner(edge) or edge.target in also:
+            found.setdefault(key, edge)
+    return list(found.values())
+
+
+def _is_inner(edge: _Edge) -> bool:
+    """Whether an edge only changes what an event remembers, or ends a run."""
+    return bool(edge.of_event) and edge.name != edge.of_event[0]
+
+
+def inner_modes(modes: Iterable[_Mode]) -> set[Any]:
+    """The modes in which runs end where too many executions of an event wait, as edges name them."""
+    return {e.target for mode in modes for e in mode.edges if _is_inner(e) and e.target != e.source}
+
+
+def written_modes(modes: Sequence[M]) -> list[M]:
+    """The modes of the file."""
+    inner = inner_modes(modes)
+    return [mode for k, mode in enumerate(modes) if k not in inner and mode.name not in inner]
+
+
+def event_text(of_event: Sequence[str]) -> list[str]:
+    """How an event is written, key by key; nothing for another edge."""
+    return [f"event {of_event[1]}", *of_event[2:]] if of_event else []

@@ -26,13 +26,6 @@ class Lost:
     word: str
 
 
-@dataclass(frozen=True)
-class _Failure:
-    """What a task raised."""
-
-    error: Exception
-
-
 @dataclass(eq=False)
 class _Worker(Generic[Task, Answer]):
     """A process that answers tasks by their index, and the one it is at."""
@@ -60,14 +53,25 @@ class _Worker(Generic[Task, Answer]):
             except EOFError:  # the parent is gone
                 return
             try:
-                there.send(self.work(self.tasks[index]))
+                there.send((self.work(self.tasks[index]), None))
             except Exception as error:  # raised again where the answer is read
-                there.send(_Failure(error))
+                there.send((None, error))
 
     def give(self, index: int) -> None:
         """Begin a task."""
         self.index, self.began, self.spent = index, time.monotonic(), processor_seconds(self.process.pid)
         self.here.send(index)
+
+    def answer(self) -> Answer | Lost:
+        """What has come of the task; a dead process has none."""
+        try:
+            answer, error = self.here.recv()
+        except (EOFError, OSError):
+            self.alive = False
+            return Lost(CRASHES)
+        if error is not None:
+            raise error
+        return answer
 
     def late(self, limit: float) -> bool:
         """Whether the task has had its time."""
@@ -101,43 +105,22 @@ def in_processes(
     try:
         while waiting or workers:
             while waiting and len(workers) < count:
-                _begin(workers, _Worker(work, tasks), waiting.pop())
+                worker = _Worker(work, tasks)
+                workers[worker.here] = worker
+                worker.give(waiting.pop())
             for here in wait([*workers], INTERVAL):
                 worker = workers[here]  # pyright: ignore[reportArgumentType]
-                yield worker.index, _answer(worker)
-                _go_on(workers, worker, waiting)
+                yield worker.index, worker.answer()
+                if waiting and worker.alive:
+                    worker.give(waiting.pop())
+                else:
+                    workers.pop(worker.here).end()
             for worker in [worker for worker in workers.values() if worker.late(limit)]:
                 yield worker.index, Lost(HANGS)
-                del workers[worker.here]
-                worker.end()
+                workers.pop(worker.here).end()
     finally:
         for worker in workers.values():
             worker.end()
-
-
-def _begin(workers: dict[Connection, _Worker[Any, Any]], worker: _Worker[Any, Any], index: int) -> None:
-    workers[worker.here] = worker
-    worker.give(index)
-
-
-def _answer(worker: _Worker[Any, Answer]) -> Answer | Lost:
-    try:
-        answer = worker.here.recv()
-    except (EOFError, OSError):
-        worker.alive = False
-        return Lost(CRASHES)
-    if isinstance(answer, _Failure):
-        raise answer.error
-    return answer
-
-
-def _go_on(workers: dict[Connection, _Worker[Any, Any]], worker: _Worker[Any, Any], waiting: list[int]) -> None:
-    """The next task of a worker that lives; the end of one that has none, or is dead."""
-    if waiting and worker.alive:
-        worker.give(waiting.pop())
-        return
-    del workers[worker.here]
-    worker.end()
 
 
 def processor_seconds(process: int | None) -> float:

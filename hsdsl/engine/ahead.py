@@ -1,8 +1,8 @@
-"""A model that is elaborated, lowered and compiled in another process, while this one loads what runs it.
+"""A model that is elaborated and lowered in another process, while this one loads what compiles, runs and reports it.
 
 The other process is a copy of this one from before anything large was loaded. It answers with the program or with the
 errors of the model; where it ends without an answer, this process does the work itself. Large models are lowered in
-two processes. Then it makes what is missing in the cache of compiled code, even where this process ends before.
+two processes.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Generic, NamedTuple, NoReturn, TypeVar
 
 from hsdsl.base import interrupts
@@ -40,12 +39,6 @@ class Lowered(NamedTuple):
 
 Answer = Lowered | ModelError | None
 LARGE = 0.03  # seconds to elaborate a model, from which on a copy takes less time than half of the lowering
-NICE = 5  # the run that needs no compiled code goes first
-# what pydantic and SymPy load where they first look for plugins and tensors, of which no model has any: for nothing
-_UNUSED: dict[str, dict[str, type]] = {
-    "pydantic.plugin._loader": {"get_plugins": tuple},
-    "sympy.tensor.tensor": {name: type(name, (), {}) for name in ("TensAdd", "TensExpr")},
-}
 
 
 @dataclass(frozen=True)
@@ -77,22 +70,17 @@ class _Copy(Generic[Result]):
 
 
 _begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
-_seen: list[ModelFiles] = []
-_going_on: list[int] = []  # copies that have answered
 
 
-def begin(files: ModelFiles, compiled: bool = True) -> None:
-    """Begin to lower a model in another process, where that saves time, and to compile it: see :func:`taken`."""
-    if files in _seen:
-        return
-    _seen.append(files)
+def begin(files: ModelFiles) -> None:
+    """Begin to lower a model in another process, where that saves time: see :func:`taken`."""
     if _saves_time() and not program_cache.is_kept(files):
         with suppress(OSError):  # there may be no more processes
-            _begun.append((files, _copy(lambda: _lowered(files), _compile if compiled else None)))
+            _begun.append((files, _copy(lambda: _lowered(files))))
 
 
 def begin_run(words: list[str]) -> None:
-    """Begin with the model of a command line that runs it as it is, before what reads other command lines is loaded."""
+    """Begin with the model of a command line that runs it as it is, before what reads command lines is loaded."""
     match words:
         case ["run", model, *options] if set(options) <= {"--json", "--quiet", "-q"} and os.path.isfile(model):
             with suppress(UsageError):  # which the command reports
@@ -123,29 +111,14 @@ def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
             import_module(name)
         answer = one[1].wait()
         _begun.remove(one)
-        if isinstance(answer, Lowered):
-            os.close(one[1].answer)
-            _going_on.append(one[1].process)
-            return answer
         one[1].end()
-        if answer is not None:
+        if isinstance(answer, ModelError):
             raise answer
+        return answer
     return None
 
 
-def compiling() -> bool:
-    """Whether another process compiles what it has lowered for this one."""
-    for process in [*_going_on]:
-        try:
-            ended = os.waitpid(process, os.WNOHANG)[0]
-        except ChildProcessError:  # this process keeps no ends of others
-            ended = True
-        if ended:
-            _going_on.remove(process)
-    return bool(_going_on)
-
-
-def _copy(work: Callable[[], Result], then: Callable[[Result], object] | None = None) -> _Copy[Result]:
+def _copy(work: Callable[[], Result]) -> _Copy[Result]:
     """Begin some work in a copy of this process, which may go on by itself when it has answered.
 
     Raises OSError: there may be no more processes.
@@ -159,14 +132,14 @@ def _copy(work: Callable[[], Result], then: Callable[[Result], object] | None = 
     else:
         if process == 0:
             os.close(answer)  # else a large answer is waited with for ever where the reader has ended
-            _work(work, to_answer, then)
+            _work(work, to_answer)
         return _Copy(process, answer)
     finally:
         os.close(to_answer)
 
 
-def _work(work: Callable[[], Result], to_answer: int, then: Callable[[Result], object] | None) -> NoReturn:
-    """Answer, go on, and end this process without what its copy does at its end."""
+def _work(work: Callable[[], object], to_answer: int) -> NoReturn:
+    """Answer, and end this process without what its copy does at its end."""
     import ctypes
     import pickle
     import signal
@@ -174,25 +147,11 @@ def _work(work: Callable[[], Result], to_answer: int, then: Callable[[Result], o
     try:
         ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG: nobody reads what it answers then
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # the other one says that it was interrupted
-        answer = work()
-        content = pickle.dumps(answer)
+        content = pickle.dumps(work())
         with open(to_answer, "wb") as stream:
             stream.write(content)
-        if then is not None:
-            ctypes.CDLL(None).prctl(1, 0)
-            _leave()
-            then(answer)
     finally:
         os._exit(0)
-
-
-def _leave() -> None:
-    """Keep nothing open that others wait for, be it a pipe or a lock, get no Ctrl-C, and let others work first."""
-    os.setpgid(0, 0)
-    os.nice(NICE)
-    os.closerange(0, 1 + max(map(int, os.listdir("/proc/self/fd"))))
-    for _ in range(3):
-        os.open(os.devnull, os.O_RDWR)
 
 
 def _both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
@@ -220,9 +179,6 @@ def _lowered(files: ModelFiles) -> Answer:
     import gc
     import time
 
-    for name, names in _UNUSED.items():
-        sys.modules[name] = module = ModuleType(name)
-        vars(module).update(names)
     gc.disable()  # imports leave no garbage; to look for it costs time
     from hsdsl.language.elaborate import elaborate_files
     from hsdsl.mathematics.completion import with_sliding
@@ -243,19 +199,6 @@ def _lowered(files: ModelFiles) -> Answer:
             return Lowered(program, sliding, files.with_data(system.files))
     except ModelError as error:
         return error
-
-
-def _compile(lowered: Answer) -> None:
-    """Compile the program that runs, for the cache; where there is none, let a run that is shorter than this end."""
-    import time
-
-    from hsdsl.engine.runtime import library
-    from hsdsl.engine.runtime.compiler import NoCompiler
-
-    if isinstance(lowered, Lowered):
-        with applied(lowered.files.limits), suppress(NoCompiler):  # the run that needs it reports the failure
-            if not library.keep_program(lowered.sliding or lowered.program):
-                time.sleep(time.process_time())
 
 
 @atexit.register

@@ -9,9 +9,9 @@ from typing import Any
 
 from hsdsl.export.source import Source
 from hsdsl.language.elaborate import elaborate_files
+from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.plain import names_in
-from hsdsl.language.expression.syntax import ExpressionError
-from hsdsl.language.schema import ModelDocument, SystemDocument
+from hsdsl.language.schema.documents import ModelDocument, SystemDocument
 
 Pairs = list[tuple[str, str]]  # names and texts of expressions
 

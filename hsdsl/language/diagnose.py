@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from hsdsl.base.errors import Diagnostic, Edit, Span
+from hsdsl.base.errors import Diagnostic, Span
 from hsdsl.base.names import visible
 
 WIDEST = 120
@@ -118,15 +118,13 @@ def as_sarif(
     codes = sorted({result["ruleId"] for result in results})
     for result in results:
         result["ruleIndex"] = codes.index(result["ruleId"])
-    rules = [_rule(code, titles[code], pages.get(code)) for code in codes]
+    rules: list[dict[str, Any]] = [{"id": code, "shortDescription": {"text": titles[code]}} for code in codes]
+    for rule in rules:
+        if page := pages.get(rule["id"]):
+            rule["help"] = {"text": page, "markdown": page}
     driver = {"name": "hsdsl", "version": version, "rules": rules}
     run = {"tool": {"driver": driver}, "columnKind": "unicodeCodePoints", "results": results}
     return {"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}
-
-
-def _rule(code: str, title: str, page: str | None) -> dict[str, Any]:
-    help = {"help": {"text": page, "markdown": page}} if page else {}
-    return {"id": code, "shortDescription": {"text": title}, **help}
 
 
 def _result(diagnostic: Diagnostic) -> dict[str, Any]:
@@ -134,26 +132,25 @@ def _result(diagnostic: Diagnostic) -> dict[str, Any]:
     message = {"text": f"{diagnostic.message}.{hint}"}
     result: dict[str, Any] = {"ruleId": diagnostic.code, "level": diagnostic.severity, "message": message}
     if diagnostic.span:
-        result["locations"] = [{"physicalLocation": _location(diagnostic.span)}]
+        span = diagnostic.span
+        region = {"startLine": span.line, "startColumn": span.column, "endColumn": span.column + span.length}
+        result["locations"] = [{"physicalLocation": {"artifactLocation": _artifact(span), "region": region}}]
     if diagnostic.decided:
         result["properties"] = {"decided": diagnostic.decided}
     if diagnostic.fix and diagnostic.span:
-        change = {"artifactLocation": _artifact(diagnostic.span), "replacements": [*map(_edit, diagnostic.fix)]}
+        edits = [
+            {
+                "deletedRegion": {"charOffset": edit.start, "charLength": edit.end - edit.start},
+                "insertedContent": {"text": edit.replacement},
+            }
+            for edit in diagnostic.fix
+        ]
+        change = {"artifactLocation": _artifact(diagnostic.span), "replacements": edits}
         result["fixes"] = [{"artifactChanges": [change]}]
     return result
-
-
-def _location(span: Span) -> dict[str, Any]:
-    region = {"startLine": span.line, "startColumn": span.column, "endColumn": span.column + span.length}
-    return {"artifactLocation": _artifact(span), "region": region}
 
 
 def _artifact(span: Span) -> dict[str, str]:
     """A path as a URI: relative ones stay relative, for the reader of the log to resolve."""
     path = Path(span.path)
     return {"uri": path.as_uri() if path.is_absolute() else quote(os.fsencode(path.as_posix()))}
-
-
-def _edit(edit: Edit) -> dict[str, Any]:
-    region = {"charOffset": edit.start, "charLength": edit.end - edit.start}
-    return {"deletedRegion": region, "insertedContent": {"text": edit.replacement}}

@@ -21,9 +21,9 @@ from typing import Any, Literal
 import sympy as sp
 
 from hsdsl.base.parts import Part
+from hsdsl.language.expression.conditions import Trigger
 from hsdsl.language.expression.scope import TIME as TIME
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.trigger import Trigger
 
 ZERO, HALF, ONE = sp.S.Zero, sp.S.Half, sp.S.One
 TRUTH = {True: sp.true, False: sp.false}

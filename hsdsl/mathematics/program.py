@@ -17,9 +17,9 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
+from hsdsl.base.graphs import Elimination, Variation, elimination, variation
 from hsdsl.base.parts import Part
 from hsdsl.base.samples import Hold
-from hsdsl.base.sparsity import Elimination, Variation, elimination, variation
 
 LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
 CURVED = re.compile(r"\w\(|/")

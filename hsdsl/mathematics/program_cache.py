@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import types
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
@@ -28,9 +28,8 @@ from hsdsl.mathematics import program as declared
 from hsdsl.mathematics.program import Program
 
 KIND = "programs"
-_PACKAGE = Path(__file__).parent
-# what a program depends on, besides the modules of the package itself
-_READERS = ("files", "source", "schema", "expression", "elaborate", "completion", "lower", "model", "sensitivity")
+_PACKAGE = Path(__file__).parents[1]
+_READERS = ("base", "language", "mathematics", "analysis/sensitivity", "interface/model")  # what a program depends on
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 LIST, LONG = "", 16  # the name of a row that is a list, and from how many items on a list is a row
 Row = list[Any]
@@ -48,15 +47,15 @@ def key_of(files: ModelFiles, part: Part = ()) -> str:
 def _fingerprint() -> str:
     """Size and time of this package's files, which differ between versions; hashing them takes longer than loading."""
 
-    def described(folder: Path | str, within: Sequence[str] | None = None) -> Iterator[str]:
+    def described(folder: Path | str) -> Iterator[str]:
         with os.scandir(folder) as entries:
             for entry in entries:
                 if entry.name.endswith(".py"):
                     yield f"{entry.path} {entry.stat().st_size} {entry.stat().st_mtime_ns}"
-                elif entry.name != "__pycache__" and entry.is_dir() and (within is None or entry.name in within):
+                elif entry.name != "__pycache__" and entry.is_dir():
                     yield from described(entry.path)
 
-    return "\n".join(sorted(described(_PACKAGE, _READERS)))
+    return "\n".join(sorted(line for reader in _READERS for line in described(_PACKAGE / reader)))
 
 
 def find(files: ModelFiles, part: Part = ()) -> tuple[Program, ModelFiles] | None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp, number
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import Number, Stretch, Vector, mp, number
 from references.rests import UNRESOLVED, rest, tail
 
 SOURCE = "closed form: flights of 2 v/g from bounce to bounce, summed to the Zeno point sqrt(2 h/g) (1 + e)/(1 - e)"

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import mp
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import mp
 from references.taylor import ORDER, Mode, Solved, digits, solve
 
 METHOD = "Taylor series"

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from hsdsl.analysis.exact.interpolation import DIGITS, Number, Stretch, Vector, breakpoints, coefficients, error_of
 from hsdsl.engine.execution import Arc, Array, Execution, Kind, Point, Stop, Transition, Verdict
+from references.interpolation import DIGITS, Number, Stretch, Vector, breakpoints, coefficients, error_of
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from hsdsl.analysis.exact.interpolation import Number, mp
 from hsdsl.engine.execution import Execution
 from references.by_series import by_series
+from references.interpolation import Number, mp
 from references.series import Flow, Series, States, sin_cos
 from references.taylor import Edge, Mode
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp, number
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import Number, Stretch, Vector, mp, number
 
 SOURCE = "closed form: straight lines from axis to axis (Burden et al. 2013, Fig. 1)"
 FIELDS = {"D0": ("1", "1"), "D1": ("1", "0.8"), "D2": ("0.7", "1"), "D3": ("1", "1")}

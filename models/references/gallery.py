@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, mp
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 from references.gallery_balls import BALLS
 from references.gallery_series import lorenz_section, stick_slip
 from references.gallery_swings import SWINGS
+from references.interpolation import Number, Stretch, mp
 from references.terms import exponential, polynomial, stretch
 
 SLIDING = "(sliding)"  # the mode of an arc along a surface, which the model as written does not have

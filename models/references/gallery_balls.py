@@ -7,10 +7,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
 from hsdsl.engine.execution import Execution, Verdict
 from references.bouncing_ball import bounces, bouncing_ball
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import Number, Stretch, Vector, mp
 from references.rests import UNRESOLVED, tail
 from references.terms import Terms, polynomial, root, stretch
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from hsdsl.analysis.exact.interpolation import mp
 from hsdsl.engine.execution import Execution, Verdict
 from references.by_series import by_series
+from references.interpolation import mp
 from references.series import Series, States
 from references.taylor import Edge, Mode
 

@@ -7,9 +7,9 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, mp
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import Number, Stretch, mp
 from references.terms import Terms, polynomial, stretch, wave
 
 SLIDING = "(sliding)"

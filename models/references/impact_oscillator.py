@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.exact.interpolation import Number, Vector, mp
 from hsdsl.engine.execution import Array
+from references.interpolation import Number, Vector, mp
 
 REST = mp.mpf(10) ** -25  # impacts slower than this are summed; flights down to it cancel half of the digits
 

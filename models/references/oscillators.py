@@ -6,11 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
 from references.impact_oscillator import Flight, Motion, exact_example_1, exact_example_2
+from references.interpolation import Number, Stretch, Vector, mp
 from references.rests import UNRESOLVED, rest, tail
 
 EXAMPLES = {1: exact_example_1, 2: exact_example_2}

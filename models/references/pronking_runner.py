@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import mp, number
 from hsdsl.engine.execution import Execution
 from references.by_series import by_series
+from references.interpolation import mp, number
 from references.series import Series, States, sin_cos, sqrt
 from references.taylor import Edge, Mode
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector
+from references.interpolation import Number, Stretch, Vector
 
 UNRESOLVED = 2.0**-51  # of the time: with less left of a tail, floats no longer tell its transitions apart
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Vector, mp
+from references.interpolation import Number, Vector, mp
 
 States = Mapping[str, Any]  # name: Series
 Flow = Callable[[States], Mapping[str, Any]]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp, number
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import Number, Stretch, Vector, mp, number
 
 SOURCE = "closed form: two exponentials a mode; its switches by Newton's method in eighty digits"
 DEGREE = 8

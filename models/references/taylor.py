@@ -15,8 +15,8 @@ from itertools import pairwise
 from math import floor
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
 from hsdsl.base.errors import UsageError
+from references.interpolation import Number, Stretch, Vector, mp
 from references.series import Flow, Series, States, solution, value, values
 
 ORDER = 40

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
+from references.interpolation import Number, Stretch, Vector, mp
 
 Function = Callable[[Number], Number]
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp, number
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution, Verdict
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import Number, Stretch, Vector, mp, number
 
 SOURCE = "closed form: exponentials, and logarithms for the times between switches"
 DEGREE = 8

@@ -11,7 +11,7 @@ import pytest
 import hsdsl
 from campaign.maps import drawn
 from hsdsl.engine.simulate.verdict import RunView
-from hsdsl.engine.simulate.verdict.agreement import Errors
+from hsdsl.engine.simulate.verdict.errors import Errors
 
 MANY, FEW = 300, 8
 TIMES, LEAST = 10, 1e-6  # how far off a state may be: of the error that is known, or of its largest size

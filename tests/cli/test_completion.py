@@ -10,7 +10,7 @@ from typing import get_args
 
 import pytest
 
-from hsdsl.engine.preparation.engines import ENGINES
+from hsdsl.engine.preparation.pipeline import ENGINES
 from hsdsl.engine.simulate import SCHEMES
 from hsdsl.interface.cli import options
 

@@ -71,10 +71,10 @@ def test_next_to_nothing_is_imported_before_control_c_is_expected():
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert {name for name in loaded if name.startswith("hsdsl")} == {
         "hsdsl",
-        "hsdsl.base",
-        "hsdsl.base.interrupts",
         "hsdsl.interface",
         "hsdsl.interface.cli",
+        "hsdsl.base",
+        "hsdsl.base.interrupts",
     }
     assert not {"dataclasses", "re", "typing"} & {*loaded}  # the first of what takes long
 

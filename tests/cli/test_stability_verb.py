@@ -7,7 +7,7 @@ import csv
 import pytest
 
 import hsdsl
-from hsdsl.interface.chart.stability.axes import read_axes
+from hsdsl.interface.chart.stability import read_axes
 
 DECAY = """hsdsl: 1
 parameters: {rate: 100}

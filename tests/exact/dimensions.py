@@ -8,8 +8,8 @@ from functools import partial
 from typing import Any
 
 from references.closed_form import ClosedForm, as_execution
+from references.interpolation import Number, Stretch, Vector, mp
 
-from hsdsl.analysis.exact.interpolation import Number, Stretch, Vector, mp
 from hsdsl.engine.execution import Verdict
 
 STATES = {"line": ("x",), "plane": ("x", "y"), "space": ("x", "y", "z"), "last": ("x",)}

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from references.closed_form import ClosedForm, as_execution
 from references.impact_oscillator import Flight, Motion
+from references.interpolation import Stretch, mp
 from references.rests import rest
 
-from hsdsl.analysis.exact.interpolation import Stretch, mp
 from hsdsl.engine.execution import Arc, Verdict
 
 

@@ -16,7 +16,7 @@ import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.export import TARGETS, files_of, source_of, write
 from hsdsl.export.source import identifiers
-from hsdsl.interface.cli.export import only_text
+from hsdsl.interface.cli.convert import only_text
 from hsdsl.interface.cli.verbs import obey
 
 BALL = str(MODELS / "bouncing-ball.yaml")

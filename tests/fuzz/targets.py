@@ -23,13 +23,11 @@ from hsdsl.interface.model import Model
 from hsdsl.language.diagnose import as_json, render
 from hsdsl.language.elaborate import elaborate
 from hsdsl.language.expression import ExpressionError, parse, symbolic
-from hsdsl.language.expression.inequality import inequality
+from hsdsl.language.expression.conditions import inequality
 from hsdsl.language.expression.scope import Scope, Value, state, symbol
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
 from hsdsl.language.system import TIME
-from hsdsl.mathematics.lower.routines import Definition, print_routines
-from hsdsl.mathematics.lower.straight import Gradient
+from hsdsl.mathematics.lower.straight import Definition, Gradient, print_routines
 
 assert late.LATE  # before anything is watched
 SCOPE = Scope(

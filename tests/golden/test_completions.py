@@ -10,7 +10,7 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.analysis.lint import Selection, lint
+from hsdsl.analysis.lint import lint, selected
 
 METHODS = ["taylor", "dopri5", "radau"]
 ENGINES = ["python", "c"]
@@ -379,7 +379,7 @@ def test_completed_text_is_clean_and_complete(name: str) -> None:
     written = model.completed()
     assert written is not None
     assert name == "zeno-ball" or hsdsl.loads(written).completed() is None
-    rules = Selection.of(["HS42", "HS50"])
+    rules = selected(["HS42", "HS50"])
     codes = {
         found.code for found in lint(Path("m.yaml"), rules, text=written.encode()).findings if found.severity != "note"
     }

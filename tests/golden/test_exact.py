@@ -23,7 +23,7 @@ from shipped import shipped
 
 import hsdsl
 from hsdsl.analysis import exact
-from hsdsl.analysis.exact.residual import residual
+from hsdsl.analysis.exact.references import residual
 from hsdsl.analysis.store import load
 
 ZENO = 12.850588106343579

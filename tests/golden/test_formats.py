@@ -14,7 +14,7 @@ import pytest
 
 import hsdsl
 from hsdsl.analysis import store
-from hsdsl.analysis.store import npz, sidecar
+from hsdsl.analysis.store import npz, table
 from hsdsl.analysis.sweep import load, manifest
 
 FORMATS = Path(__file__).parent / "formats"
@@ -27,7 +27,7 @@ def versions(pattern: str) -> list[int]:
 
 def test_every_version_has_its_file():
     assert versions("execution-*.npz") == [*range(1, npz.VERSION + 1)]
-    assert versions("table-*.csv") == [*range(1, sidecar.VERSION + 1)]
+    assert versions("table-*.csv") == [*range(1, table.VERSION + 1)]
     assert versions("sweep-*") == [*range(1, manifest.VERSION + 1)]
 
 

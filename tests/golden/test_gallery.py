@@ -17,7 +17,7 @@ from references.gallery import two_ways
 import hsdsl
 from hsdsl.engine.execution import Verdict
 from hsdsl.interface.chart.outcome import WITHIN, Tolerance, outcome
-from hsdsl.interface.chart.result import Result
+from hsdsl.interface.chart.scene import Result
 
 SCENES = entries()
 BY_SERIES = {"lorenz-section", "stick-slip"}

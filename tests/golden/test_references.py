@@ -13,8 +13,7 @@ from shipped import MODELS, shipped
 
 import hsdsl
 from hsdsl.analysis.exact import reference
-from hsdsl.analysis.exact.references import STORED
-from hsdsl.analysis.exact.residual import residual
+from hsdsl.analysis.exact.references import STORED, residual
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.backends.python import PythonKernel
 

@@ -15,14 +15,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import hsdsl
-from hsdsl.analysis.lint import Selection, lint
+from hsdsl.analysis.lint import lint, selected
 from hsdsl.base.errors import ModelError, UsageError
 
 LEVELS = ("0", "1", "-1", "1/2")
 NAMES = ("x", "y", "z")
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "exp", "tanh", "sqrt", "floor")}
 FUNCTIONS |= {"abs": abs, "min": min, "max": max, "sign": lambda v: (v > 0) - (v < 0), "__builtins__": {}}
-SELECTED = Selection.of(["mathematics", "HS406", "HS427", "HS428"])
+SELECTED = selected(["mathematics", "HS406", "HS427", "HS428"])
 
 
 @dataclass

@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from hsdsl.base.functions import FUNCTIONS
 from hsdsl.mathematics.decisions.decide import Decider
-from hsdsl.mathematics.decisions.normal_form import NormalForms, expression
-from hsdsl.mathematics.decisions.question import SearchRange, at_most_zero, negative, positive, zero
-from hsdsl.mathematics.decisions.straight_line_program import StraightLine
+from hsdsl.mathematics.decisions.polynomial import NormalForms, expression
+from hsdsl.mathematics.decisions.search import SearchRange, StraightLine, at_most_zero, negative, positive, zero
 
 x, y, v, t = sp.symbols("x y v t", real=True)
 pi = sp.pi

@@ -8,7 +8,7 @@ import pytest
 from fuzz import generators
 from lint.grid import grid
 
-from hsdsl.analysis.lint import UNDECIDED, Selection, lint
+from hsdsl.analysis.lint import UNDECIDED, lint, selected
 from hsdsl.analysis.lint.fix import fix
 from hsdsl.base.errors import ModelError
 
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 MODELS = [p for p in sorted(ROOT.glob("tests/conformance/cases/*.yaml")) if not p.name.endswith(".expect.yaml")]
 MODELS += [*sorted(ROOT.glob("models/*.yaml")), *sorted(ROOT.glob("tests/convergence/scenes/*.yaml"))]
 RANDOM = 120
-STRUCTURE = Selection.of(["names", "shape", "scene", "experiment"])
+STRUCTURE = selected(["names", "shape", "experiment"])
 
 
 def test_every_rule_is_decided_for_every_model_of_the_tests_and_places_are_in_the_file():

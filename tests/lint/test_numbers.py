@@ -6,7 +6,7 @@ import mpmath
 import pytest
 import sympy as sp
 
-from hsdsl.analysis.lint.numbers import BEYOND, INSIDE, ON, evaluate, holds, leaves, rational, sample_at, side
+from hsdsl.analysis.lint.subject import BEYOND, INSIDE, ON, evaluate, holds, leaves, rational, sample_at, side
 from hsdsl.language.expression import parse, symbolic
 from hsdsl.language.expression.scope import Scope, Value, symbol
 from hsdsl.language.system import TIME, Mode, SampledInput, Surface

@@ -18,7 +18,7 @@ import pytest
 import yaml
 from lint.fragments import completed, examples
 
-from hsdsl.analysis.lint import RULES, Selection, lint
+from hsdsl.analysis.lint import RULES, lint, selected
 from hsdsl.analysis.lint.fix import fix
 from hsdsl.analysis.lint.pages import rule_pages
 from hsdsl.analysis.lint.rules import FAMILIES, family
@@ -40,7 +40,7 @@ def code_of(name: str) -> str:
 
 def found(code: str, model: str):
     """What one rule finds; comments that ignore it count, as they do for users."""
-    selection = Selection.of() if code.startswith("HS49") else Selection.of([code])
+    selection = selected() if code.startswith("HS49") else selected([code])
     return [f for f in lint("model.yaml", selection, text=completed(model).encode()).findings if f.code == code]
 
 
@@ -94,7 +94,7 @@ def test_bad_models(name, number):
 def test_fixes(name, number, tmp_path):
     case, path = CASES[name]["bad"][number], tmp_path / "model.yaml"
     path.write_text(completed(case["model"]))
-    report, remedied = fix(path, Selection.of([code_of(name)]))
+    report, remedied = fix(path, selected([code_of(name)]))
     assert path.read_text() == completed(case["fixed"])
     assert remedied and not report.findings
 
@@ -122,7 +122,7 @@ def test_a_rule_that_gives_up_says_so_and_the_others_go_on(monkeypatch, raised, 
 
     monkeypatch.setitem(RULES, "HS421", replace(RULES["HS421"], check=fails))
     model = "parameters: {p: 1}\nmodes: {m: {flow: {x: 1}}}\n"
-    found = lint("model.yaml", Selection.of(["HS401", "HS421"]), text=completed(model).encode()).findings
+    found = lint("model.yaml", selected(["HS401", "HS421"]), text=completed(model).encode()).findings
     assert [f.code for f in found] == ["HS492", "HS401"] and says in found[0].message
 
 

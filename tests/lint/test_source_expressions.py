@@ -5,11 +5,12 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from hsdsl.analysis.lint.source_expressions import Role, written
-from hsdsl.analysis.lint.units.model import Units
+from hsdsl.analysis.lint.units import Units
 from hsdsl.base.errors import Findings
-from hsdsl.language import schema
+from hsdsl.language.schema import documents as schema
 from hsdsl.language.schema import fields
 from hsdsl.language.schema.fields import Document
+from hsdsl.language.schema.read import read
 from hsdsl.language.source import ABSENT, Scalar, compose, decode
 
 OF_EXPRESSIONS = (
@@ -77,7 +78,7 @@ def documents():
     for samples in ("xm + xs", "[xm + xs, xm - xs]", "{every: xm + xs}"):
         findings = Findings("whole.yaml")
         text = decode("whole.yaml", WHOLE.replace("SAMPLES", samples).encode())
-        yield schema.read(compose(text, findings), findings)
+        yield read(compose(text, findings), findings)
         assert not findings.diagnostics
 
 

@@ -5,7 +5,7 @@ from fractions import Fraction
 import pint
 import pytest
 
-from hsdsl.analysis.lint.units.unit import Unit, UnknownUnit, read
+from hsdsl.analysis.lint.units import Unit, UnknownUnit, read
 
 TEXTS = ["m", "kg*m/s**2", "km/h", "1/min", "N*mm**-1", "m**(1/2)", "rad/s", "degree", "W/(m**2*K)", "2*m", "µs", "rpm"]
 

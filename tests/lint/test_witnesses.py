@@ -6,7 +6,7 @@ from functools import cache
 import pytest
 
 import hsdsl
-from hsdsl.analysis.lint import Selection, lint
+from hsdsl.analysis.lint import lint, selected
 
 BEYOND = """hsdsl: 1
 modes:
@@ -50,7 +50,7 @@ def found(tmp_path):
     def look(text, code):
         path = tmp_path / "model.yaml"
         path.write_text(text)
-        (finding,) = [f for f in lint(path, Selection.of([code])).findings if f.code == code]
+        (finding,) = [f for f in lint(path, selected([code])).findings if f.code == code]
         point = {name: float(number) for name, number in re.findall(r"(\w+) = (-?[\d.]+(?:e-?\d+)?)", finding.message)}
         return hsdsl.load(path), point, finding
 

@@ -12,9 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hsdsl.analysis.metrics.curves import rho
-from hsdsl.analysis.metrics.labelled_sup import rho_hat, sup_norm
-from hsdsl.analysis.metrics.skorokhod import skorokhod
-from hsdsl.analysis.metrics.tau_epsilon import tau_epsilon
+from hsdsl.analysis.metrics.labelled import rho_hat, skorokhod, sup_norm, tau_epsilon
 
 UNTIL = 2.0
 number = st.floats(-2, 2).map(lambda x: round(x, 3))

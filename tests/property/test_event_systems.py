@@ -13,6 +13,7 @@ import hsdsl
 CLOSE = 1e-6  # of times, which are below 30
 BEFORE_A_TAIL = 1e-3  # impacts of a ball, of which each run resolves its own
 FEW, MANY = range(24), range(24, 324)
+MULTIPLES = 58, 77, 91, 312  # with events as p <= -1.4 and -0.5*p >= 0.7, of different priorities
 
 
 def made(times: list[tuple[Any, str]], end: float) -> list[tuple[float, str]]:
@@ -53,6 +54,11 @@ def check(seed: int) -> str:
     assert right or run.verdict.theorem != "holds", f"seed {seed}: wrong, and its verdict is `holds`"
     assert right, f"seed {seed}: {run.stop.message}"
     return run.verdict.theorem
+
+
+@pytest.mark.parametrize("seed", MULTIPLES)
+def test_events_whose_surfaces_are_multiples_have_one_order(seed):
+    assert check(seed) == "holds"
 
 
 @pytest.mark.parametrize("seed", FEW)

@@ -212,7 +212,7 @@ def test_a_run_that_ends_early_is_worse_than_any_measurement(monkeypatch: pytest
     data = {"t": [0.5, 1.0], "x": [0.9, 0.95]}
     found = hsdsl.loads(ENDING).fit(data, "p", sigma={"x": 1e-5})
     assert found.values["p"] == pytest.approx(1, abs=1e-6)  # the nearest to 0.9*2 at which the run does not end
-    monkeypatch.setattr("hsdsl.analysis.fitting.objective.TOO_FAR", 1e-9)
+    monkeypatch.setattr("hsdsl.analysis.fitting.least_squares.TOO_FAR", 1e-9)
     ended = hsdsl.loads(ENDING).fit(data, "p", sigma={"x": 1e-5})
     assert not ended.success
     assert "before the last measurement" in ended.message

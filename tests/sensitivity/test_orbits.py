@@ -14,7 +14,7 @@ import hsdsl
 from hsdsl import UsageError
 from hsdsl.analysis.orbits.section import Section
 from hsdsl.analysis.plot import style
-from hsdsl.analysis.plot.panel import label
+from hsdsl.analysis.plot.style import label
 from hsdsl.interface.cli.verbs import obey
 
 BELT = "models/gallery/stick-slip.yaml"

@@ -133,7 +133,7 @@ def public_functions():
             yield name, thing
             continue
         shown = vars(thing) if members == "*" else members.split()
-        found = ((key, vars(thing)[key]) for key in shown if not key.startswith("_"))
+        found = ((key, inspect.getattr_static(thing, key)) for key in shown if not key.startswith("_"))
         yield from ((f"{last}.{key}", value) for key, value in found if inspect.isfunction(value))
         if name in MADE:
             yield name, thing

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import hsdsl
+from hsdsl.base.graphs import variation
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.base.sparsity import variation
 from hsdsl.engine.integrators import radau
 from hsdsl.engine.integrators.radau import Steps
 from hsdsl.engine.integrators.stepper import Derivatives
-from hsdsl.mathematics.lower.ordering import ordering
+from hsdsl.mathematics.lower.mode import ordering
 
 STATES, STEP = 5, 0.3
 COLUMNS = ((0, 1, 2, 3, 4), (1, 3, 4), (4,))  # 4 depends on all, 1 and 3 on each other, 0 and 2 on themselves

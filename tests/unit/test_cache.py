@@ -25,8 +25,7 @@ import hsdsl
 from hsdsl.base import cache
 from hsdsl.base.errors import ModelError
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.base.unfinished import is_locked
-from hsdsl.engine.runtime import kernel, library
+from hsdsl.engine.runtime import compiler, kernel, library
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.language.files import ModelFiles
 from hsdsl.mathematics import program_cache
@@ -351,7 +350,7 @@ def test_a_run_of_a_model_seen_before_imports_little(program: str, with_loop) ->
 PYTHON_LOOP = tuple(
     f"hsdsl.engine.simulate.{name}" for name in ("relaxed", "located", "entry", "zeno", "contact", "touching")
 )
-LOOKS = tuple(f"hsdsl.engine.simulate.verdict.{name}" for name in ("looks", "flows", "misses", "landings", "steps"))
+LOOKS = tuple(f"hsdsl.engine.simulate.verdict.{name}" for name in ("flows", "misses", "resets", "steps"))
 OTHERS = (
     "hsdsl.analysis.report.summary",
     "hsdsl.language.elaborate",
@@ -378,7 +377,7 @@ def test_the_runtime_is_compiled_once(monkeypatch: pytest.MonkeyPatch) -> None:
     text = "".join(f'__attribute__((visibility("default"))) void {name}(void) {{}}\n' for name in {*names})
     monkeypatch.setattr(library, "LOOP", (text, "hs_simulate"))  # which takes no seconds to compile
     kernel.runtime.cache_clear()
-    assert library.is_missing(text) and kernel.runtime() is kernel.runtime() and not library.is_missing(text)
+    assert kernel.runtime() is kernel.runtime() and library._kept(library._key(text, compiler.find_compiler()))
     kernel.runtime.cache_clear()
 
 
@@ -394,15 +393,3 @@ def test_processes_that_begin_together_compile_once(tmp_path):
     assert [process.wait() for process in begun] == [0, 0]
     libraries = [line for line in log.read_text().splitlines() if "-shared" in line]
     assert len(libraries) == 2  # the loop and the model
-
-
-@pytest.mark.skipif(fcntl is None, reason="there are no locks of folders")
-def test_who_looks_at_a_lock_is_not_taken_for_its_owner(tmp_path):
-    folder = os.open(tmp_path, os.O_RDONLY)
-    assert not is_locked(tmp_path)
-    fcntl.flock(folder, fcntl.LOCK_SH)  # as one does who looks
-    assert not is_locked(tmp_path)
-    fcntl.flock(folder, fcntl.LOCK_EX)
-    assert is_locked(tmp_path)
-    os.close(folder)
-    assert not is_locked(tmp_path) and not is_locked(Path(__file__) / "compiled")

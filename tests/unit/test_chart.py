@@ -19,10 +19,10 @@ import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.functions import FUNCTIONS
 from hsdsl.interface.chart import PEERS, Refused, Scene, work_precision
-from hsdsl.interface.chart.judge import judge
+from hsdsl.interface.chart.outcome import judge
 from hsdsl.interface.chart.peers import prepare
-from hsdsl.interface.chart.result import Attempt, Result, Tool
 from hsdsl.interface.chart.rows import COLUMNS, as_csv
+from hsdsl.interface.chart.scene import Attempt, Result, Tool
 from hsdsl.interface.chart.stopwatch import Deadline, race
 from hsdsl.interface.chart.translation import as_function, in_floats, translate
 
@@ -321,7 +321,8 @@ def by_casadi(mode, value, points):
 def by_diffrax(mode, value, points):
     import jax.numpy as jnp
 
-    from hsdsl.interface.chart.peers.diffrax_event import FUNCTIONS, jax
+    from hsdsl.export import jax
+    from hsdsl.interface.chart.peers.diffrax_event import FUNCTIONS
 
     jax.config.update("jax_enable_x64", True)
     function = as_function(mode, (value,), FUNCTIONS)

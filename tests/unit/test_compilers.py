@@ -16,7 +16,7 @@ from engines import needs_compiler
 import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits
-from hsdsl.engine.preparation import engines
+from hsdsl.engine.preparation import pipeline
 from hsdsl.engine.runtime import compiler, kernel, library, process
 from hsdsl.interface.cli.verbs import obey
 
@@ -58,7 +58,7 @@ def nothing_known(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
-    engines._warn_once.cache_clear()
+    pipeline._warn_once.cache_clear()
     library._say_unkept.cache_clear()
 
 
@@ -161,7 +161,7 @@ def test_what_takes_too_long_is_tried_once(use, with_loop, capsys, tmp_path: Pat
 
     def runs(seconds: float) -> int:
         """How often the compiler has been tried, after another run."""
-        engines._warn_once.cache_clear()
+        pipeline._warn_once.cache_clear()
         with_loop()
         assert hsdsl.load(MODEL, limits=Limits(compile=seconds)).simulate(until=0.1).engine == "python"
         return len(tried.read_text().split())

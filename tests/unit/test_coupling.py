@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hsdsl.analysis.metrics.polyline import Polyline
-from hsdsl.analysis.metrics.skorokhod import coupling
+from hsdsl.analysis.metrics.labelled import coupling
+from hsdsl.analysis.metrics.trace import Polyline
 
 
 def walk(rng, size, modes, step):

@@ -11,16 +11,13 @@ import numpy as np
 import pytest
 from curve_spaces import Apart, Bent, Line, Plane
 
-from hsdsl.analysis.metrics.bernstein import bernstein, largest_norm, length, restrict
 from hsdsl.analysis.metrics.curves import rho
-from hsdsl.analysis.metrics.labelled_sup import rho_hat, sup_norm
-from hsdsl.analysis.metrics.profile import profiles
-from hsdsl.analysis.metrics.skorokhod import skorokhod
+from hsdsl.analysis.metrics.labelled import profiles, rho_hat, skorokhod, sup_norm, tau_epsilon
 from hsdsl.analysis.metrics.table import CURVE_METRICS, CurvePair, between
-from hsdsl.analysis.metrics.tau_epsilon import tau_epsilon
 from hsdsl.analysis.store import load
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers import decimals
+from hsdsl.base.numbers.bernstein import bernstein, largest_norm, length, restrict
 
 NAN = float("nan")
 

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 import hsdsl
-from hsdsl.analysis.report.remedies import remedies_of
+from hsdsl.analysis.report.words import remedies_of
 
 PAIRS: dict[str, Any] = yaml.safe_load((Path(__file__).parent / "decided_by_the_file.yaml").read_text())
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hsdsl.base.errors import Diagnostic, Span
 from hsdsl.language.diagnose import render
-from hsdsl.language.schema import json_schema
+from hsdsl.language.schema.jsonschema import json_schema
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "editors.md").read_text(encoding="utf-8")

@@ -9,7 +9,7 @@ import sympy as sp
 
 from hsdsl.base.errors import STEP_AND_TOLERANCE, ModelError, UsageError
 from hsdsl.language.elaborate import elaborate, parameter_expression
-from hsdsl.language.elaborate.slicing import only
+from hsdsl.language.elaborate.derived import only
 from hsdsl.language.system import TIME, HybridSystem, KnownState, KnownTransition, Reference
 
 X, V, A = (sp.Symbol(n, real=True) for n in "xva")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hsdsl.analysis.metrics.space.expressions import formula
+from hsdsl.analysis.metrics.space import formula
 from hsdsl.language.expression import parse, symbolic
 from hsdsl.language.expression.scope import Scope, state, symbol
 

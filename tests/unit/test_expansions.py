@@ -1,6 +1,6 @@
-"""Expansions of functions and steps in C (``expansions.c``, ``screen_parts.h``): no value is beyond what they bound.
+"""Expansions of functions and steps in C (``expansions.c``, ``screen_view.h``): no value is beyond what they bound.
 
-Those in Python (``verdict/expansions.py``) are the same.
+Those in Python (``verdict/flows.py``) are the same.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from engines import needs_compiler
 from hsdsl.base.numbers.bernstein import around_middle, from_powers
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.compiler import FLAGS, find_compiler
-from hsdsl.engine.simulate.verdict import expansions
-from hsdsl.engine.simulate.verdict.expanded import EXPANDED
+from hsdsl.engine.simulate.verdict import flows
+from hsdsl.engine.simulate.verdict.flows import EXPANDED
 
 pytestmark = needs_compiler
-ONE = """#include "screen_parts.h"
+ONE = """#include "screen_view.h"
 HS_EXPORT void expand_one(int kind, int other, const hs_expansion *a, const hs_expansion *b, hs_expansion *to) {
   const hs_operation operation = {kind, 0, other};
   *to = expansion_of(&operation, a, b);
@@ -52,7 +52,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "floor": lambda a, _: np.floor(a),
 }  # fmt: skip
 IN_PYTHON: dict[str, Callable[..., Any]] = FUNCTIONS | {
-    "power": lambda a, _: EXPANDED.functions["pow"](a, expansions.line(POWER, 0.0)),
+    "power": lambda a, _: EXPANDED.functions["pow"](a, flows.line(POWER, 0.0)),
     **{name: EXPANDED.functions[name] for name in ("min", "max")},
     **{
         name: lambda a, _, name=name: EXPANDED.functions[name](a)
@@ -111,7 +111,7 @@ def test_both_languages_expand_alike(name: str, compiled: Any) -> None:
         a, b, found = Expansion(*numbers[0]), Expansion(*numbers[1]), Expansion()
         compiled.expand_one(structures.OPERATORS.index(name), POWER, a, b, found)
         with np.errstate(all="ignore"):
-            same = IN_PYTHON[name](*(expansions.Expansion(each[:4, None], *each[4:, None]) for each in numbers))
+            same = IN_PYTHON[name](*(flows.Expansion(each[:4, None], *each[4:, None]) for each in numbers))
         assert [*same.terms.ravel(), same.remainder, same.unresolved, same.error] == pytest.approx(
             [*found], rel=1e-6, abs=1e-12
         )

@@ -8,7 +8,7 @@ import sympy as sp
 from hsdsl.base.functions import absolute, atan2, maximum, minimum
 from hsdsl.language.expression import ExpressionError, parse, symbolic
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state, symbol
-from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import deep_stack
 
 NAMES = ["x", "y", "a", "E", "I", "S", "N", "Q", "beta", "gamma", "lambda", "zeta", "class", "def", "None", "é", "x_1"]
 SCOPE = Scope({**{name: state(name) for name in NAMES}, "t": Value(symbol("t"))})

@@ -18,7 +18,8 @@ from hsdsl.base import limits
 from hsdsl.base.cache import key_of
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.limits import Limits, applied
-from hsdsl.language.files import data, read_bytes
+from hsdsl.language import files as data
+from hsdsl.language.files import read_bytes
 from hsdsl.mathematics import program_cache
 
 posix = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="POSIX files")
@@ -214,7 +215,7 @@ def test_what_has_no_end_or_no_content_is_refused(command, sentence, tmp_path):
 
 @posix
 def test_a_pipe_to_which_nobody_writes_is_left_after_a_while(tmp_path, monkeypatch):
-    monkeypatch.setattr("hsdsl.language.files.model._SILENCE", 0.05)
+    monkeypatch.setattr("hsdsl.language.files._SILENCE", 0.05)
     os.mkfifo(tmp_path / "m.yaml")
     with pytest.raises(UsageError, match="nobody writes to this pipe"):
         hsdsl.load(tmp_path / "m.yaml")

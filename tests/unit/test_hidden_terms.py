@@ -11,7 +11,7 @@ import sympy as sp
 from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
-from hsdsl.mathematics.lower.terms import may_hide
+from hsdsl.mathematics.lower.mode import may_hide
 
 UNIT = 2.0**-53
 X, V, T = sp.symbols("x v t", real=True)

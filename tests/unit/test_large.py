@@ -14,12 +14,12 @@ from engines import needs_compiler
 from scipy.special import jv
 
 import hsdsl
-from hsdsl.base.sparsity import elimination
+from hsdsl.base.graphs import elimination
 from hsdsl.engine.backends.c.routine import LONGEST
 from hsdsl.engine.backends.c.source import model_parts, model_source
 from hsdsl.engine.integrators.linear import sparse_factored, sparse_factored_complex
 from hsdsl.engine.runtime.kernel import SYMBOL
-from hsdsl.mathematics.lower.ordering import ordering
+from hsdsl.mathematics.lower.mode import ordering
 from hsdsl.mathematics.program_cache import _rows
 
 SIZES = 40, 80

@@ -7,10 +7,9 @@ import pytest
 from shipped import MODELS
 
 import hsdsl
-from hsdsl.analysis.metrics.gate_sequence import ConeShape
+from hsdsl.analysis.metrics.gate_sequence import ConeShape, solve
 from hsdsl.analysis.metrics.interval import INFINITE, ZERO
 from hsdsl.analysis.metrics.points import SpacePoint, distance, distances
-from hsdsl.analysis.metrics.socp import solve
 from hsdsl.analysis.metrics.space import make_space
 from hsdsl.base.errors import UsageError
 

@@ -7,12 +7,11 @@ import pytest
 from affine_scenes import UNITS, BruteForce, path_fault, random_point, random_scene, text_of
 
 import hsdsl
-from hsdsl.analysis.metrics import passage_bounds
-from hsdsl.analysis.metrics.budget import Budget
-from hsdsl.analysis.metrics.dominance import followers, hops_of
-from hsdsl.analysis.metrics.interval import EndsCross, Interval, weakest
+from hsdsl.analysis.metrics import search as passage_bounds
+from hsdsl.analysis.metrics.gate_sequence import solve
+from hsdsl.analysis.metrics.interval import Budget, EndsCross, Interval, weakest
 from hsdsl.analysis.metrics.points import SpacePoint, distance, distances
-from hsdsl.analysis.metrics.socp import solve
+from hsdsl.analysis.metrics.search import followers, hops_of
 from hsdsl.analysis.metrics.space import make_space
 from hsdsl.base.errors import UsageError
 

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hsdsl
-from hsdsl.analysis.report.graph_layout import PORT, Box, laid_out
-from hsdsl.analysis.report.mode_graph import mode_graph
+from hsdsl.analysis.report.mode_graph import PORT, Box, laid_out, mode_graph
 
 MODELS = sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.analysis.report.mathml import Mathematics
+from hsdsl.analysis.report.model import Mathematics
 from hsdsl.base.errors import UsageError
 from hsdsl.base.progress import FIRST_SIGN, INTERVAL, counted, in_notebook, ticking
 from hsdsl.engine.execution import Execution

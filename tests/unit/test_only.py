@@ -12,7 +12,7 @@ import pytest
 import hsdsl
 from hsdsl.interface.cli import main
 from hsdsl.language.elaborate import elaborate
-from hsdsl.language.elaborate.slicing import only
+from hsdsl.language.elaborate.derived import only
 
 HEAD = "hsdsl: 1\nmodes: {modes}\n{more}experiment: {{until: 3, tolerance: 1e-7, method: dopri5, scheme: relaxed}}\n"
 BALL = "{up: {flow: {h: v, v: -9.8%s}, transitions: [{when: h <= 0, to: up, reset: {v: -0.8*v%s}}]%s}}"

@@ -11,8 +11,8 @@ import pytest
 from engines import ENGINES, needs_compiler
 
 import hsdsl
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
-from hsdsl.language.elaborate.product import flat_part
+from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.language.elaborate.derived import flat_part
 
 MODELS = Path(__file__).parents[2] / "models" / "parts"
 WAYS = [
@@ -539,7 +539,7 @@ def test_a_fit_finds_a_parameter_of_a_part():
 
 def test_transitions_of_one_name_are_told_apart():
     prepared = hsdsl.loads(SWITCHED).pipeline.prepare({"until": 1})
-    crossed = list(RecordedRun(prepared, prepared.simulate()).crossed.values())
+    crossed = list(RunView(prepared, prepared.simulate()).crossed.values())
     assert len(crossed) > 4 and crossed == [k % 2 for k in range(len(crossed))]
 
 

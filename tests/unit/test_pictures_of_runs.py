@@ -16,12 +16,11 @@ from matplotlib import colors
 from matplotlib.figure import Figure
 
 import hsdsl
-from hsdsl.analysis.plot import View, orbit, plot
-from hsdsl.analysis.plot.animation import FPS, MOST, frame_times
+from hsdsl.analysis.plot import View, analyses, plot
+from hsdsl.analysis.plot.animation import FPS, MOST, Drawn, frame_times, shapes_at
 from hsdsl.analysis.plot.curves import curves
 from hsdsl.analysis.plot.figure import picture
 from hsdsl.analysis.plot.page import page, thinned
-from hsdsl.analysis.plot.shapes import Drawn, shapes_at
 from hsdsl.analysis.plot.style import fills, looks
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Stop
@@ -326,7 +325,7 @@ def test_an_orbit_is_closed_by_the_jump_of_its_section(states, jump):
     text = "hsdsl: 1\nmodes: {m: {flow: {s: 1, w: 0}, transitions: [{when: s >= 1, to: m, reset: {s: 0}}]}}"
     run = hsdsl.loads(f"{text}\ninitial: {{mode: m, s: 0, w: 0}}\nexperiment: {{until: 1}}\n").simulate()
     axis = Figure().subplots()
-    orbit._draw_run(axis, run, states, 1.0)
+    analyses._draw_run(axis, run, states, 1.0)
     (dotted,) = (line for line in axis.lines if line.get_linestyle() == ":")
     assert np.asarray(dotted.get_xydata()) == pytest.approx(np.array(jump, float), abs=1e-12)
 

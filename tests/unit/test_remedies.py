@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import hsdsl
-from hsdsl.analysis.report.remedies import REMEDIES, remedies_of, table
 from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.report.words import REMEDIES, remedies_of, remedy_table
 
 ROOT = Path(hsdsl.__file__).parent
 CLOSE = """\
@@ -24,7 +24,7 @@ experiment: {until: 3, tolerance: 1e-6}
 
 
 def test_the_documentation_has_the_table() -> None:
-    assert table() in (ROOT.parent / "docs/how-to/unknown.md").read_text()
+    assert remedy_table() in (ROOT.parent / "docs/how-to/unknown.md").read_text()
 
 
 @pytest.mark.parametrize("reason", [reason for each in REMEDIES for reason in each.reasons])

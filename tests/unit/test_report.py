@@ -14,10 +14,8 @@ import pytest
 
 import hsdsl
 from hsdsl.analysis import report
-from hsdsl.analysis.report.alike import condensed
-from hsdsl.analysis.report.html import html
-from hsdsl.analysis.report.summary import summary
-from hsdsl.analysis.report.words import times
+from hsdsl.analysis.report.summary import html, summary
+from hsdsl.analysis.report.words import condensed, times
 from hsdsl.base import parts
 from hsdsl.base.numbers import decimals
 from hsdsl.engine.execution import Verdict

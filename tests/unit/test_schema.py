@@ -10,7 +10,7 @@ import yaml
 import hsdsl
 from hsdsl.base.errors import ModelError
 from hsdsl.language.elaborate import elaborate
-from hsdsl.language.schema import json_schema
+from hsdsl.language.schema.jsonschema import json_schema
 
 ROOT = Path(__file__).parent.parent.parent
 MODELS = [*ROOT.glob("models/*.yaml")]

@@ -16,7 +16,7 @@ from engines import needs_compiler
 import hsdsl
 from hsdsl.engine.simulate import verdict
 from hsdsl.engine.simulate.stops import Diagnostics
-from hsdsl.engine.simulate.verdict import RunView, assess, compiled_verdict, run_view
+from hsdsl.engine.simulate.verdict import RunView, assess, run_view
 from hsdsl.engine.simulate.verdict.screen import Screen, screened
 
 ROOT = Path(__file__).parents[2]
@@ -75,7 +75,7 @@ def both(loaded: Any, method: str, tolerance: float, **parameters: float) -> tup
     """The verdict of a run, and that without a screen."""
     found = run_of(loaded, method, tolerance, **parameters).verdict
     with (
-        patch.object(compiled_verdict, "screens_of", return_value=None),
+        patch.object(verdict, "screens_of", return_value=None),
         patch.object(run_view, "screened", return_value=None),
         patch.object(verdict, "is_compiled", return_value=False),
     ):

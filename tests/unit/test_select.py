@@ -10,7 +10,7 @@ from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
 from hsdsl import ModelError
-from hsdsl.mathematics.completion.printer import text_of
+from hsdsl.language.expression.plain import text_of
 
 RATE = "select(on, 1/(1 - x) + sqrt(1 - x), -y)"
 MODEL = """

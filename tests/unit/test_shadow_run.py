@@ -9,8 +9,7 @@ import pytest
 
 import hsdsl
 from hsdsl.engine.simulate.verdict import RunView
-from hsdsl.engine.simulate.verdict.shadow import order_of, shadow_errors
-from hsdsl.engine.simulate.verdict.shadow_run import ShadowRun
+from hsdsl.engine.simulate.verdict.shadow import ShadowRun, order_of, shadow_errors
 
 DUFFING = ("v", "x - x**3 - 0.3*v + 0.5*cos(1.2*t)", "x >= 1.2", "-0.9*v")
 VAN_DER_POL = ("v", "3*(1 - x**2)*v - x", "x >= 1.5", "-v/2")

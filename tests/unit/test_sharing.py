@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from hsdsl.base.functions import below, maximum
-from hsdsl.mathematics.lower.sharing import shared
+from hsdsl.mathematics.lower.straight import shared
 
 A, B, C, D, X, Y = sp.symbols("a b c d x y", real=True)
 

@@ -174,12 +174,12 @@ def test_a_table_that_was_moved_with_its_sidecar_still_belongs_to_it(tmp_path):
 
 
 def test_a_chart_removes_the_sidecar_of_what_it_writes_over(tmp_path, monkeypatch):
-    from hsdsl.interface.cli import chart
+    from hsdsl.interface.cli import charts
     from hsdsl.interface.cli.options import Answer
 
     RUNS[0].save(tmp_path / "run.csv")
     monkeypatch.setattr("hsdsl.interface.chart.rows.as_csv", lambda rows: "name\n")
-    chart._report([], tmp_path / "run.csv", None, Answer(quiet=True))
+    charts._report([], tmp_path / "run.csv", None, Answer(quiet=True))
     assert [p.name for p in tmp_path.iterdir()] == ["run.csv"]
     with pytest.raises(UsageError, match="No such file"):
         read_sidecar(tmp_path / "run.csv")

@@ -11,7 +11,7 @@ from engines import ENGINES, needs_compiler
 import hsdsl
 from hsdsl import UsageError
 from hsdsl.base.functions import solution
-from hsdsl.mathematics.lower.elimination import solved
+from hsdsl.mathematics.lower.straight import solved
 
 CART = """hsdsl: 1
 parameters: {M: 2, m: 1, l: 1/2, g: 9.81}

@@ -15,13 +15,16 @@ import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.processes import CRASHES, HANGS, Lost, in_processes
 from hsdsl.engine.integrators import INTEGRATORS
-from hsdsl.interface.chart.result import Tool
-from hsdsl.interface.chart.stability import stability_map
-from hsdsl.interface.chart.stability.axes import read_axes
-from hsdsl.interface.chart.stability.cells import Bench
-from hsdsl.interface.chart.stability.limits import eigenvalues, grows_on_the_axis, largest_step, stability_polynomial
+from hsdsl.interface.chart.scene import Tool
+from hsdsl.interface.chart.stability import as_csv, as_plain, as_text, read_axes, stability_map
+from hsdsl.interface.chart.stability.cells import (
+    Bench,
+    eigenvalues,
+    grows_on_the_axis,
+    largest_step,
+    stability_polynomial,
+)
 from hsdsl.interface.chart.stability.picture import plot_stability
-from hsdsl.interface.chart.stability.table import as_csv, as_plain, as_text
 
 GALLERY = Path(__file__).parents[2] / "models" / "gallery"
 DECAY = """hsdsl: 1

@@ -12,9 +12,8 @@ from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
-from hsdsl.language.expression.derivatives import derivative
-from hsdsl.mathematics.lower.routines import written_out
-from hsdsl.mathematics.lower.straight import LARGEST, WIDEST, Cut, Gradient
+from hsdsl.language.expression.algebra import derivative
+from hsdsl.mathematics.lower.straight import LARGEST, WIDEST, Cut, Gradient, written_out
 
 MANY = multiprecision(60)
 X, Y = sp.symbols("x y", real=True)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.analysis.sweep import load, picture, recording, variation
+from hsdsl.analysis.sweep import Recording, dataset, load, variation
 from hsdsl.analysis.sweep.dataset import damaged
 from hsdsl.base.errors import UsageError
 
@@ -114,7 +114,7 @@ def test_what_cannot_vary_is_refused(texts, random, sentence):
 @pytest.mark.parametrize("text", ["finals", "outputs", "outputs:every", "outputs:count=1", "final:every=1", ""])
 def test_what_cannot_be_recorded_is_refused(text):
     with pytest.raises(UsageError, match="--record"):
-        recording.read(text)
+        Recording.read(text)
 
 
 def test_rows_are_single_runs(model, tmp_path):
@@ -267,7 +267,7 @@ def test_what_cannot_be_run_is_refused_before_a_folder_is_made(model, tmp_path, 
 
 
 def test_a_process_that_dies_loses_nothing(model, tmp_path, monkeypatch):
-    from hsdsl.interface.model.chunk_work import ChunkWork
+    from hsdsl.interface.model.sweeps import ChunkWork
 
     made, fuse = ChunkWork.__call__, tmp_path / "fuse"
     fuse.touch()
@@ -284,7 +284,7 @@ def test_a_process_that_dies_loses_nothing(model, tmp_path, monkeypatch):
 
 
 def test_a_chunk_that_ends_every_process_ends_the_sweep(model, tmp_path, monkeypatch):
-    from hsdsl.interface.model.chunk_work import ChunkWork
+    from hsdsl.interface.model.sweeps import ChunkWork
 
     made = ChunkWork.__call__
     monkeypatch.setattr(ChunkWork, "__call__", lambda self, k: os._exit(1) if k == 3 else made(self, k))
@@ -316,7 +316,7 @@ def test_pictures(model, tmp_path, vary, of, kind):
 def test_samples_are_drawn_over_time(model, tmp_path, vary):
     random = 4 if "~" in vary[0] else None
     found = model.sweep(vary, tmp_path / "s", record="final,outputs:count=7", random=random, processes=1)
-    curves = picture._curves(found, "sample.x")
+    curves = dataset._curves(found, "sample.x")
     assert len(curves) == found.rows
     for k, (times, values) in enumerate(curves):
         assert times[0] == 0 and len(times) == len(values)
@@ -331,7 +331,7 @@ def test_samples_are_drawn_over_time(model, tmp_path, vary):
 
 
 def test_where_no_column_is_named_the_most_telling_one_is_drawn(model, tmp_path):
-    telling = picture.telling
+    telling = dataset.telling
     one = {"c": [0.7, 0.8]}
     assert telling(model.sweep(one, tmp_path / "a", processes=1, record="transitions")) == "before.v"  # x stays
     assert telling(model.sweep(one, tmp_path / "b", processes=1)) == "transitions"

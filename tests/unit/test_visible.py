@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 from hsdsl.analysis import plot, store
-from hsdsl.analysis.report.html import html
-from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.report.summary import html, summary
 from hsdsl.base.errors import Diagnostic, Span
 from hsdsl.base.names import shown, visible, visible_lines
 from hsdsl.engine.execution import Stop, Transition, Verdict

@@ -14,8 +14,7 @@ from lint.fragments import blocks
 import hsdsl
 from hsdsl.analysis.lint.pages import warning_pages
 from hsdsl.analysis.report import as_json, dumps
-from hsdsl.analysis.report.html import html
-from hsdsl.analysis.report.summary import summary
+from hsdsl.analysis.report.summary import html, summary
 from hsdsl.analysis.report.words import MOST_WORDS, conclusion
 from hsdsl.analysis.store import load
 from hsdsl.base.errors import WARNINGS

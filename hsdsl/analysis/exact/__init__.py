@@ -1,11 +1,7 @@
 """Exact executions: references that owe nothing to the simulator, and refined runs for other models.
 
-==================  ===========================================================================================
-`references`        the stored execution that solves a model
-`residual`          whether an execution solves a model as it is written
-`interpolation`     a stretch of a formula as polynomial pieces with a bound on their error
-`refined`           any other model: runs in many digits, refined until they agree
-==================  ===========================================================================================
+`references` finds the stored execution that solves a model as it is written; `refined` is for any other model: runs in
+many digits, refined until they agree. Stored ones are made by ``models/references``, with a bound on their error.
 """
 
 from hsdsl.analysis.exact.references import reference, start_of

@@ -9,10 +9,9 @@ errors of lowering stay hidden: those need an independent solution.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import floor, inf, log10
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -29,14 +28,7 @@ SOURCE = (
 )
 
 
-class Simulated(Protocol):
-    """The part of a model that runs it."""
-
-    @property
-    def simulate(self) -> Callable[..., Execution]: ...
-
-
-def precise(model: Simulated, digits: int = 10, **options: Any) -> Execution:
+def precise(model: Any, digits: int = 10, **options: Any) -> Execution:
     """Run a model until halving its steps changes nothing in so many decimal digits.
 
     Parameters
@@ -72,7 +64,7 @@ def precise(model: Simulated, digits: int = 10, **options: Any) -> Execution:
     raise UsageError(f"halved steps still change {error:.1e}: the run is not known to {digits} digits")
 
 
-def _run(model: Simulated, exponent: int, finer: str, options: dict[str, Any]) -> Execution:
+def _run(model: Any, exponent: int, finer: str, options: dict[str, Any]) -> Execution:
     sizes = {"tolerance": f"1e-{exponent}{finer}", "relaxation": f"1e-{exponent + 3}{finer}"}
     run = model.simulate(scheme="relaxed", method="auto", **sizes, **options)
     if not run.stop.complete or (run.transitions and run.transitions[-1].resumed is None):

@@ -1,4 +1,4 @@
 """Parameters from measurements: least squares over executions, with their exact derivatives.
 
-`data` reads measurements, `least_squares` fits, `fit` is what was found.
+`least_squares` fits measurements; these, and what was found, are in `fit`.
 """

@@ -1,23 +1,24 @@
-"""Least squares over executions by SciPy's trust region method, with the derivatives of the executions."""
+"""Least squares over executions by SciPy's trust region method, with the derivatives of the executions.
+
+No derivative shows that a measurement agrees better with the other side of the transition next to it: such a transition
+is moved over it, and the fit goes on from there.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
-from hsdsl.analysis.fitting.data import Measurements
-from hsdsl.analysis.fitting.fit import Fit
-from hsdsl.analysis.fitting.objective import Objective
-from hsdsl.analysis.fitting.wrong_sides import MOST_SIDES, UNKNOWN, steps_across, wrong_sides
+from hsdsl.analysis.fitting.fit import Fit, Measurements
 from hsdsl.analysis.sensitivity.result import SampleSlopes, Sensitivity
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
 from hsdsl.base.numbers.arithmetic import TIE
-from hsdsl.engine.execution import Array
+from hsdsl.engine.execution import Array, Execution
 from hsdsl.engine.simulate.stops import show
 
 SHARES = (0.25, 0.5)  # of the time: fits of the beginning of the measurements, from which the whole is tried as well
@@ -200,3 +201,146 @@ def _close_transitions(found: Sensitivity, measured: Measurements, covariance: A
             )
     more = [f"and {len(close) - MOST_NAMED} more transitions so"] if len(close) > MOST_NAMED else []
     return [*close[:MOST_NAMED], *more]
+
+
+Evaluate = Callable[[Mapping[str, float], float], Sensitivity]
+Progress = Callable[[int, Mapping[str, float], float], None]
+TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends before a measurement
+
+
+@dataclass
+class Objective:
+    """Weighted residuals of runs and their derivatives; the last run is kept.
+
+    ``start`` has the values of the names by which runs are changed, ``weights`` a factor for each column.
+    """
+
+    evaluate: Evaluate
+    measured: Measurements
+    weights: Mapping[str, float]
+    start: Mapping[str, float]
+    progress: Progress | None = None
+    evaluations: int = 0
+    bumps: list[str] = field(default_factory=list[str])
+    _last: tuple[bytes, Array, Array, Sensitivity] | None = None
+
+    def residuals(self, x: Array) -> Array:
+        """The residuals of a run with these values, weighted, one behind the other."""
+        return self._at(x)[1]
+
+    def slopes(self, x: Array) -> Array:
+        """Their derivatives, (number of residuals, number of values)."""
+        return self._at(x)[2]
+
+    def run(self, x: Array) -> Sensitivity:
+        """The run."""
+        return self._at(x)[3]
+
+    def _at(self, x: Array) -> tuple[bytes, Array, Array, Sensitivity]:
+        key = np.asarray(x, float).tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = (key, *self._computed(x))
+            self.evaluations += 1
+            if self.progress is not None:
+                self.progress(self.evaluations, self.named(x), float(np.sum(self._last[1] ** 2)))
+        return self._last
+
+    def size(self, name: str) -> float:
+        """The largest size of a column, weighted."""
+        column = self.measured.columns[name]
+        with np.errstate(over="ignore"):
+            return float(self.weights[name] * np.max(np.abs(column[np.isfinite(column)]), initial=0.0))
+
+    def named(self, x: Array) -> dict[str, float]:
+        """Values by name."""
+        return dict(zip(self.start, np.asarray(x, float).tolist(), strict=True))
+
+    def _computed(self, x: Array) -> tuple[Array, Array, Sensitivity]:
+        times = self.measured.times
+        found = self.evaluate(self.named(x), float(times.max()))
+        if found.breaks:
+            self.bumps += [reason for _, reason in found.breaks if reason not in self.bumps]
+        reached = times <= float(found.execution.times[-1])
+        table = found.as_made().sample(times[reached]) if reached.any() else None
+        residuals: list[Array] = []
+        slopes: list[Array] = []
+        for name, column in self.measured.columns.items():
+            weight, known = self.weights[name], np.isfinite(column)
+            far = TOO_FAR * (self.size(name) or 1.0)
+            off, moves = np.full(len(times), far), np.zeros((len(times), len(self.start)))
+            if table is not None and name in table.values:
+                there = np.asarray(table.values[name], float)
+                off[reached] = np.where(np.isfinite(there), weight * (there - column[reached]), far)
+                moves[reached] = np.nan_to_num(weight * np.asarray(table.slopes[name], float), posinf=0, neginf=0)
+            residuals.append(off[known])
+            slopes.append(moves[known])
+        return np.concatenate(residuals), np.concatenate(slopes), found
+
+
+MOST_SIDES = 3  # that are tried, and named
+UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
+JUMP = 1e-8  # of the size of a column: less is no jump
+LONGER = 1.25  # of the time of measurements
+FURTHER, NARROW = 1.1, 1e-6  # so many times as far, and by this share of the time, transitions are moved over them
+
+
+class WrongSide(NamedTuple):
+    """A measurement that agrees better with the other side of the transition next to it.
+
+    ``gain`` is what the sum of squares would lose there, ``late`` how much later than the transition it is, and
+    ``slope`` has the derivatives of the transition's time.
+    """
+
+    gain: float
+    late: float
+    slope: Array
+    sentence: str
+
+
+def wrong_sides(objective: Objective, x: Array) -> list[WrongSide]:
+    """Those of a run with these values, the largest gains first: no derivative shows them.
+
+    The run goes on for a while, since its next transition may be one that was measured.
+    """
+    measured, there = objective.measured, list[WrongSide]()
+    found = objective.evaluate(objective.named(x), LONGER * float(measured.times.max()))
+    end = float(found.execution.times[-1])
+    for made, moves in zip(found.execution.transitions, found.as_made().transitions, strict=True):
+        slope, time = np.array([moves.time[by] for by in found.wrt], float), float(made.time)
+        near = TIE * max(time, end)
+        if not np.isfinite(slope).all() or not np.any(slope) or not near < time < end - near:
+            continue
+        later = measured.times > time
+        for rows in (np.flatnonzero(~later)[-1:], np.flatnonzero(later & (measured.times <= end))[:1]):
+            for at in measured.times[rows].tolist():
+                gain = _gain(objective, found.execution, at, [time - near, time + near][:: -1 if at > time else 1])
+                if gain > 0:
+                    sentence = f"the measurement at t = {show(at)} agrees better with the other side of {made.edge} at "
+                    there.append(WrongSide(gain, at - time, slope, f"{sentence}t = {show(time)}"))
+    return sorted(there, key=lambda each: -each.gain)
+
+
+def _gain(objective: Objective, run: Execution, at: float, sides: Sequence[float]) -> float:
+    """What squares at a time lose where the run is on the other side of a transition, from the first of two times."""
+    own, table, gain = run.sample([at]), run.sample(sorted(sides)), 0.0
+    order = np.argsort(np.argsort(sides))
+    for name, column in objective.measured.columns.items():
+        jump = float(np.diff(np.asarray(table[name], float)[order])[0])
+        if not abs(jump) > JUMP * objective.size(name) / objective.weights[name]:
+            continue
+        for y in column[objective.measured.times == at].tolist():
+            off = float(own[name][0]) - y
+            change = off**2 - (off + jump) ** 2
+            gain += objective.weights[name] ** 2 * change if np.isfinite(change) else 0.0  # was not measured
+    return gain
+
+
+def steps_across(objective: Objective, x: Array, sizes: Array) -> Iterator[Array]:
+    """Steps by which a transition passes a measurement on its wrong side, those that change the others least."""
+    end, slopes = float(objective.measured.times.max()), objective.slopes(x) * sizes
+    shape = np.linalg.pinv(slopes.T @ slopes, rcond=UNKNOWN)
+    for each in wrong_sides(objective, x)[:MOST_SIDES]:
+        way = shape @ (each.slope * sizes)
+        rate = float(each.slope * sizes @ way)
+        if rate > 0:
+            yield sizes * way * (FURTHER * each.late + np.copysign(NARROW * end, each.late)) / rate

@@ -12,31 +12,28 @@ from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import NamedTuple
 
-from hsdsl.analysis.lint.automata import OF_UNITS, automata_of
 from hsdsl.analysis.lint.finding import Finding
-from hsdsl.analysis.lint.ignores import Ignored, sift
-from hsdsl.analysis.lint.parts import findings_of_parts
+from hsdsl.analysis.lint.parts import OF_UNITS, automata_of, findings_of_parts
 from hsdsl.analysis.lint.rules import RULES
-from hsdsl.analysis.lint.selection import Selection, configured
+from hsdsl.analysis.lint.selection import Ignored, configured, selected, sift
 from hsdsl.analysis.lint.subject import Subject
 from hsdsl.base import limits
 from hsdsl.base.errors import Diagnostic
 from hsdsl.language.elaborate import elaborate_files
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
 from hsdsl.language.files import ModelFiles
 from hsdsl.language.system import HybridSystem
 
 UNDECIDED = "HS492"
 _LEAST_SECONDS = 0.01  # for a rule, also where the others have used up the time of all
 
-__all__ = ["RULES", "Finding", "Ignored", "Report", "Selection", "Subject", "configured", "lint"]
+__all__ = ["RULES", "Finding", "Ignored", "Report", "Subject", "configured", "lint", "selected"]
 
 
-@dataclass(frozen=True)
-class Report:
+class Report(NamedTuple):
     """What was found in one model, in source order, and what its comments ask to ignore."""
 
     system: HybridSystem
@@ -44,15 +41,15 @@ class Report:
     ignored: tuple[Ignored, ...]
 
 
-def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, text: bytes | None = None) -> Report:
+def lint(path: str | os.PathLike[str], selection: Sequence[str] | None = None, *, text: bytes | None = None) -> Report:
     """Let rules look at a model.
 
     Parameters
     ----------
     path : path
         The model file.
-    selection : Selection, optional
-        The rules to use; all unless given.
+    selection : codes, optional
+        Those of the rules to use, see `selected`; all unless given.
     text : bytes, optional
         The file's content, where it is not to be read from ``path``.
 
@@ -60,7 +57,7 @@ def lint(path: str | os.PathLike[str], selection: Selection | None = None, *, te
     Raises UsageError: the file cannot be read.
     """
     subject = Subject(elaborate_files(ModelFiles.read(path, text=text)))
-    codes = (selection or Selection.of()).codes
+    codes = selected() if selection is None else selection
     seconds = limits.current().seconds
     end = time.process_time() + seconds / 2
     found: list[Diagnostic] = []

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from hsdsl.analysis.lint import Report, Selection, lint
+from hsdsl.analysis.lint import Report, lint
 from hsdsl.base.atomic import replacing
 from hsdsl.base.errors import Edit, ModelError, UsageError
 from hsdsl.language.files import is_piped, read_bytes
@@ -17,7 +17,7 @@ _MOST_ROUNDS = 100
 _MARK = b"\xef\xbb\xbf"
 
 
-def fix(path: str | os.PathLike[str], selection: Selection | None = None) -> tuple[Report, int]:
+def fix(path: str | os.PathLike[str], selection: Sequence[str] | None = None) -> tuple[Report, int]:
     """Remedy what rules know to remedy, and look again.
 
     A new file replaces the old one, once, and only if something has changed. Edits after which the model would
@@ -68,7 +68,7 @@ def _apart(batches: Iterable[tuple[Edit, ...]]) -> list[tuple[Edit, ...]]:
 
 def _attempt(
     path: str | os.PathLike[str],
-    selection: Selection | None,
+    selection: Sequence[str] | None,
     data: bytes,
     batches: list[tuple[Edit, ...]],
     before: HybridSystem,
@@ -88,7 +88,7 @@ def _attempt(
 
 
 def _meaning(system: HybridSystem) -> tuple[Any, ...]:
-    """What no fix may change. Walls that guards repeat, priorities without a rival and defaults may go."""
+    """What no fix may change."""
     edges = [[(e.name, e.target, e.surface.residual, e.condition, e.reset) for e in m.edges] for m in system.modes]
     modes = [(m.name, m.states, m.flow, m.final, m.outputs, m.scene) for m in system.modes]
     parameters = [(p.name, p.value, p.minimum, p.maximum) for p in system.parameters]

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from hsdsl.analysis.metrics.formulas import Formula
-from hsdsl.analysis.metrics.geometry import TOLERANCE, Passage, Space
-from hsdsl.analysis.metrics.line import interval_of
-from hsdsl.analysis.metrics.rounding import UNIT, norm
+from hsdsl.analysis.metrics.gate_sequence import interval_of, norm
+from hsdsl.analysis.metrics.geometry import TOLERANCE, Formula, Passage, Space
+from hsdsl.base.numbers.bernstein import UNIT
 from hsdsl.base.numbers.enclosures import Array
 
 HALVINGS = 12

@@ -16,19 +16,23 @@ grazing      a transition of the orbit begins or ends, or its rate becomes zero;
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
-from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, multipliers_of
-from hsdsl.analysis.orbits.section import NoReturn, Return
-from hsdsl.analysis.orbits.shooting import CLOSED, Closed, gap
+from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, Orbit, multipliers_of
+from hsdsl.analysis.orbits.section import CLOSED, Closed, NoReturn, Return, gap
+from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.words import number
+from hsdsl.base.names import called, checks_methods
 from hsdsl.engine.execution import Array
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.engine.simulate.verdict.run_view import RunView
 
 Passage = Callable[[Array, float, float], tuple[Return, float | None, float]]
 MOST_POINTS, MOST_CORRECTIONS = 400, 8
@@ -39,8 +43,7 @@ NODES = 8  # of a step, where it is interpolated
 CIRCLE = "the branch is closed"
 
 
-@dataclass(frozen=True)
-class Solution:
+class Solution(NamedTuple):
     """An orbit of the branch: its unknowns, the last passage, and the tangent of the branch."""
 
     unknowns: Array
@@ -214,7 +217,7 @@ def branch(follower: Follower, way: float) -> tuple[list[Point], list[Bifurcatio
             ahead, same, last, why = None, False, False, str(problem)
         else:
             why = "the orbit makes other transitions from there on"
-        if ahead is None or not same or _turns(here, ahead):
+        if ahead is None or not same or float(here.tangent @ ahead.tangent) < 0.9:  # something may be missed
             length = min(length, reach) / 2
             if length >= LEAST:
                 continue
@@ -242,20 +245,16 @@ def sequence(here: Solution) -> list[str]:
     return [made.edge for made in here.passage.execution.transitions[: here.passage.index + 1]]
 
 
-def _turns(here: Solution, ahead: Solution) -> bool:
-    """Whether the branch turns so much in a step that something may be missed."""
-    return float(here.tangent @ ahead.tangent) < 0.9
-
-
 def _between(follower: Follower, here: Solution, ahead: Solution, length: float) -> list[Bifurcation]:
     """The bifurcations between two solutions, located along the step."""
     before, after, found = follower.tests(here), follower.tests(ahead), list[Bifurcation]()
     for kind in before:
         if before[kind] * after[kind] >= 0:
             continue
-        if kind == "branch point" and _families(follower, here, ahead):
-            continue
-        if kind == "torus" and len(_pairs(follower, here)) != len(_pairs(follower, ahead)):
+        multipliers: list[Any] = [follower.multipliers(each) for each in (here, ahead)]
+        if kind == "branch point" and any(np.any(np.abs(each - 1) < LEAST_MARGIN) for each in multipliers):
+            continue  # a multiplier is 1 but for its error, as on families of orbits
+        if kind == "torus" and len({int(np.sum(each.imag > 0)) for each in multipliers}) > 1:
             continue  # a pair became real on the way
 
         def value(s: float, kind: str = kind) -> float:
@@ -284,15 +283,6 @@ def _interpolated(follower: Follower, here: Solution, length: float, kind: str) 
     return np.array([each(zero) for each in unknowns])
 
 
-def _families(follower: Follower, *solutions: Solution) -> bool:
-    """Whether a multiplier is 1 but for its error, as on families of orbits."""
-    return any(np.any(np.abs(follower.multipliers(each) - 1) < LEAST_MARGIN) for each in solutions)
-
-
-def _pairs(follower: Follower, here: Solution) -> list[complex]:
-    return [m for m in follower.multipliers(here).tolist() if m.imag > 0]
-
-
 def _grazing(previous: Solution, here: Solution) -> Bifurcation:
     """Where the branch stops being smooth: where a rate becomes zero, or as near as it was followed."""
     before, last = _rates(previous), _rates(here)
@@ -308,6 +298,132 @@ def _grazing(previous: Solution, here: Solution) -> Bifurcation:
 def _rates(here: Solution) -> list[float]:
     """The rates at which the transitions of a period cross their guards."""
     found = here.passage.sensitivity
-    run = RecordedRun(found.setting.augmented, found.execution)
+    run = RunView(found.setting.augmented, found.execution)
     made = run.transitions[: len(sequence(here))]
     return [float(place.rate(k)) for place, k in map(run.before, made)]
+
+
+@checks_methods
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Periodic orbits over a parameter.
+
+    Attributes
+    ----------
+    section, parameter : str
+    states : tuple of str
+        The names of the states of points, which are those right after the section's transition.
+    points : tuple of Point
+        The points in the order of the branch: ``parameter``, ``state``, ``phase``, ``period``, ``multipliers``,
+        ``unstable``.
+    bifurcations : tuple of Bifurcation
+        ``kind`` (fold, branch point, flip, torus or grazing), ``parameter``, ``state``.
+    stable : list of (float, float)
+        The parameter ranges of the stable pieces, in the order of the branch.
+    ends : tuple of str
+        The reasons of both ends of the branch.
+    first : Orbit
+        The orbit at which the branch was started.
+    """
+
+    section: str
+    parameter: str
+    states: tuple[str, ...]
+    points: tuple[Point, ...]
+    bifurcations: tuple[Bifurcation, ...]
+    ends: tuple[str, ...]
+    first: Orbit = field(repr=False)
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object of `orbit --continue --json`."""
+        points = [
+            {
+                "parameter": p.parameter,
+                "state": dict(zip(self.states, p.state.tolist(), strict=True)),
+                "period": p.period,
+                "multipliers": [{"real": m.real, "imaginary": m.imag} for m in map(complex, p.multipliers)],
+                "unstable": p.unstable,
+            }
+            for p in self.points
+        ]
+        found = [
+            {"kind": b.kind, "parameter": b.parameter, "state": dict(zip(self.states, b.state.tolist(), strict=True))}
+            for b in self.bifurcations
+        ]
+        return plain(
+            {
+                "section": self.section,
+                "parameter": self.parameter,
+                "points": points,
+                "bifurcations": found,
+                "stable": self.stable,
+                "ends": self.ends,
+            }
+        )
+
+    @property
+    def knots(self) -> list[tuple[float, Array, bool | None]]:
+        """The points and, between them, the bifurcations: the parameter, the state, and whether the orbit is stable.
+
+        A bifurcation ends a stable piece on one side, so it is neither stable nor unstable.
+        """
+        found: list[tuple[float, Array, bool | None]] = []
+        for b in self.bifurcations:
+            if b.after < 0:
+                found.append((b.parameter, b.state, None))
+        for k, p in enumerate(self.points):
+            found.append((p.parameter, p.state, p.unstable == 0))
+            found += [(b.parameter, b.state, None) for b in self.bifurcations if b.after == k]
+        return found
+
+    @property
+    def stable(self) -> list[tuple[float, float]]:
+        """The parameter ranges of the stable pieces, in the order of the branch."""
+        found: list[tuple[float, float]] = []
+        knots = self.knots
+        for stable, part in groupby(range(len(knots)), key=lambda k: knots[k][2]):
+            if stable:
+                piece = list(part)
+                ends = range(max(piece[0] - 1, 0), min(piece[-1] + 2, len(knots)))
+                values = [knots[k][0] for k in ends if knots[k][2] is not False]
+                found.append((min(values), max(values)))
+        return found
+
+    @property
+    def summary(self) -> str:
+        """The branch as lines of text."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        run = self.first.execution
+        yield f"{called(run.title, run.model)}: {len(self.points)} orbits through {self.section} over {self.parameter}"
+        for way, why in zip((self.points[0], self.points[-1]), self.ends, strict=True):
+            yield f"  to {self.parameter} = {number(way.parameter, 10)}: {why}"
+        for found in self.bifurcations:
+            yield f"  {found.kind} at {self.parameter} = {number(found.parameter, 12)}"
+        for low, high in self.stable:
+            yield f"  stable from {self.parameter} = {number(low, 10)} to {number(high, 10)}"
+
+    def plot(self, path: str | os.PathLike[str]) -> None:
+        """Draw the state that varies most over the parameter, with its bifurcations, to a .png or .svg file."""
+        from hsdsl.analysis.plot.analyses import plot_branch
+        from hsdsl.analysis.plot.style import label
+        from hsdsl.engine.simulate.verdict.run_view import RunView
+
+        states = np.array([p.state for p in self.points])
+        drift = [k for k, name in enumerate(self.states) if name in self.first.drift]
+        lap = RunView(self.first.sensitivity.setting.plain, self.first.execution)
+        sizes = [lap.sizes.get(name, 0.0) for name in self.states]  # a state may be round-off at the section alone
+        spread = np.ptp(states, axis=0) / np.maximum(sizes, np.max(np.abs(states), axis=0) + 1e-300)
+        spread[drift] = -1
+        k = int(np.argmax(spread))
+        units = self.first.units
+        marks = [(b.kind, b.parameter, float(b.state[k])) for b in self.bifurcations]
+        plot_branch(
+            path,
+            label(self.parameter, units),
+            f"{label(self.states[k], units)} after the section",
+            [(value, float(state[k]), stable) for value, state, stable in self.knots],
+            marks,
+            f"{called(self.first.execution.title, self.first.execution.model)}: orbits through {self.section}",
+        )

@@ -11,8 +11,8 @@ import sympy as sp
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.functions import replaced
+from hsdsl.language.expression.conditions import without_roundoff
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.trigger import without_roundoff
 from hsdsl.language.system import TIME, HybridSystem, Parameter
 
 PHASE = "phase of the start"  # a parameter of a system that can begin at any phase

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.orbits.shooting import Closed
+from hsdsl.analysis.orbits.section import Closed
+from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.words import condensed, number, values
 from hsdsl.analysis.sensitivity.result import Sensitivity
-from hsdsl.base.calls import checks_methods
-from hsdsl.base.names import called
+from hsdsl.base.names import called, checks_methods, seen
 from hsdsl.engine.execution import Array, Execution
 
 LEAST_MARGIN = 1e-8  # multipliers are not known better than this
@@ -66,22 +68,37 @@ class Orbit:
         return self.sensitivity.execution
 
     def as_json(self) -> dict[str, Any]:
-        """Return the object of `orbit --json`."""
-        from hsdsl.analysis.orbits.summary import as_json
-
-        return as_json(self)
+        """The object of `orbit --json`; a complex number is its real and its imaginary part."""
+        names = ("section", "laps", "mode", "state", "phase", "period", "drift", "residual", "verdict", "reasons")
+        result = {name: getattr(self, name) for name in names}
+        result |= {"state": seen(self.state), "multipliers": _pairs(self.multipliers)}
+        if self.sides:
+            result["sides"] = {edge: _pairs(found) for edge, found in self.sides.items()}
+        return plain(result)
 
     @property
     def summary(self) -> str:
         """The orbit as lines of text."""
-        from hsdsl.analysis.orbits.summary import summary
+        return "\n".join(f"{label:12}{text}" for label, text in self._facts())
 
-        return summary(self)
+    def _facts(self) -> Iterator[tuple[str, str]]:
+        run = self.execution
+        closing = "" if self.laps == 1 else f", closed by {self.laps} of them"
+        yield "orbit", f"{called(run.title, run.model)}: right after {self.section}{closing}"
+        yield "period", number(self.period, 12)
+        if self.phase is not None:
+            yield "phase", f"t = {number(self.phase, 12)} within the period of the forcing"
+        yield "state", f"mode {self.mode}, {values(seen(self.state))}"
+        if self.drift:
+            yield "drift", f"{values(self.drift)} in a period; nothing depends on it"
+        yield "multipliers", shown(self.multipliers)
+        for edge, found in self.sides.items():
+            yield "", f"{shown(found)} where {edge} goes first"
+        yield "verdict", f"{self.verdict}: {'; '.join(condensed(self.reasons))}"
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the orbit and its multipliers to a .png or .svg file."""
-        from hsdsl.analysis.orbits.summary import shown
-        from hsdsl.analysis.plot.orbit import plot_orbit
+        from hsdsl.analysis.plot.analyses import plot_orbit
 
         states = [x for x in self.state if x not in self.drift]
         name = called(self.execution.title, self.execution.model)
@@ -145,3 +162,19 @@ def judged(multipliers: Array, error: float) -> tuple[str, str]:
     if largest < 1 - margin:
         return "stable", known
     return ("unstable" if largest > 1 + margin else "undecided"), known
+
+
+def _pairs(found: Array) -> list[dict[str, float]]:
+    return [{"real": float(m.real), "imaginary": float(m.imag), "size": float(np.abs(m))} for m in found]
+
+
+def shown(found: Array) -> str:
+    """Multipliers, a pair of conjugate ones as one; what is not known from zero is zero."""
+    parts: list[str] = []
+    for m in np.where(np.abs(found) < LEAST_MARGIN, 0.0, found):
+        if m.imag == 0:
+            parts.append(number(float(m.real), 12))
+        elif m.imag > 0:
+            size = number(float(np.abs(m)), 12)
+            parts.append(f"{number(float(m.real), 12)} +- {number(float(m.imag), 12)}i (size {size})")
+    return ", ".join(parts) or "none"

@@ -16,7 +16,7 @@ import numpy as np
 
 from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import number
-from hsdsl.base.calls import checks_methods
+from hsdsl.base.names import checks_methods
 from hsdsl.engine.execution import Array
 
 FALLS, STAYS = 0.4, 0.1  # exponents of the radius: from the one on distances fall, up to the other they stay

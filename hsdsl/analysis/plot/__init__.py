@@ -1,9 +1,9 @@
 # pyright: reportUnknownMemberType=false
 """Pictures of runs: states over time with mode bands, jumps not joined, guards as dotted levels; phase plots.
 
-`view` is what a picture shows, `curves` are the points that it draws; `figure` has the panels (`panel`, `phase`), in
-the colours of `style`, and `page` is the same as HTML. Other subjects have modules of their own: `analyses`, `orbit`,
-`path`, `sweep`; `animation` draws the `shapes` of a scene, `notebook` is what notebooks display.
+`curves` has what a picture shows and the points that it draws; `figure` has the panels, in the colours of `style`, and
+`page` is the same as HTML. `analyses` are pictures of other subjects; `animation` draws a scene, `notebook` is what
+notebooks display.
 """
 
 from __future__ import annotations
@@ -12,9 +12,8 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.analysis.plot.curves import GuardLine
+from hsdsl.analysis.plot.curves import GuardLine, View
 from hsdsl.analysis.plot.style import FORMATS, check_suffixes, save, styled, write_figure
-from hsdsl.analysis.plot.view import View
 from hsdsl.base.atomic import replacing
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution

@@ -1,23 +1,40 @@
 # pyright: reportUnknownMemberType=false
-"""Pictures of analyses: distances over time, fitted measurements, runs from nearby, branches of periodic orbits."""
+"""Pictures of analyses: distances, shortest paths, fits, runs from nearby, orbits and their branches, sweeps."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from itertools import groupby, pairwise
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hsdsl.analysis.plot.curves import curves, limits_of, line
-from hsdsl.analysis.plot.panel import label, time_label
-from hsdsl.analysis.plot.style import FAINT, PALETTE, legend_below, to_file
+from hsdsl.analysis.plot.style import (
+    ALARM,
+    FAINT,
+    INK,
+    PALETTE,
+    curve,
+    label,
+    legend_below,
+    time_label,
+    to_file,
+    whole_ticks,
+)
 from hsdsl.analysis.report import words
+from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Array, Execution
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from hsdsl.analysis.metrics.geometry import Domain, Formula, Gate, Space
+    from hsdsl.analysis.metrics.points import PathPiece
+
 
 BANDS = ("#0b5394", "#c8c8c8", "#b45f06")  # colours of distances over time
 DECADES = 12  # below the largest value: smaller ones are drawn there
@@ -149,3 +166,352 @@ def plot_branch(
     axis.set_ylabel(state, parse_math=False)
     axis.set_title(fill(title, TITLE), loc="left", fontsize=10, parse_math=False)
     return figure
+
+
+POINTS = 2000
+LETTERS = 90  # of a line of the title
+
+
+@to_file
+def plot_orbit(
+    run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str, units: Mapping[str, str]
+) -> Figure:
+    """Draw a run over one period; jumps are dotted."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(10, 4.6), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    _draw_run(left, run, states, period)
+    across, up = (states[0], states[1]) if len(states) > 1 else ("t", states[0])
+    left.set_xlabel(label(across, units) if len(states) > 1 else time_label(units), parse_math=False)
+    left.set_ylabel(label(up, units), parse_math=False)
+    draw_circle(right, multipliers)
+    figure.suptitle(textwrap.fill(title, LETTERS), x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False)
+    return figure
+
+
+def _draw_run(axis: Axes, run: Execution, states: Sequence[str], period: float) -> None:
+    """Draw the first two states against each other, or one over time."""
+    first: tuple[float, float] | None = None
+    before: tuple[float, float] | None = None
+    for arc in run.arcs:
+        start, end = float(run.times[arc.first]), min(float(run.times[arc.last]), period)
+        if end < start or not set(states[:2]) <= set(arc.states):
+            before = None
+            continue
+        times = np.linspace(start, end, max(2, int(POINTS * (end - start) / period)))
+        table = run.sample(times[1:-1])
+        columns: list[Array] = []
+        for name in states[:2]:
+            k = arc.states.index(name)
+            last = run.values[arc.last, k] if end == float(run.times[arc.last]) else run.sample([end], "left")[name][0]
+            columns.append(np.concatenate(([run.values[arc.first, k]], table[name], [last])).astype(float))
+        x, y = columns if len(columns) == 2 else (times, columns[0])
+        axis.plot(x, y, color=PALETTE[0])
+        if before is not None:
+            _draw_jump(axis, before, (float(x[0]), float(y[0])))
+        before = float(x[-1]), float(y[-1])
+        first = first or (float(x[0]), float(y[0]))
+        if end >= period:
+            break
+    if first is not None and before is not None:  # the jump of the section closes the orbit
+        _draw_jump(axis, before, first if len(states) > 1 else (before[0], first[1]))
+
+
+def _draw_jump(axis: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
+    axis.plot([start[0], end[0]], [start[1], end[1]], ":", color=PALETTE[1])
+
+
+def draw_circle(axis: Axes, multipliers: Array) -> None:
+    """Draw the unit circle and multipliers."""
+    angles = np.linspace(0, 2 * np.pi, 200)
+    axis.plot(np.cos(angles), np.sin(angles), color=FAINT)
+    for inside, colour in ((True, PALETTE[0]), (False, PALETTE[1])):
+        chosen = [complex(m) for m in multipliers.tolist() if (abs(m) < 1) is inside]
+        axis.plot([m.real for m in chosen], [m.imag for m in chosen], "o", color=colour)
+    axis.set_aspect("equal", "datalim")
+    axis.set_title("Floquet multipliers", fontsize=9)
+    axis.set_xlabel("real part")
+    axis.set_ylabel("imaginary part")
+
+
+MOST_WORDS = 20  # of which each has a colour
+MARGIN = 0.01  # beside the first and the last column of dots
+DOT = 40_000  # dots from which on they are small and pale
+
+
+class Axis(NamedTuple):
+    """A varied name, the label with its unit, its value in each row, and its grid where it has one."""
+
+    label: str
+    values: Any
+    grid: Sequence[float] | None
+    logarithmic: bool
+
+
+class Quantity(NamedTuple):
+    """A column: its label, and its value in each row, a number or a word; None where there is none."""
+
+    label: str
+    values: Any
+
+    @property
+    def words(self) -> list[str]:
+        """The different words; none where it has numbers."""
+        return [] if self.values.dtype != object else sorted({str(v) for v in self.values if v is not None})
+
+
+@to_file
+def plot_curve(x: Axis, of: Quantity, title: str) -> Figure:
+    """Draw a number over a name, in the order of the name; words as dots on lines of their own."""
+    figure, axes = _empty()
+    order = np.argsort(x.values, kind="stable")
+    if of.words:
+        numbers = [of.words.index(str(v)) if v is not None else np.nan for v in of.values[order]]
+        axes.plot(x.values[order], numbers, ".", color=curve(PALETTE[5]))
+        axes.set_yticks(range(len(of.words)), of.words, parse_math=False)
+    else:
+        line = "-" if x.grid is not None and len(x.grid) == len(x.values) else "."
+        axes.plot(x.values[order], of.values[order], line, color=curve(PALETTE[5]), linewidth=1.2, markersize=2)
+        whole_ticks(axes.yaxis, of.values)
+    axes.set_ylabel(of.label, parse_math=False)
+    return _labelled(figure, axes, x, title)
+
+
+@to_file
+def plot_dots(x: Axis, of: Quantity, where: Any, title: str) -> Figure:
+    """Draw every number of rows with lists; ``where`` has the row of each."""
+    (figure, axes), many = _empty(), len(of.values) > DOT
+    size, alpha = (0.4, 0.35) if many else (1.2, 0.8)
+    dots: dict[str, Any] = {"markersize": size, "alpha": alpha, "markeredgewidth": 0, "rasterized": True}
+    axes.plot(x.values[where], of.values, "o", color=curve(PALETTE[5]), **dots)
+    axes.set_ylabel(of.label, parse_math=False)
+    whole_ticks(axes.yaxis, of.values)
+    axes.margins(x=MARGIN)
+    return _labelled(figure, axes, x, title)
+
+
+@to_file
+def plot_family(curves: Sequence[tuple[Any, Any]], by: Axis, label: str, title: str) -> Figure:
+    """Draw a curve (times, values) for each row, in colours that rise with a name."""
+    from matplotlib.collections import LineCollection
+
+    figure, axes = _empty()
+    known = by.values[np.isfinite(by.values)]
+    low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
+    lines = LineCollection([np.column_stack(each) for each in curves], cmap="viridis", linewidths=0.9)
+    lines.set(array=by.values, norm="log" if by.logarithmic else None, clim=(low, high), rasterized=True)
+    axes.add_collection(lines)
+    axes.autoscale_view()
+    figure.colorbar(lines, ax=axes).set_label(by.label, parse_math=False)
+    axes.set_ylabel(label, parse_math=False)
+    return _labelled(figure, axes, Axis("time t", None, None, False), title)
+
+
+@to_file
+def plot_map(x: Axis, y: Axis, of: Quantity, title: str) -> Figure:
+    """Draw a number or a word over two names: cells where both have grids, else dots; grey where there is none."""
+    figure, axes = _empty()
+    axes.set_facecolor("#dddddd")
+    shades: dict[str, Any] = {"cmap": "viridis"}
+    values = of.values
+    if of.words:
+        values, shades = _by_words(of)
+    if x.grid is None or y.grid is None:
+        drawn: Any = axes.scatter(x.values, y.values, c=values, s=6, linewidths=0, **shades)
+    else:
+        drawn = axes.pcolormesh(*_cells(x, y, values), rasterized=True, **shades)
+    _legend(figure, axes, drawn, of)
+    axes.set_ylabel(y.label, parse_math=False)
+    if y.logarithmic:
+        axes.set_yscale("log")
+    return _labelled(figure, axes, x, title)
+
+
+def _empty() -> tuple[Figure, Axes]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(8, 5), layout="constrained")
+    return figure, figure.subplots()
+
+
+def _labelled(figure: Figure, axes: Axes, x: Axis, title: str) -> Figure:
+    if x.logarithmic:
+        axes.set_xscale("log")
+    axes.set_xlabel(x.label, parse_math=False)
+    axes.set_title(title, loc="left", fontsize=10, parse_math=False)
+    return figure
+
+
+def _by_words(of: Quantity) -> tuple[Any, dict[str, Any]]:
+    """Words as numbers, and their colours."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+
+    words = of.words[:MOST_WORDS]
+    numbers = np.array([words.index(v) if v in words else np.nan for v in of.values], dtype=float)
+    colours = ListedColormap([PALETTE[i % len(PALETTE)] for i in range(len(words))])
+    return numbers, {"cmap": colours, "norm": BoundaryNorm(np.arange(len(words) + 1) - 0.5, max(1, len(words)))}
+
+
+def _cells(x: Axis, y: Axis, values: Any) -> tuple[Any, Any, Any]:
+    """The edges of cells and the value in each; of several rows in a cell the last counts."""
+    across, up = np.unique(x.values), np.unique(y.values)
+    cells = np.full((len(up), len(across)), np.nan)
+    cells[np.searchsorted(up, y.values), np.searchsorted(across, x.values)] = values
+    return edges(across, x.logarithmic), edges(up, y.logarithmic), cells
+
+
+def edges(values: Any, logarithmic: bool) -> Any:
+    """Where the cells around rising values begin and end, one more than values."""
+    at = np.log10(values) if logarithmic else np.asarray(values, dtype=float)
+    if len(at) == 1:
+        at = np.array([at[0] - 0.5, at[0] + 0.5])
+        return 10.0**at if logarithmic else at
+    middle = (at[1:] + at[:-1]) / 2
+    found = np.concatenate([[2 * at[0] - middle[0]], middle, [2 * at[-1] - middle[-1]]])
+    return 10.0**found if logarithmic else found
+
+
+def _legend(figure: Figure, axes: Axes, drawn: Any, of: Quantity) -> None:
+    if not of.words:
+        bar = figure.colorbar(drawn, ax=axes)
+        bar.set_label(of.label, parse_math=False)
+        whole_ticks(bar.ax.yaxis, of.values)
+        return
+    from matplotlib.patches import Patch
+
+    handles = [Patch(color=PALETTE[i % len(PALETTE)], label=word) for i, word in enumerate(of.words[:MOST_WORDS])]
+    handles += [Patch(color="#dddddd", label="other")] if len(of.words) > MOST_WORDS else []
+    legend = figure.legend(handles=handles, title=of.label, loc="outside right upper", frameon=False, edgecolor=FAINT)
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+
+
+GRID = 160  # points of a panel's side at which domains and curved guards are evaluated
+AROUND = 0.25  # of a path's extent, around it
+
+
+@to_file
+def plot_path(space: Space, pieces: Sequence[PathPiece], title: str) -> Figure:
+    """Draw domains, guards, their images and the pieces of a path.
+
+    Raises UsageError: no path, a mode on it that has not two coordinates, an unknown suffix, or a file that cannot be
+    written.
+    """
+    modes = _visited(space, pieces)
+    from matplotlib.figure import Figure
+
+    columns = min(3, len(modes))
+    rows = -(-len(modes) // columns)
+    figure = Figure(figsize=(1.5 + 4.2 * columns, 0.6 + 3.8 * rows), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for axis, mode in zip(axes, modes, strict=False):
+        _panel(axis, space, mode, pieces)
+    for axis in axes[len(modes) :]:
+        axis.set_visible(False)
+    figure.suptitle(title, x=0.01, ha="left", parse_math=False)
+    return figure
+
+
+def _visited(space: Space, pieces: Sequence[PathPiece]) -> list[int]:
+    if not pieces:
+        raise UsageError("there is no path to draw: either none was found or the points are the same")
+    modes = [space.mode_index(name) for name in dict.fromkeys(piece.mode for piece in pieces)]
+    for mode in modes:
+        names = space.domains[mode].coordinates
+        if len(names) != 2:
+            has = f"mode {space.modes[mode]} has {len(names)}: {', '.join(names) or 'none'}"
+            raise UsageError(f"a path is drawn in modes of two coordinates, and {has}")
+    return modes
+
+
+def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[PathPiece]) -> None:
+    domain = space.domains[mode]
+    own: Array = np.array([x for piece in pieces if piece.mode == domain.mode for x in (piece.start, piece.end)])
+    extent = max(float(np.max(own.max(axis=0) - own.min(axis=0))), 1e-9 * (1 + float(np.abs(own).max())))
+    middle = (own.max(axis=0) + own.min(axis=0)) / 2
+    low, high = middle - (0.5 + AROUND) * extent, middle + (0.5 + AROUND) * extent
+    x: Array = np.linspace(float(low[0]), float(high[0]), GRID)
+    y: Array = np.linspace(float(low[1]), float(high[1]), GRID)
+    axis.contourf(x, y, _beyond(domain, x, y), levels=[-np.inf, 0], colors=["#eef4fa"])
+    for gate in space.gates:
+        if gate.source == mode:
+            _line(axis, gate, gate.sides[0], extent, own, "-", f"guard of {gate.edge}")
+        if gate.target == mode:
+            _line(axis, gate, gate.sides[1], extent, own, ":", f"image of {gate.edge}")
+    for gate in space.curved_gates:
+        if gate.source == mode:
+            _curve(axis, x, y, gate.surface, gate.conditions)
+        if gate.target == mode and gate.marks.value(own[0]).size:
+            _curve(axis, x, y, gate.marks, None)
+    _pieces(axis, domain.mode, pieces)
+    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    axis.set_xlabel(domain.coordinates[0], parse_math=False)
+    axis.set_ylabel(domain.coordinates[1], parse_math=False)
+    axis.set_title(domain.mode, loc="left", parse_math=False)
+    axis.set_aspect("equal", adjustable="box")
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2)
+
+
+def _grid(x: Array, y: Array) -> Array:
+    return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+
+def _beyond(domain: Domain, x: Array, y: Array) -> Array:
+    """How far each point of a grid is beyond the domain: positive outside."""
+    points = _grid(x, y)
+    worst = np.max(points @ domain.normals.T - domain.levels, axis=1, initial=-1.0)
+    for formula in domain.curved:
+        worst = np.maximum(worst, [formula(point) for point in points])
+    return np.nan_to_num(worst, nan=1.0).reshape(len(y), len(x))
+
+
+def _line(axis: Any, gate: Gate, side: Array, extent: float, own: Array, style: str, label: str) -> None:
+    """A guard or image: a segment, cut off some way outside the panel."""
+    base, frame = side[:, 0], side[:, 1:]
+    if not np.any(frame):
+        axis.plot(*base, marker="s", color=FAINT, label=label, linestyle="none")
+        return
+    from hsdsl.analysis.metrics.gate_sequence import interval_of
+
+    slope = frame[:, 0]
+    middle = float((own.mean(axis=0) - base) @ slope / (slope @ slope))
+    reach = 4 * extent / float(np.linalg.norm(slope))
+    ends = np.clip(interval_of(gate.normals, gate.levels), middle - reach, middle + reach)
+    at = base + np.outer(ends, slope)
+    axis.plot(at[:, 0], at[:, 1], style, color=FAINT, linewidth=2.0, label=label, zorder=1)
+
+
+def _curve(axis: Any, x: Array, y: Array, surface: Formula, conditions: Formula | None) -> None:
+    points = _grid(x, y)
+    values = np.array([surface(point) for point in points])
+    if conditions is not None:
+        allowed = np.array([np.all(conditions.value(point) <= 1e-2 * np.ptp(x)) for point in points])
+        values = np.where(allowed, values, np.nan)
+    if np.nanmin(values, initial=1) < 0 < np.nanmax(values, initial=-1):
+        style = "solid" if conditions is not None else "dotted"
+        axis.contour(x, y, values.reshape(len(y), len(x)), levels=[0], colors=[FAINT], linestyles=[style])
+
+
+def _pieces(axis: Any, mode: str, pieces: Sequence[PathPiece]) -> None:
+    """The straight pieces in one mode, with the numbers of the passages they end at and come from."""
+    number = 0
+    for k, piece in enumerate(pieces):
+        came, number = number, number + (piece.edge is not None)
+        if piece.mode != mode:
+            continue
+        axis.plot(*zip(piece.start, piece.end, strict=True), color=INK, linewidth=1.8, zorder=3)
+        if k == 0:
+            _mark(axis, piece.start, "from", INK)
+        elif pieces[k - 1].edge is not None:
+            _mark(axis, piece.start, str(came), ALARM)
+        if piece.edge is not None:
+            _mark(axis, piece.end, str(number), ALARM)
+        elif k == len(pieces) - 1:
+            _mark(axis, piece.end, "to", INK)
+
+
+def _mark(axis: Any, at: tuple[float, ...], text: str, colour: str) -> None:
+    axis.plot(*at, marker="o", color=colour, markersize=6, zorder=4)
+    axis.annotate(text, at, xytext=(6, 6), textcoords="offset points", color=colour, fontweight="bold", zorder=5)

@@ -5,17 +5,16 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from shutil import which
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from hsdsl.analysis.plot.curves import curves
-from hsdsl.analysis.plot.shapes import draw_shape, shapes_at
-from hsdsl.analysis.plot.style import check_suffixes, fills, styled
+from hsdsl.analysis.plot.style import ALARM, INK, RUNS, check_suffixes, fills, styled
 from hsdsl.analysis.report import words
 from hsdsl.base.atomic import replacing
 from hsdsl.base.errors import UsageError
@@ -25,6 +24,7 @@ from hsdsl.engine.execution import Array, Execution, Samples
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
 
 FORMATS = (".gif", ".mp4")
 FPS = 25
@@ -81,11 +81,12 @@ def animate(
     ----------
     shapes : sequence of `hsdsl.language.system.Shape`
     speed : float, optional
-        Time of the run by seconds of the film; left out, 1 where the film then lasts 4 to 20 s, else what fits.
+        Model time per second of the film; by default 1 if the film then lasts 4 to 20 s, or else a value for such a
+        length.
     unit : str, optional
         The unit of time.
     progress : callable, optional
-        Called after each frame with how many there are, and how many there will be.
+        Called after each frame with the number of finished frames and their total number.
 
     Raises UsageError: as :func:`check` and :func:`frame_times`.
     """
@@ -158,3 +159,70 @@ def _box(run: Execution, samples: Samples, shapes: Sequence[Any]) -> tuple[tuple
     ends = [(float(a) - room - least * (b - a < least), float(b) + room + least * (b - a < least))
             for a, b in zip(low, high, strict=True)]  # fmt: skip
     return ends[0], ends[1]
+
+
+COILS = 8  # of a spring
+
+
+class Drawn(NamedTuple):
+    """A shape at one time: its kind, its points (n, 2), and its sizes."""
+
+    kind: str
+    points: Array
+    sizes: tuple[float, ...]
+
+    @property
+    def outline(self) -> Array:
+        """The corners of a box, the zigzag of a spring, else the points."""
+        if self.kind == "box":
+            width, height, angle = self.sizes
+            corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (width / 2, height / 2)
+            turned = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+            return self.points[0] + corners @ turned
+        return _zigzag(*self.points) if self.kind == "spring" else self.points
+
+    def reach(self, point: Array) -> float:
+        """How far its farthest coordinate is from that of a point."""
+        return float(np.abs(self.extent - point).max())
+
+    @property
+    def extent(self) -> Array:
+        """Points that a picture must have room for."""
+        if self.kind == "circle":
+            return np.concatenate([self.points - self.sizes[0], self.points + self.sizes[0]])
+        return self.points if self.kind == "spring" else self.outline
+
+
+def _zigzag(start: Array, end: Array) -> Array:
+    along = end - start
+    across = np.array([-along[1], along[0]]) * 0.06
+    shares = np.linspace(0.12, 0.88, 2 * COILS + 1)
+    sides = np.array([0, *([1, -1] * COILS)[: 2 * COILS - 1], 0])
+    return np.concatenate([[start], start + np.outer(shares, along) + np.outer(sides, across), [end]])
+
+
+def shapes_at(samples: Samples, shapes: Sequence[Any], row: int) -> Iterator[Drawn]:
+    """Give the shapes at a row that have all their numbers; these are the outputs ``scene 0``, ``scene 1``, ..."""
+    at = 0
+    for shape in shapes:
+        numbers = np.array([float(samples[f"scene {k}"][row]) for k in range(at, at + shape.numbers)])
+        at += shape.numbers
+        if np.isfinite(numbers).all():
+            points = numbers[: 2 * shape.points].reshape(-1, 2)
+            yield Drawn(shape.kind, points, tuple(numbers[2 * shape.points :].tolist()))
+
+
+def draw_shape(axis: Axes, drawn: Drawn) -> None:
+    """Add a shape to an axis."""
+    from matplotlib.patches import Circle, Polygon
+
+    look: dict[str, Any] = {"edgecolor": INK, "facecolor": f"{RUNS[0]}59", "linewidth": 1.6}
+    if drawn.kind == "circle":
+        x, y = drawn.points[0].tolist()
+        axis.add_patch(Circle((x, y), abs(drawn.sizes[0]), **look))
+    elif drawn.kind == "box":
+        axis.add_patch(Polygon(drawn.outline, closed=True, **look))
+    elif drawn.kind == "point":
+        axis.plot(*drawn.points.T, "o", color=ALARM, markersize=6)
+    else:
+        axis.plot(*drawn.outline.T, color=INK, linewidth=1.6, solid_joinstyle="round")

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsdsl.analysis.plot.curves import View
 from hsdsl.analysis.plot.style import ALARM, INK, styled, write_figure
-from hsdsl.analysis.plot.view import View
 from hsdsl.analysis.report import words
-from hsdsl.analysis.report.html import html
+from hsdsl.analysis.report.summary import html
 from hsdsl.base.errors import WARNINGS
 from hsdsl.base.names import called, visible, visible_lines, without_memory
 from hsdsl.engine.execution import Array, Ensemble, Execution

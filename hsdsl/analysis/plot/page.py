@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.plot.curves import Array, Curves, curves, moving_levels
+from hsdsl.analysis.plot.curves import Array, Curves, Pair, View, curves, moving_levels, names_of
 from hsdsl.analysis.plot.parts import filled, inert, scripts, shared
 from hsdsl.analysis.plot.style import colours
-from hsdsl.analysis.plot.view import Pair, View, names_of
 from hsdsl.analysis.report import mode_graph, words
-from hsdsl.analysis.report.html import html
+from hsdsl.analysis.report.summary import html
 from hsdsl.base.names import visible
 from hsdsl.base.parts import short_names
 from hsdsl.engine.execution import Execution
@@ -31,7 +30,8 @@ def page(runs: Sequence[Execution], view: View) -> str:
     else:
         columns, shown = list(dict.fromkeys([*names, *(name for pair in pairs for name in pair)])), names
     data = [curves(run) for run in runs]
-    modes = list(dict.fromkeys(mode for run, drawn in zip(runs, data, strict=True) for mode in _modes(run, drawn)))
+    pairs_of = zip(runs, data, strict=True)
+    modes = list(dict.fromkeys(m for run, drawn in pairs_of for m in (*(a.mode for a in run.arcs), *drawn.modes)))
     kept = [thinned(drawn, columns, NUMBERS // len(runs)) for drawn in data]
     title = escape(visible(view.title or ", ".join(dict.fromkeys(map(words.heading, runs)))))
     parts = {
@@ -45,10 +45,6 @@ def page(runs: Sequence[Execution], view: View) -> str:
         "script": "\n".join([scripts(), shared("runs.js")]),
     }
     return filled(shared("runs.html"), parts)
-
-
-def _modes(run: Execution, drawn: Curves) -> list[str]:
-    return [*(arc.mode for arc in run.arcs), *drawn.modes]
 
 
 def _facts(runs: Sequence[Execution], data: Sequence[Curves], kept: Sequence[Array]) -> str:

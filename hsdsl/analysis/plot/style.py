@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
@@ -191,3 +191,13 @@ def curve(colour: str) -> str:
 def _mixed(colour: str, share: float, other: str) -> str:
     parts = (int(colour[i : i + 2], 16) * share + int(other[i : i + 2], 16) * (1 - share) for i in (1, 3, 5))
     return "#" + "".join(f"{round(part):02x}" for part in parts)
+
+
+def label(name: str, units: Mapping[str, str]) -> str:
+    """Label an axis with name and unit."""
+    return f"{name} [{units[name]}]" if name in units else name
+
+
+def time_label(units: Mapping[str, str]) -> str:
+    """Label an axis of time."""
+    return label("time t", {"time t": units["t"]} if "t" in units else {})

@@ -1,7 +1,6 @@
-"""A run as a readable `summary`, as HTML (`html`), and as the object that `--json` prints (`json_form`).
+"""A run as a readable `summary`, in text or HTML, and as the object that `--json` prints (`json_form`).
 
-All take their sentences from `words`; `alike` joins those that differ in numbers only. `model` is a model for
-notebooks: its equations (`mathml`) and its `mode_graph`, laid out by `graph_layout`; `visited` is what of it to draw.
+Both take their sentences from `words`. `model` is a model for notebooks; `mode_graph` draws its modes.
 """
 
 from hsdsl.analysis.report.json_form import as_json, dumps, record

@@ -1,12 +1,13 @@
-"""The summary as plain text of a hundred columns."""
+"""The summary of a run: as plain text of a hundred columns, and as HTML for notebooks and pages."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from html import escape
 
 from hsdsl.analysis.report import words
-from hsdsl.base.names import shown
+from hsdsl.base.names import shown, visible_lines
 from hsdsl.engine.execution import Execution
 
 WIDTH = 100
@@ -64,13 +65,13 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
     if not execution.transitions:
         yield "No transitions."
         return
-    table = words.Table.of(execution, limit)
-    cells = list(zip(words.COLUMNS, *table.rows, strict=True))
+    rows, cut, left_out = words.table(execution, limit)
+    cells = list(zip(words.COLUMNS, *rows, strict=True))
     *aligned, notes = [column for column in cells if set(column[1:]) != {"-"} or column[0] != "delay"]
     for i, (line, note) in enumerate(zip(_aligned(aligned), notes, strict=True)):
         yield from _row(line, note, columns)
-        if i == table.cut and table.left_out:
-            yield f"   ... {table.left_out} more ..."
+        if i == cut and left_out:
+            yield f"   ... {left_out} more ..."
 
 
 def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
@@ -89,3 +90,29 @@ def _row(line: str, note: str, columns: int) -> list[str]:
     if columns - start >= 24:
         return _wrapped(note, columns, line + "  ", " " * start)
     return [line.rstrip(), *_wrapped(note, columns, " " * 6, " " * 6)]
+
+
+def _escaped(text: str) -> str:
+    return escape(visible_lines(text))
+
+
+def html(execution: Execution, *, limit: int = 60) -> str:
+    """Sum a run up in a ``div``, with at most ``limit`` transitions; every text of the model is escaped."""
+    facts = [("with", words.overrides(execution)), *words.facts(execution)]
+    rows = "".join(f"<tr><th>{label}</th><td>{_escaped(text)}</td></tr>" for label, text in facts if text)
+    settings = _escaped(", ".join(words.settings(execution)))
+    return (
+        f'<div class="hsdsl"><p><strong>{_escaped(words.heading(execution))}</strong><br>{settings}</p>'
+        f"<table>{rows}</table>{_transition_table(execution, limit)}</div>"
+    )
+
+
+def _transition_table(execution: Execution, limit: int) -> str:
+    if not execution.transitions:
+        return "<p>No transitions.</p>"
+    chosen, cut, left_out = words.table(execution, limit)
+    rows = ["<tr>" + "".join(f"<td>{_escaped(cell)}</td>" for cell in row) + "</tr>" for row in chosen]
+    if left_out:
+        rows.insert(cut, f'<tr><td colspan="6">&hellip; {left_out} more &hellip;</td></tr>')
+    header = "".join(f"<th>{_escaped(name)}</th>" for name in words.COLUMNS)
+    return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"

@@ -1,4 +1,7 @@
-"""The parts of a run in words, the same in text, in HTML and on a plot."""
+"""The parts of a run in words, the same in text, in HTML and on a plot.
+
+Sentences that differ in numbers only are told once, and each reason of `unknown` has a remedy.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +9,9 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from functools import cache
+from typing import Any, NamedTuple
 
-from hsdsl.analysis.report.alike import condensed
-from hsdsl.analysis.report.remedies import remedies_of
 from hsdsl.base.defaults import kept_digits
 from hsdsl.base.names import called, seen, without_memory
 from hsdsl.base.numbers import decimals
@@ -129,33 +130,27 @@ def reasons(execution: Execution) -> list[str]:
 
 
 def stop(execution: Execution) -> str:
-    """Why and when the run ended."""
+    """The reason and time of the run's end."""
     reason, message = execution.stop.reason, execution.stop.message
     when = "" if "t = " in message else f" at t = {number(execution.stop.time, 10)}"
     return f"{reason}{when}: {message}"
 
 
-@dataclass(frozen=True)
-class Table:
-    """Rows of transitions by `COLUMNS`; after the first ``cut`` of them ``left_out`` are missing."""
+def table(execution: Execution, limit: int) -> tuple[list[tuple[str, ...]], int, int]:
+    """The first and the last transitions, ``limit`` in all, as rows by `COLUMNS`.
 
-    rows: Sequence[tuple[str, ...]]
-    cut: int
-    left_out: int
-
-    @staticmethod
-    def of(execution: Execution, limit: int) -> Table:
-        """Write the first and the last transitions, ``limit`` in all."""
-        transitions, digits = execution.transitions, meant_digits(execution)
-        count = len(transitions)
-        cut = (limit + 1) // 2 if count > limit else count
-        chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
-        instants = times([t.time for t in chosen], digits)
-        rows = [
-            (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t, min(6, digits)))
-            for t, instant in zip(chosen, instants, strict=True)
-        ]
-        return Table(rows, cut, count - len(chosen))
+    Returns the rows, and behind how many of them how many transitions are left out.
+    """
+    transitions, digits = execution.transitions, meant_digits(execution)
+    count = len(transitions)
+    cut = (limit + 1) // 2 if count > limit else count
+    chosen = [*transitions[:cut], *(transitions[cut - limit :] if limit < count and cut < limit else ())]
+    instants = times([t.time for t in chosen], digits)
+    rows = [
+        (str(t.index), instant, _delay(t), t.edge, change(t.source, t.target, t.edge), _changes(t, min(6, digits)))
+        for t, instant in zip(chosen, instants, strict=True)
+    ]
+    return rows, cut, count - len(chosen)
 
 
 def times(values: Sequence[Any], digits: int) -> list[str]:
@@ -200,3 +195,194 @@ def _state(transition: Transition, digits: int) -> str:
     words += [f"{name}: {number(after[name], digits)} (new)" for name in new if name not in before]
     words += [f"{name} dropped" for name in old if name not in after]
     return ", ".join(words) or "unchanged"
+
+
+_NUMBER = re.compile(r"(?<![\w.\-])-?\d+(?:,\d{3})*(?:\.\d+)?(?:e[+-]?\d+)?(?!\w)")
+_MARK = "\0"
+_TIME = f"t = {_MARK}"
+_WHEN = re.compile(f"(?:^|,? )(?:from {_TIME} (?:on|to {_TIME})|(?:at|close to) {_TIME})")
+MOST_LISTED = 3  # of indices
+
+
+def condensed(sentences: Sequence[str]) -> list[str]:
+    """The same sentences, those that differ in numbers only as one."""
+    groups: dict[str, list[str]] = {}
+    for sentence in sentences:
+        groups.setdefault(form(sentence), []).append(sentence)
+    return [alike[0] if len(alike) == 1 else _joined(each, alike) for each, alike in groups.items()]
+
+
+def form(sentence: str) -> str:
+    """A sentence without its numbers: the same for all that are alike."""
+    return _NUMBER.sub(_MARK, sentence)
+
+
+def _joined(form: str, alike: Sequence[str]) -> str:
+    """One sentence for several, with the times before it."""
+    columns = list(zip(*map(_NUMBER.findall, alike), strict=True))
+    place, times, kept = 0, list[str](), ""
+    for piece in re.split(f"({_WHEN.pattern})", form):
+        own = columns[place : place + piece.count(_MARK)]
+        place += len(own)
+        moves = any(len(set(column)) > 1 for column in own)
+        if moves and _WHEN.fullmatch(piece):
+            times += [text for column in own for text in column]
+        else:
+            kept += _filled(piece, own)
+    when = f" between t = {_least(times)} and {_largest(times)}" if times else ""
+    return f"{len(alike)} times{when}: {kept.strip()}"
+
+
+def _filled(piece: str, columns: Sequence[Sequence[str]]) -> str:
+    """A piece of a sentence with the span of each number."""
+    first, *rest = piece.split(_MARK)
+    texts = [_span(column, first if k == 0 else rest[k - 1]) for k, column in enumerate(columns)]
+    return first + "".join(text + after for text, after in zip(texts, rest, strict=True))
+
+
+def _span(column: Sequence[str], before: str) -> str:
+    distinct = list(dict.fromkeys(column))
+    if len(distinct) == 1:
+        return distinct[0]
+    if before.endswith("["):  # an index
+        inner = sorted(distinct, key=_value)
+        return ", ".join(inner) if len(inner) <= MOST_LISTED else f"{inner[0]}..{inner[-1]}"
+    return f"{_least(distinct)} to {_largest(distinct)}"
+
+
+def _least(texts: Sequence[str]) -> str:
+    return min(texts, key=_value)
+
+
+def _largest(texts: Sequence[str]) -> str:
+    return max(texts, key=_value)
+
+
+def _value(text: str) -> float:
+    return float(text.replace(",", ""))
+
+
+class Remedy(NamedTuple):
+    """Reasons as they read, ``...`` for what differs, what they mean, and what to do about them."""
+
+    reasons: tuple[str, ...]
+    meaning: str
+    remedy: str
+
+
+REMEDIES = (
+    Remedy(
+        ("a fixed step does not say how wrong it is", "the finer run was interrupted"),
+        "no second run was made to measure the error",
+        "`--estimate`, or a tolerance in place of a step",
+    ),
+    Remedy(
+        ("the run is unreliable from t = ... on",),
+        "from there a finer run makes other transitions, or an error exceeds a tenth of its state",
+        "a smaller `--tolerance`; in chaos no tolerance helps for long: shorten `until`. Where digits cancel, as in "
+        "`sqrt(x**2 + 1e18) - 1e9`, write the expression without that, or use `--precision`",
+    ),
+    Remedy(
+        (
+            "the crossing of ... would be undone by ... the error",
+            "the run turns back close to ...",
+            "the run turns back within the error of ...",
+            "whether ... is reached close to ... could not be decided",
+        ),
+        "a guard is hardly crossed, or hardly missed: near grazing",
+        "a smaller `--tolerance`; else change a parameter a little both ways and compare what happens there",
+    ),
+    Remedy(
+        ("the order of ... is within the error",),
+        "two guards are reached almost together",
+        "separate them with `if`, or make both orders lead to one state",
+    ),
+    Remedy(
+        ("... fired at once on entry, ... outside its domain",),
+        "a reset landed beyond the guard of another transition",
+        "land on the guard or inside it, or use `event` in place of `when`",
+    ),
+    Remedy(
+        ("... fired at once on entry, ... may keep it from that",),
+        "a reset or a jump leads so close to a guard that an error decides whether it fires",
+        "move the threshold off the value, as halves for counters, or use a smaller `--tolerance`",
+    ),
+    Remedy(
+        ("an input or function of time jumps ... within the error of ...",),
+        "a step of an input, or of `floor(t)`, falls on a transition that reads it",
+        "move the step off the transition, or read the input in the flow alone",
+    ),
+    Remedy(
+        ("whether the condition of ... holds is within the error",),
+        "an `if` is decided by round-off",
+        "compare counters at halves; move the threshold off the value",
+    ),
+    Remedy(
+        ("a transition of ... within the error of the end is undecided",),
+        "`until` falls on an event, as a multiple of a sampling period does",
+        "end a little earlier or later: between two samples",
+    ),
+    Remedy(
+        ("... would not settle on a polynomial", "the surface of ... has no slope there"),
+        "a guard with a kink is crossed at it (`abs`, `min`), or one that is flat",
+        "split the guard into two transitions",
+    ),
+    Remedy(
+        ("the run starts on the surface of ...",),
+        "the start is on a guard, and an error decides whether that fires",
+        "start off the surface",
+    ),
+    Remedy(
+        ("the reset of ... lands ... the surface of ...", "the reset of ... jumps within the error"),
+        "an error decides on which side of a guard, or of a jump of the reset, the next mode begins",
+        "land clearly inside, or on the guard for all states nearby; a gap between thresholds (hysteresis) helps",
+    ),
+    Remedy(
+        ("the flow of mode ... jumps where ...",),
+        "a flow that jumps within a mode",
+        "two modes with a transition between them",
+    ),
+    Remedy(
+        ("a change of the flow of mode ... may not have been seen", "the slope of the flow of mode ... has no bound"),
+        "the flow changes faster than the steps show",
+        "a sampled input with the times of the pulse, or a smaller `--tolerance`",
+    ),
+    Remedy(
+        (
+            "inside a step, ... the run is beyond the surface of ...",
+            "... turning points close to surfaces were not looked at",
+        ),
+        "a step passed over a visit beyond a guard",
+        "a smaller `--tolerance`, or `--method taylor`",
+    ),
+    Remedy(
+        ("... has no value close to ...", "... has no rate at ..."),
+        "a guard or its rate has no number there, as a root of something negative",
+        "write the guard so that it has a value on both sides, as h for sqrt(h)",
+    ),
+    Remedy(("the run did not get to its end",), "the run stopped before `until`", "what the line `stop` says"),
+)
+
+
+def remedies_of(reasons: Sequence[str]) -> list[str]:
+    """The remedies of some reasons, each once."""
+    found = (next((remedy for pattern, remedy in _patterns() if pattern.match(reason)), "") for reason in reasons)
+    return [text for text in dict.fromkeys(found) if text]
+
+
+@cache
+def _patterns() -> list[tuple[re.Pattern[str], str]]:
+    return [
+        (re.compile(".*".join(re.escape(part.strip()) for part in reason.split("..."))), each.remedy)
+        for each in REMEDIES
+        for reason in each.reasons
+    ]
+
+
+def remedy_table() -> str:
+    """The remedies as a table in Markdown."""
+    rows = (
+        f"| {', '.join(f'`{reason}`' for reason in each.reasons)} | {each.meaning} | {each.remedy} |"
+        for each in REMEDIES
+    )
+    return "\n".join(["| the reason says | what it is | what to do |", "|---|---|---|", *rows])

@@ -1,21 +1,23 @@
 # pyright: basic, reportArgumentType=false
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportReturnType=false
 """A system with the overrides of a run in it, as far as they change how one of its numbers depends on another."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import sympy as sp
 
-from hsdsl.analysis.sensitivity.chain import slopes
 from hsdsl.analysis.sensitivity.targets import Target
 from hsdsl.base.errors import UsageError
+from hsdsl.base.functions import replaced
 from hsdsl.base.numbers.decimals import number_of
 from hsdsl.language.elaborate import parameter_expression
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import HybridSystem, Initial, started
+from hsdsl.mathematics.lower.straight import Gradient
 
 
 @dataclass(frozen=True)
@@ -132,3 +134,16 @@ def time_slopes(given: Overridden, by: Sequence[Target]) -> tuple[list[sp.Expr],
         return until, []
     last = max(1, int(experiment.samples) - 1)
     return until, [[sp.Rational(i, last) * slope for slope in until] for i in range(last + 1)]
+
+
+Slopes = dict[sp.Symbol, sp.Expr]
+
+
+def slopes(expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol]) -> list[Slopes]:
+    """The derivatives of each expression by those arguments where they are not zero."""
+    found = Gradient([sp.sympify(e) for e in expressions], arguments, letter="slope ", whole=True)
+    meaning: dict[sp.Basic, sp.Basic] = {}
+    done: dict[sp.Basic, sp.Basic] = {}
+    for name, expr in found.statements:
+        meaning[name] = replaced(expr, meaning, done)
+    return [{a: replaced(slope, meaning, done) for a, slope in row.items()} for row in found.sparse]

@@ -1,4 +1,4 @@
-"""The derivatives of an execution, from the execution of an augmented system, as numbers by name."""
+"""The derivatives of an execution, read off the execution of an augmented system: by name, in words, as JSON."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.sensitivity.landing import landing, parted
-from hsdsl.analysis.sensitivity.state_names import (
+from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.words import aligned, condensed, number
+from hsdsl.analysis.sensitivity.targets import (
     MEASURED,
     derivative_name,
     own,
@@ -21,9 +22,8 @@ from hsdsl.analysis.sensitivity.state_names import (
     slope_name,
     still_rate_name,
 )
-from hsdsl.analysis.sensitivity.ties import Tie, ties
-from hsdsl.analysis.sensitivity.touching import touched
-from hsdsl.base.calls import checks_methods
+from hsdsl.analysis.sensitivity.ties import Tie, landing, parted, ties, touched
+from hsdsl.base.names import called, checks_methods, seen
 from hsdsl.base.parts import numbered, present, product_name
 from hsdsl.engine.execution import Array, Execution, Samples, Transition, Verdict
 from hsdsl.engine.simulate import Prepared
@@ -243,10 +243,6 @@ class Sensitivity:
         further = () if self._smooth.theorem == "holds" else (*self.touches, *self._smooth.reasons)
         return (*own, *(reason for reason in further if not any(reason in told for told in own)))
 
-    def _exists_at(self, index: int) -> bool:
-        """Whether the derivatives of a transition exist."""
-        return not any(tie.index <= index for tie in self._parting)
-
     @cached_property
     def final(self) -> EndSlopes:
         """The derivatives of the end of the run; there are none if the run leaves its domain."""
@@ -255,7 +251,7 @@ class Sensitivity:
         time = self._shifts(end.state) if by_event else self.setting.span
         exists = not self.breaks and run.stop.reason != "left_domain"
         state = self._followed(end.mode, end.time, end.state, time, True)
-        rate = still_rate_name if self._rests(end.mode) else rate_name
+        rate = still_rate_name if (not self._mode(end.mode).states) else rate_name
         outputs = {y: self._output(end.outputs, y, rate(y), time) for y in self.setting.output_names}
         mode, own = self._shown(end.mode, end.state)
         return EndSlopes(
@@ -273,7 +269,7 @@ class Sensitivity:
     def transition(self, index: int) -> TransitionSlopes:
         """Return the derivatives of one transition."""
         made = self.execution.transitions[index]
-        after, exists = made.after or {}, self._exists_at(made.index)
+        after, exists = made.after or {}, (not any(tie.index <= made.index for tie in self._parting))
         time = self._shifts(after)
         before = self._followed(made.source, made.time, made.before, time, False)
         reached = self._followed(made.target, made.time, after, time, True)
@@ -327,10 +323,6 @@ class Sensitivity:
         earlier = bisect_left(segments, t, key=lambda each: each.start) - 1
         segment = plain.timeline.at(t) if after else segments[max(0, earlier)]
         return plain.kernel.bind(index, segment.data).flow(t, *x)
-
-    def _rests(self, mode: str) -> bool:
-        """Whether a mode is a final one without a flow."""
-        return not self._mode(mode).states
 
     def _mode(self, name: str) -> ModeProgram:
         """A mode of the run without derivatives."""
@@ -409,3 +401,106 @@ class Sensitivity:
     def _all_states(self) -> Iterator[str]:
         hidden = numbered(self.setting.plain.program.parts)
         yield from dict.fromkeys(x for arc in self.execution.arcs for x in own(arc.states) if x not in hidden)
+
+
+PARTS = ("final", "transitions", "outputs")
+ALWAYS = PARTS[:2]  # where no part is chosen
+MOST_ROWS = 40
+
+
+def as_json(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> dict[str, Any]:
+    """The object of `sensitivity --json`; numbers that do not exist are null."""
+    run = found.execution
+    result: dict[str, Any] = {
+        "model": run.model,
+        "wrt": list(found.wrt),
+        "settings": {"method": run.method, "tolerance": run.settings.get("tolerance"), "until": run.settings["until"]},
+        "stop": {"reason": found.run.stop.reason, "time": found.run.stop.time},
+        "exists": found.exists,
+        "reasons": list(found.reasons),
+        "verdict": found.verdict.theorem,
+    }
+    if "final" in parts:
+        result["final"] = {"at": run.final.time, **_end(found.final)}
+    if "transitions" in parts:
+        made = zip(run.transitions, found.transitions, strict=True)
+        result["transitions"] = [{"at": t.time, **_transition(d)} for t, d in made]
+    if "outputs" in parts:
+        table = found.sample()
+        values = {
+            name: {"value": v, **{by: table.slopes[name][:, k] for k, by in enumerate(found.wrt)}}
+            for name, v in table.values.items()
+        }
+        result["samples"] = {"times": table.times, "values": values}
+    if found.ties:
+        result["ties"] = [
+            {"time": tie.time, "reason": tie.reason, "orders": [vars(order) for order in tie.orders]}
+            for tie in found.ties
+        ]
+    if found.breaks:
+        result["one_sided"] = {edge: _end(side.final) for edge, side in found.sides.items()}
+    return plain(result)
+
+
+def _end(end: EndSlopes) -> dict[str, Any]:
+    return {"mode": end.mode, "time": end.time, "state": seen(end.state), "outputs": end.outputs}
+
+
+def _transition(made: TransitionSlopes) -> dict[str, Any]:
+    return vars(made) | {"before": seen(made.before), "after": seen(made.after)}
+
+
+def summary(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> str:
+    """The derivatives as tables."""
+    return "\n".join(_lines(found, parts))
+
+
+def _lines(found: Sensitivity, parts: Sequence[str]) -> Iterator[str]:
+    run = found.execution
+    yield f"{called(run.title, run.model)}: derivatives by {', '.join(found.wrt)}"
+    answer = {True: "yes", False: "no", None: "not known"}[found.exists]
+    reasons = [] if found.exists else condensed(found.reasons)
+    yield f"they exist: {answer}" + "".join(f"\n  {reason}" for reason in reasons)
+    if "final" in parts:
+        yield from _final(found)
+    for edge, side in found.sides.items() if found.breaks else ():
+        yield f"\nof the executions on which {edge} goes first"
+        yield from _final(side)
+    if "transitions" in parts and run.transitions:
+        rows = zip(run.transitions, found.transitions, strict=True)
+        table = [[str(t.index), t.edge, number(t.time, 10), *map(_slope, d.time.values())] for t, d in rows]
+        yield from _table("transition times", ["#", "edge", "time", *_heads(found)], table)
+    if "outputs" in parts:
+        yield from _samples(found)
+
+
+def _final(found: Sensitivity) -> Iterator[str]:
+    run, end = found.execution, found.final
+    rows = [["t", number(run.final.time, 10), *map(_slope, end.time.values())]]
+    rows += [[x, number(run.final.state[x], 10), *map(_slope, row.values())] for x, row in seen(end.state).items()]
+    rows += [[y, number(run.final.outputs[y], 10), *map(_slope, row.values())] for y, row in end.outputs.items()]
+    yield from _table(f"end of the run, mode {end.mode}", ["", "value", *_heads(found)], rows)
+
+
+def _samples(found: Sensitivity) -> Iterator[str]:
+    table = found.sample()
+    for name, values in table.values.items():
+        columns = zip(table.times.tolist(), values.tolist(), table.slopes[name].tolist(), strict=True)
+        rows = [[number(t, 10), number(v, 10), *map(_slope, row)] for t, v, row in columns]
+        yield from _table(name, ["t", "value", *_heads(found)], rows)
+
+
+def _heads(found: Sensitivity) -> list[str]:
+    return [f"d/d {by}" for by in found.wrt]
+
+
+def _slope(value: Any) -> str:
+    return "none" if value != value else number(value, 10)
+
+
+def _table(title: str, heads: list[str], rows: list[list[str]]) -> Iterator[str]:
+    shown = rows[:MOST_ROWS]
+    yield f"\n{title}"
+    yield from (f"  {line}".rstrip() for line in aligned([heads, *shown]))
+    if len(rows) > len(shown):
+        yield f"  and {len(rows) - len(shown)} more (--json has all)"

@@ -1,9 +1,12 @@
-"""What a derivative is taken by: a parameter, or the initial value of a state."""
+"""What a derivative is taken by: a parameter, or the initial value of a state; names that an augmented system adds.
+
+A model's names are identifiers, and none of the added names is.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
@@ -13,8 +16,7 @@ from hsdsl.mathematics.program import Program
 EXAMPLE = "for example c or initial.v"
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """A parameter, or with ``initial`` the initial value of a state; ``label`` is how it is written."""
 
     label: str
@@ -60,3 +62,38 @@ def _target(label: str, program: Program, states: Sequence[str]) -> Target:
     if name == "mode" and name != label:
         hint = "the initial mode is no number"
     raise UsageError(f"the model has no parameter or initial state '{label}'", hint)
+
+
+UNIT, SPAN, ERROR = "unit round-off", "length of the run", "error of the run"  # parameters, given by numbers
+LAST = "time of the last transition"
+MEASURED = "slopes are measured"  # 1 where a step's end told them
+
+
+def own(names: Iterable[str]) -> tuple[str, ...]:
+    """The names that are a model's."""
+    return tuple(name for name in names if " " not in name)
+
+
+def derivative_name(state: str, by: str) -> str:
+    """The derivative of a state or output."""
+    return f"d {state} / d {by}"
+
+
+def rate_name(output: str) -> str:
+    """The derivative of an output along the flow."""
+    return f"d {output} / d t"
+
+
+def still_rate_name(output: str) -> str:
+    """The derivative of an output by time where states rest."""
+    return f"d {output} / d t at rest"
+
+
+def slope_name(state: str) -> str:
+    """The slope of a state as the end of a step tells it."""
+    return f"slope of {state}"
+
+
+def shift_name(by: str) -> str:
+    """The derivative of the time of the last transition."""
+    return f"d time / d {by}"

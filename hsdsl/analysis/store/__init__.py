@@ -13,12 +13,18 @@ from pathlib import Path
 from typing import Any
 
 from hsdsl.analysis.store.npz import load, save_npz
-from hsdsl.analysis.store.sidecar import forget_sidecar, read_sidecar, sidecar_of, write_sidecar
-from hsdsl.analysis.store.table import at_samples, write_csv, write_parquet
-from hsdsl.base.atomic import replacing, unplaced
-from hsdsl.base.calls import checks_arguments
+from hsdsl.analysis.store.table import (
+    at_samples,
+    forget_sidecar,
+    read_sidecar,
+    sidecar_of,
+    write_csv,
+    write_parquet,
+    write_sidecar,
+)
+from hsdsl.base.atomic import locked, replacing, unplaced
 from hsdsl.base.errors import UsageError
-from hsdsl.base.unfinished import locked
+from hsdsl.base.names import checks_arguments
 from hsdsl.engine.execution import Execution
 
 __all__ = ["forget_sidecar", "load", "read_sidecar", "save"]

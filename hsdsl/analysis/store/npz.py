@@ -1,26 +1,28 @@
 """Executions in NumPy's ``.npz``: arrays and one JSON text, nothing pickled, nothing lost.
 
 Multiprecision columns are decimal text with the digits that the stored precision (in bits) needs to read back the same
-numbers. The arcs are rows of integers: layout, kind, and their own, where a layout is a mode with its states.
+numbers. The arcs are rows of integers: layout, kind, and their own, where a layout is a mode with its states. Floats
+that are not finite, mpmath numbers and tuples keep their types: a value without a form in JSON is an object of one key
+that begins with ``$``.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import types
 import zipfile
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, fields
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from hsdsl.analysis.store.lossless import Lossless, numbers
-from hsdsl.base.calls import checks_arguments
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_arguments
 from hsdsl.base.numbers import decimals
 from hsdsl.engine.execution import Arc, Array, Execution, Kind, Point, RunWarning, Stop, Transition, Verdict
 from hsdsl.language.files import open_regular
@@ -119,23 +121,19 @@ def _read(archive: Mapping[str, Array]) -> Execution:
         for layout, kind, *integers in cast("list[tuple[int, ...]]", archive["arcs"].tolist())
     )
     fields: dict[str, Any] = {name: form.unpack(header[name]) for name in _TEXTS}
-    fields["overrides"] = form.unpack(header.get("overrides", {}))  # files of earlier versions have none
+    fields["overrides"] = form.unpack(header.get("overrides", {}))  # files of earlier versions have neither
+    warnings = tuple(RunWarning(**form.unpack(record)) for record in header.get("warnings", ()))
     fields |= {name: form.unpack_array(archive[name]) for name in COLUMNS}
     execution = Execution(
         stop=Stop(**form.unpack(header["stop"])),
         final=Point(**form.unpack(header["final"])),
-        verdict=Verdict(**form.unpack(header["verdict"]) | {"warnings": _warnings(header, form)}),
+        verdict=Verdict(**form.unpack(header["verdict"]) | {"warnings": warnings}),
         transitions=tuple(Transition(**form.unpack(record)) for record in header["transitions"]),
         arcs=arcs,
         **fields,
     )
     _check(execution)
     return execution
-
-
-def _warnings(header: Mapping[str, Any], form: Lossless) -> tuple[RunWarning, ...]:
-    """The warnings; files of earlier versions have none."""
-    return tuple(RunWarning(**form.unpack(record)) for record in header.get("warnings", ()))
 
 
 def _check(execution: Execution) -> None:
@@ -189,3 +187,89 @@ def _fits(value: Any, kind: Any) -> bool:
     if origin in (Union, types.UnionType):
         return any(_fits(value, one) for one in arguments)
     return type(value) is kind
+
+
+def numbers(value: Any) -> Iterator[Any]:
+    """All multiprecision numbers in a value of mappings and lists."""
+    if decimals.is_multiprecision(value):
+        yield value
+    elif isinstance(value, Mapping):
+        yield from numbers(list(cast("Mapping[Any, Any]", value).values()))
+    elif isinstance(value, (tuple, list)):
+        for item in cast("list[Any]", value):
+            yield from numbers(item)
+
+
+@dataclass(frozen=True)
+class Lossless:
+    """Numbers written at ``precision`` bits, and read into the context of ``digits`` decimal digits."""
+
+    precision: int
+    digits: int | None
+
+    def pack(self, value: Any) -> Any:
+        """Make a value one that JSON has.
+
+        Raises TypeError: for a value of a kind that executions do not record.
+        """
+        match value:
+            case np.generic():
+                return self.pack(cast(Any, value).item())
+            case None | str() | bool() | int():
+                return value
+            case float():
+                return value if math.isfinite(value) else {"$float": repr(value)}
+            case Mapping():
+                items = [(key, self.pack(item)) for key, item in cast("Mapping[Any, Any]", value).items()]
+                if all(isinstance(key, str) and not key.startswith("$") for key, _ in items):
+                    return dict(items)
+                return {"$map": [[self.pack(key), item] for key, item in items]}
+            case tuple():
+                return {"$tuple": [self.pack(item) for item in cast("tuple[Any, ...]", value)]}
+            case list():
+                return [self.pack(item) for item in cast("list[Any]", value)]
+            case _ if decimals.is_multiprecision(value):
+                return {"$mpf": decimals.text(value, self.precision)}
+            case _:
+                raise TypeError(f"a {type(value).__name__} cannot be stored")
+
+    def unpack(self, value: Any) -> Any:
+        """Undo :meth:`pack`."""
+        match value:
+            case {"$mpf": text}:
+                return self._number(text)
+            case {"$float": text}:
+                return float(text)
+            case {"$tuple": items}:
+                return tuple(self.unpack(item) for item in items)
+            case {"$map": items}:
+                return {self.unpack(key): self.unpack(item) for key, item in items}
+            case dict():
+                return {key: self.unpack(item) for key, item in cast("dict[str, Any]", value).items()}
+            case list():
+                return [self.unpack(item) for item in cast("list[Any]", value)]
+            case _:
+                return value
+
+    def pack_fields(self, record: Any) -> dict[str, Any]:
+        """Make a dataclass a mapping of its fields."""
+        return {field.name: self.pack(getattr(record, field.name)) for field in fields(record)}
+
+    def pack_array(self, column: Array) -> Array:
+        """Make an array one that needs no pickling: a multiprecision one becomes text."""
+        if column.dtype != object:
+            return column
+        context = decimals.context_of(self.digits or 15)
+        texts = [decimals.text(context.convert(x), self.precision) for x in column.ravel()]
+        return np.array(texts, dtype="S" if texts else "S1").reshape(column.shape)
+
+    def unpack_array(self, column: Array) -> Array:
+        """Undo :meth:`pack_array`."""
+        if column.dtype.kind != "S":
+            return column
+        values = np.empty(column.size, dtype=object)
+        values[:] = [self._number(text.decode()) for text in column.ravel().tolist()]
+        return values.reshape(column.shape)
+
+    def _number(self, written: str) -> Any:
+        return decimals.read(written, self.precision, decimals.context_of(self.digits or 15))

@@ -1,19 +1,17 @@
 """Sweeps: runs of one model over many values, as a dataset of Parquet files.
 
-=============  ================================================================================
-`variation`    what varies: grids and random draws; `distributions` has those
-`recording`    what is kept of each run
-`manifest`     what a dataset is of: model, values, settings; its format has a version
-`rows`         an ensemble as an Arrow table with the columns of a dataset
-`dataset`      a folder with a manifest and a file for each chunk of rows; `summary` and `picture` show it
-`schedule`     chunks to processes of this machine, or (`cluster`) to the workers of Dask
-=============  ================================================================================
+=============  ============================================================================================
+`variation`    what varies: grids and random draws
+`manifest`     what a dataset is of: model, values, settings, what is recorded; its columns, and their rows
+`dataset`      a folder with a manifest and a file for each chunk of rows: made, read, summed up, drawn
+`cluster`      chunks to the workers of Dask
+=============  ============================================================================================
 
 The runs themselves are made in `hsdsl.interface.model.sweeps`.
 """
 
 from hsdsl.analysis.sweep.dataset import Sweep, load
-from hsdsl.analysis.sweep.recording import Recording
+from hsdsl.analysis.sweep.manifest import Recording
 from hsdsl.analysis.sweep.variation import Variation
 
 __all__ = ["Recording", "Sweep", "Variation", "load"]

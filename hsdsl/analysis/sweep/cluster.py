@@ -20,7 +20,7 @@ from typing import Any
 from distributed import Client, WorkerPlugin, as_completed, get_worker
 from distributed.scheduler import KilledWorker
 
-from hsdsl.analysis.sweep.schedule import TRIES, Run, Work, Write, refuse_deadly
+from hsdsl.analysis.sweep.dataset import TRIES, Run, Work, Write, refuse_deadly
 from hsdsl.base.errors import UsageError
 
 AHEAD = 3  # chunks under way for each thread

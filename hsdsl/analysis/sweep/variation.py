@@ -1,18 +1,22 @@
+# pyright: reportUnknownLambdaType=false, reportUnknownArgumentType=false
 """What varies in a sweep: the product of grids, each point with one row or with several of random draws.
 
 ======================= =====================================================
 ``c=0.5:0.9:101``       101 values from 0.5 to 0.9, evenly
 ``c=1e-3:1:50:log``     50 values, evenly in their logarithms
 ``c=0.1,0.2,0.5``       these values
-``c~normal(0.9, 0.02)`` a draw for each row (`hsdsl.analysis.sweep.distributions`)
+``c~normal(0.9, 0.02)`` a draw for each row
 ======================= =====================================================
 
-Rows are numbered with the first name varying slowest, and draws fastest.
+Rows are numbered with the first name varying slowest, and draws fastest. Each drawn name has a stream of Philox, with a
+key made of seed and name, from which row k takes the k-th number. So a row has its values whoever computes it, in any
+order, and what else is varied does not change them. A uniform number goes through the inverse distribution function.
 """
 
 from __future__ import annotations
 
 import math
+import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,9 +24,8 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.sweep import distributions
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import shown
+from hsdsl.base.names import counted, did_you_mean, shown
 from hsdsl.engine.execution import Array
 
 EXAMPLE = "for example --vary c=0.5:0.9:101, --vary c=0.1,0.2 or --vary 'c~normal(0.9, 0.02)'"
@@ -76,7 +79,7 @@ class Variation:
             found[grid.name] = np.array(grid.values)[place % len(grid.values)]
             place //= len(grid.values)
         for each in self.draws:
-            draws = distributions.draw(each.name, self.seed, each.distribution, each.arguments, first, last)
+            draws = draw(each.name, self.seed, each.distribution, each.arguments, first, last)
             found[each.name] = draws
         return {name: found[name] for name in self.names}
 
@@ -149,7 +152,7 @@ def _grid(name: str, text: str, number: NumberOf) -> Grid:
 
 def _draw(name: str, distribution: str, text: str, number: NumberOf) -> Draw:
     given = tuple(number(part.strip(), f"--vary {name}") for part in text.split(",") if part.strip())
-    distributions.check(name, distribution, given)
+    check(name, distribution, given)
     return Draw(name, distribution, given)
 
 
@@ -157,3 +160,68 @@ def _checked(grid: Grid) -> Grid:
     if not grid.values or not all(map(math.isfinite, grid.values)):
         raise UsageError(f"--vary {grid.name}: expected finite numbers, got {'none' if not grid.values else 'others'}")
     return grid
+
+
+BLOCK = 4  # numbers that Philox makes at a time
+
+
+def _normal(u: Array, mean: float, deviation: float) -> Array:
+    from scipy.special import ndtri  # pyright: ignore[reportMissingTypeStubs]
+
+    return mean + deviation * ndtri(u)
+
+
+def _triangular(u: Array, low: float, mode: float, high: float) -> Array:
+    rising = low + np.sqrt(u * (high - low) * (mode - low))
+    falling = high - np.sqrt((1 - u) * (high - low) * (high - mode))
+    return np.where(u * (high - low) < mode - low, rising, falling)
+
+
+def _loguniform(u: Array, low: float, high: float) -> Array:
+    return np.exp(np.log(low) + u * (np.log(high) - np.log(low)))
+
+
+# The names of arguments, what they must fulfil, and the inverse distribution function.
+DISTRIBUTIONS: dict[str, tuple[tuple[str, ...], str, Callable[..., bool], Callable[..., Any]]] = {
+    "uniform": (("low", "high"), "low < high", operator.lt, lambda u, low, high: low + u * (high - low)),
+    "loguniform": (("low", "high"), "0 < low < high", lambda low, high: 0 < low < high, _loguniform),
+    "normal": (("mean", "deviation"), "deviation > 0", lambda _, width: width > 0, _normal),
+    "lognormal": (
+        ("log_mean", "log_deviation"),
+        "log_deviation > 0",
+        lambda _, width: width > 0,
+        lambda *given: np.exp(_normal(*given)),
+    ),
+    "exponential": (("mean",), "mean > 0", lambda mean: mean > 0, lambda u, mean: -mean * np.log1p(-u)),
+    "triangular": (
+        ("low", "mode", "high"),
+        "low <= mode <= high and low < high",
+        lambda low, mode, high: low <= mode <= high > low,
+        _triangular,
+    ),
+}
+
+
+def check(name: str, distribution: str, arguments: Sequence[float]) -> None:
+    """Refuse a distribution that there is not, or arguments that do not fit it."""
+    known = DISTRIBUTIONS.get(distribution)
+    if known is None:
+        hint = did_you_mean(distribution, DISTRIBUTIONS)
+        raise UsageError(f"--vary {name}: there is no distribution '{shown(distribution)}'", hint)
+    names, needs, fits, _ = known
+    form = f"{distribution}({', '.join(names)})"
+    if len(arguments) != len(names):
+        raise UsageError(f"--vary {name}: expected {form}, got {counted(len(arguments), 'number')}")
+    if not fits(*arguments):
+        raise UsageError(f"--vary {name}: {form} needs {needs}, got {', '.join(f'{a:g}' for a in arguments)}")
+
+
+def draw(name: str, seed: int, distribution: str, arguments: Sequence[float], first: int, last: int) -> Array:
+    """Draw the numbers of the rows from ``first`` up to ``last``."""
+    key = np.random.SeedSequence([seed, *name.encode()]).generate_state(2, np.uint64)
+    stream = np.random.Philox(key=key)
+    stream.advance(first // BLOCK)
+    skip = first % BLOCK
+    raw = stream.random_raw(skip + last - first)[skip:]
+    uniform = ((raw >> np.uint64(11)) + 0.5) * 2.0**-53  # neither 0 nor 1
+    return DISTRIBUTIONS[distribution][3](uniform, *arguments)

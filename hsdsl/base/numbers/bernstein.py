@@ -1,4 +1,7 @@
-"""Matrices of the Bernstein form on [0, 1]: a polynomial lies between the least and the largest of its coefficients."""
+"""The Bernstein form on [0, 1]: a polynomial lies between the least and the largest of its coefficients.
+
+A curve lies in the convex hull of its coefficients, and is no longer than the polygon through them.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+UNIT = 2.0**-53  # round-off of one operation, relative
 
 
 @cache
@@ -38,3 +42,55 @@ def around_middle(degree: int) -> Array:
             powers = [a + sign * b for a, b in zip([*powers, 0], [0, *powers], strict=True)]
         rows.append([each / 2.0**degree for each in powers])
     return np.array(rows)
+
+
+def restrict(coefficients: Array, begin: Array, end: Array) -> Array:
+    """Write polynomials, powers of s with shape (n, p + 1, w), by powers of u: s = begin + u (end - begin)."""
+    result = coefficients.copy()
+    degree = coefficients.shape[1] - 1
+    at = begin[:, None]
+    for i in range(degree):
+        for m in range(degree - 1, i - 1, -1):
+            result[:, m] += at * result[:, m + 1]
+    width = (end - begin)[:, None]
+    scale = width
+    for k in range(1, degree + 1):
+        result[:, k] *= scale
+        scale = scale * width
+    return result
+
+
+def bernstein(coefficients: Array) -> Array:
+    """Turn powers (n, p + 1, w) into Bernstein coefficients of the same shape."""
+    return from_powers(coefficients.shape[1] - 1).T @ coefficients
+
+
+def degree_raised(coefficients: Array, degree: int) -> Array:
+    """Pad powers with zeros up to a degree."""
+    missing = degree + 1 - coefficients.shape[1]
+    return np.pad(coefficients, ((0, 0), (0, missing), (0, 0))) if missing > 0 else coefficients
+
+
+def largest_norm(coefficients: Array) -> Array:
+    """Bound the Euclidean norm of each polynomial (by powers) on [0, 1] from above, shape (n,); rounded outwards."""
+    norms = np.sqrt(np.max(np.sum(bernstein(coefficients) ** 2, axis=2), axis=1))
+    return norms + _rounding(coefficients)
+
+
+def length(coefficients: Array) -> Array:
+    """Bound the length of each curve on [0, 1] from above by that of its control polygon; rounded outwards."""
+    moving = coefficients.copy()
+    moving[:, 0] = 0.0  # where it begins does not count, nor does that number's rounding
+    steps = np.diff(bernstein(moving), axis=1)
+    return np.sum(np.sqrt(np.sum(steps**2, axis=2)), axis=1) + 2 * coefficients.shape[1] * _rounding(moving)
+
+
+def sizes(coefficients: Array) -> Array:
+    """Add up the norms of each polynomial's coefficients, shape (n,)."""
+    return np.sqrt(np.einsum("nkw,nkw->nk", coefficients, coefficients)).sum(axis=1)
+
+
+def _rounding(coefficients: Array) -> Array:
+    """Bound what rounding does to any of a polynomial's Bernstein coefficients and its norm."""
+    _, count, width = coefficients.shape
+    return (2 * count + width + 8) * UNIT * sizes(coefficients)

@@ -4,6 +4,9 @@ Every result contains every value that the formula takes there, rounding include
 where nothing is rounded. Where it has no value somewhere in a box the result of `ENCLOSED` is everything, so that
 nothing is concluded from it. `RESTRICTED` encloses the values that there are. A sum or a product of numbers that are
 nowhere negative is nowhere negative.
+
+Last come matrices of the Bernstein form on [0, 1]: a polynomial lies between the least and the largest of its
+coefficients there.
 """
 
 from __future__ import annotations

@@ -179,8 +179,11 @@ class Roundoff:
         return self._chosen(max(a.value, b.value), b.value + b.error > a.value + a.error, a, b)
 
     def _chosen(self, value: Number, second: bool, a: Rounded, b: Rounded) -> Rounded:
-        chosen = b if second else a
-        return Rounded(self, value, (chosen.value - value) + chosen.error, max(a.off, b.off))
+        """One of two; the other one counts by how far beyond it that may be."""
+        chosen, other = (b, a) if second else (a, b)
+        reach = other.off - abs((other.value + other.error) - (chosen.value + chosen.error))
+        off = reach if reach > chosen.off else chosen.off
+        return Rounded(self, value, (chosen.value - value) + chosen.error, off)
 
     def below(self, number: Rounded, bound: Rounded, one: Rounded, other: Rounded) -> Rounded:
         """Choose between two numbers, as round-off has it."""

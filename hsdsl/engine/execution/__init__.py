@@ -24,22 +24,23 @@ Numbers are float64, or objects (mpmath) for a run at higher precision.
 """
 
 from hsdsl.engine.execution.ensemble import Ensemble, Failure, TransitionTable
-from hsdsl.engine.execution.parts import (
+from hsdsl.engine.execution.records import (
     COMPLETE,
+    HYBRID_TIME,
     INCOMPLETE,
     LEFT,
     REASONS,
     Arc,
+    Array,
     Kind,
     Point,
     RunWarning,
+    Samples,
     Stop,
     Transition,
     Verdict,
 )
-from hsdsl.engine.execution.run import Execution, OutputFunction
-from hsdsl.engine.execution.samples import HYBRID_TIME, Array, Samples
-from hsdsl.engine.execution.sampling import Evaluated, Sampler, Side
+from hsdsl.engine.execution.run import Evaluated, Execution, OutputFunction, Sampler, Side
 
 __all__ = [
     "COMPLETE", "HYBRID_TIME", "INCOMPLETE", "LEFT", "REASONS", "Arc", "Array", "Ensemble", "Evaluated", "Execution",

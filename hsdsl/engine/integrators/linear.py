@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
+from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.base.sparsity import Elimination, Variation
 
 Matrix = list[list[Number]]
 Vector = list[Number]

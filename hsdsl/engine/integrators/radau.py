@@ -23,8 +23,8 @@ from dataclasses import dataclass
 from functools import cache, partial
 from itertools import islice
 
+from hsdsl.base.graphs import Elimination
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.base.sparsity import Elimination
 from hsdsl.engine.integrators.linear import (
     Matrix,
     Singular,

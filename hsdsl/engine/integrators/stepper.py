@@ -19,8 +19,8 @@ from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar, Literal
 
+from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
-from hsdsl.base.sparsity import Elimination, Variation
 from hsdsl.engine.integrators.linear import Matrix, Vector
 from hsdsl.engine.integrators.tableau import ButcherTableau
 from hsdsl.engine.kernel import Routine

@@ -38,12 +38,13 @@ from math import inf, isfinite
 import numpy as np
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.engine.execution import Array
+from hsdsl.engine.execution import Array, Execution
 from hsdsl.engine.integrators import AUTO, METHODS, ButcherTableau, Method
 from hsdsl.engine.kernel import Kernel
 from hsdsl.engine.simulate import Prepared, Settings
 from hsdsl.engine.simulate.input_segments import Timeline
-from hsdsl.engine.simulate.review import BecomesStiff
+from hsdsl.engine.simulate.plan import Watch
+from hsdsl.engine.simulate.review import Judge
 from hsdsl.mathematics.program import Program
 
 LEAST_STEPS = 1000
@@ -54,7 +55,7 @@ ON = 2.0**-26  # of what the way's first step moves a surface by: a state so nea
 OTHER_STAGES = "dop853"
 SHORT = (20, 30, 40)  # halvings of the run: the lengths of first steps that are tried
 LAST = 16  # of these, at which a mode must be stiff
-MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longer to look at than to run
+MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longer to examine than to run
 
 
 @dataclass(frozen=True)
@@ -105,8 +106,19 @@ def _adaptive(
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 
-def judged(prepared: Prepared, plain: Prepared | None = None) -> Prepared:
-    """The run, which ends with `BecomesStiff` where it comes to a stiff stretch, if `auto` has chosen its method.
+def run(prepared: Prepared, watch: Watch | None, seconds: Mapping[str, float]) -> tuple[Prepared, Execution]:
+    """Run to the end; by the method for stiff modes from the start where the run has come to a stiff stretch."""
+    judge = judge_of(prepared)
+    if judge is not None:
+        made, stiff = prepared.judged(judge, watch, seconds)
+        if made is not None:
+            return prepared, made
+        prepared = instead(prepared, stiff)
+    return prepared, prepared.simulate(watch, seconds)
+
+
+def judge_of(prepared: Prepared, plain: Prepared | None = None) -> Judge | None:
+    """What finds stiff stretches of a run under way; None unless `auto` has chosen an explicit method.
 
     Of a run with more states ``plain`` is the one that the choice was made for: its modes are judged.
     """
@@ -114,8 +126,8 @@ def judged(prepared: Prepared, plain: Prepared | None = None) -> Prepared:
     settings, digits = prepared.settings, prepared.arithmetic.digits
     chosen = settings.tolerance is not None and plain.settings.method_chosen is not None
     if chosen and digits is None and settings.method is not None and not settings.method.implicit:
-        prepared.judges.append(partial(_judge, plain, prepared.program))
-    return prepared
+        return partial(_judge, plain, prepared.program)
+    return None
 
 
 def _judge(
@@ -130,9 +142,9 @@ def _judge(
     if here is None:
         return None
     try:
-        look = _Look(plain.kernel, plain.timeline, index, float(t), np.array(here))
-        decay = look.decay()
-        if decay * float(step) < 1 or look.straight(decay) * decay < APART:
+        flight = _Flight(plain.kernel, plain.timeline, index, float(t), np.array(here))
+        decay = flight.decay()
+        if decay * float(step) < 1 or flight.straight(decay) * decay < APART:
             return None
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
         return None
@@ -141,28 +153,24 @@ def _judge(
 
 def settled(prepared: Prepared) -> Prepared:
     """The run by the method that it ends with: it is made once for that, in constant memory."""
-    judged(prepared)
-    try:
-        if prepared.plan is not None and prepared.judges:
-            prepared.stream(lambda chunk: None)
-    except BecomesStiff as found:
-        return instead(prepared, found)
-    prepared.judges.clear()
-    return prepared
+    judge = judge_of(prepared)
+    if prepared.plan is None or judge is None:
+        return prepared
+    _, stiff = prepared.stream(lambda chunk: None, None, judge)
+    return prepared if stiff is None else instead(prepared, stiff)
 
 
-def instead(prepared: Prepared, found: BecomesStiff) -> Prepared:
+def instead(prepared: Prepared, stiff: Stiffness) -> Prepared:
     """The same run by the method for stiff modes."""
     settings = prepared.settings
     method = METHODS["radau"].for_tolerance(settings.tolerance, prepared.arithmetic)
-    settings = replace(settings, method=method, method_chosen=f"{method.name}: {found}")
-    return prepared.prepared_with(settings)
+    return prepared.prepared_with(replace(settings, method=method, method_chosen=f"{method.name}: {stiff}"))
 
 
 def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]) -> bool:
     """Whether the flow has finite derivatives at the start: the square root of 0 has none, and so no Taylor series."""
     try:
-        return bool(np.isfinite(_Look(kernel, timeline, mode, 0.0, np.array(x, float)).jacobian()).all())
+        return bool(np.isfinite(_Flight(kernel, timeline, mode, 0.0, np.array(x, float)).jacobian()).all())
     except DOMAIN_ERRORS:
         return False
 
@@ -188,7 +196,7 @@ def _near(program: Program, mode: int, x: Sequence[Number]) -> Iterator[tuple[in
 
 
 def _in_mode(program: Program, mode: int, values: Mapping[str, Number]) -> list[float] | None:
-    """The values of a mode's states; None where one is missing, or where there are none or too many to look at."""
+    """The values of a mode's states; None where one is missing, or where there are none or too many to examine."""
     states = program.modes[mode].states
     if not 0 < len(states) <= MOST_STATES or not values.keys() >= set(states):
         return None
@@ -200,25 +208,25 @@ def stiffness(
 ) -> Stiffness | None:
     """The stiffness of a mode near x at a time, None where it is not stiff."""
     try:
-        look = _Look(kernel, timeline, mode, t, np.array(x, float))
+        flight = _Flight(kernel, timeline, mode, t, np.array(x, float))
         stiff = None
         for count in range(STEPS):
-            decay = look.decay()
+            decay = flight.decay()
             if decay * (until - t) < LEAST_STEPS * REACH:
                 return None
-            straight = look.straight(decay)
+            straight = flight.straight(decay)
             if count >= STEPS - LAST and straight * decay < APART:
                 return None
             stiff = Stiffness(name, t, 1 / decay, straight)
-            look.step(min(LENGTH / decay, straight))
-            if look.has_ended():
+            flight.step(min(LENGTH / decay, straight))
+            if flight.has_ended():
                 return None
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
         return None  # unknown
     return stiff
 
 
-class _Look:
+class _Flight:
     """A mode's flow and Jacobian as arrays, with the inputs of a time, and a point on the way from there."""
 
     x: Array
@@ -230,7 +238,7 @@ class _Look:
         self.t, self.x = t, x
         self._scales: Array = np.abs(x)
         self._before = self._mode.surfaces(t, *x.tolist())
-        self._touched: set[int] | None = None
+        self._left: set[int] | None = None
 
     def flow(self, t: float, x: Array) -> Array:
         return np.array(self._flow(t, *x.tolist()), float)
@@ -242,10 +250,10 @@ class _Look:
         """Whether the flight from the start of the way has ended; surfaces that the state was on do not end it."""
         place = self.t, *self.x.tolist()
         now, fires = self._mode.surfaces(*place), self._mode.conditions
-        if self._touched is None:
+        if self._left is None:
             both = enumerate(zip(self._before, now, strict=True))
-            self._touched = {k for k, (a, b) in both if abs(a) <= ON * abs(b - a)}
-        crossed = (k for k, r in enumerate(now) if r > 0 and k not in self._touched)
+            self._left = {k for k, (a, b) in both if abs(a) <= ON * abs(b - a)}
+        crossed = (k for k, r in enumerate(now) if r > 0 and k not in self._left)
         return self.t > self._end or any(k >= len(fires) or fires[k](*place)[0] for k in crossed)
 
     def decay(self) -> float:

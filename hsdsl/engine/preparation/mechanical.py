@@ -12,7 +12,7 @@ from hsdsl.engine.preparation.values import Values
 from hsdsl.engine.simulate.settings import OneStop
 from hsdsl.engine.simulate.stops import show
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import Edge, HybridSystem, Mode
 
 HINT = "use scheme 'relaxed'"

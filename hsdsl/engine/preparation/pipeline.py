@@ -1,8 +1,12 @@
-"""The stages of a model: mathematics, program, kernels, compiled code; each is made when first needed, and once."""
+"""The stages of a model: mathematics, program, kernels, compiled code; each is made when first needed, and once.
+
+From them runs are prepared, for the compiled loop or for the readable one.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,20 +16,30 @@ from typing import TYPE_CHECKING, Any
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits, applied
+from hsdsl.base.names import did_you_mean
 from hsdsl.base.numbers.arithmetic import TIE, Arithmetic, Number
 from hsdsl.base.numbers.roundoff import following, moved
 from hsdsl.base.parts import numbered
 from hsdsl.engine import ahead
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.integrators import METHODS
-from hsdsl.engine.preparation import automatic, engines
+from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import FILE, KEYS, Options, overrides_of, recorded, resolve
-from hsdsl.engine.preparation.settings import arithmetic_of, following_digits, settings_of
-from hsdsl.engine.preparation.values import Values, initial_state, with_parameters
-from hsdsl.engine.preparation.waiting import initial_waits, waiting_apart
+from hsdsl.engine.preparation.values import (
+    Values,
+    arithmetic_of,
+    following_digits,
+    initial_state,
+    initial_waits,
+    settings_of,
+    waiting_apart,
+    with_parameters,
+)
+from hsdsl.engine.runtime import kernel
 from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel
-from hsdsl.engine.simulate import Prepared, Problem, prepare
+from hsdsl.engine.runtime.structures import SCHEMES
+from hsdsl.engine.simulate import Prepared, Problem, Settings, prepare
 from hsdsl.engine.simulate.input_segments import Timeline, UnorderedTimes, make_timeline, samples_of
 from hsdsl.engine.simulate.moving import Start, moved_time
 from hsdsl.language.files import ModelFiles
@@ -35,6 +49,7 @@ from hsdsl.mathematics.program_cache import SLIDING
 
 if TYPE_CHECKING:
     from hsdsl.language.system import HybridSystem
+
 
 # what compiles, runs and reports a model
 _RUNNING = (
@@ -134,7 +149,7 @@ class Pipeline:
         return self._part_of(_elaborated(self._files))
 
     def _part_of(self, system: HybridSystem) -> HybridSystem:
-        from hsdsl.language.elaborate.slicing import only
+        from hsdsl.language.elaborate.derived import only
 
         for names in self._part:
             system = self._with_sliding(system) if names == SLIDING else only(system, names)
@@ -152,7 +167,7 @@ class Pipeline:
         if SLIDING in self._part:
             return self
         files, part = self._files, (*self._part, SLIDING)
-        cached = None if files is None else program_cache.find(files, part)
+        cached = self._kept(part)
         if cached is not None:
             program, files = cached
             whole = len(program.modes) == len(self.program.modes)
@@ -179,6 +194,9 @@ class Pipeline:
         if self._files is not None and _method_exists(program):
             program_cache.keep(self._files, program, part)
 
+    def _kept(self, part: program_cache.Part) -> tuple[Program, ModelFiles] | None:
+        return None if self._files is None else program_cache.find(self._files, part)
+
     @property
     def columns(self) -> list[str]:
         """Names of all states and outputs."""
@@ -197,6 +215,11 @@ class Pipeline:
             in_file["samples"] = "samples"
         states = program.all_states if program.parts else ()
         return resolve({FILE: in_file, "--set": settings or {}, "the call": call or {}}, states)
+
+    def slides(self, arguments: Mapping[str, Any]) -> bool:
+        """Whether a run with these arguments slides on surfaces that two modes press on: its completion is `auto`."""
+        call = {"completion": arguments.get("completion")}
+        return self.resolve(arguments.get("settings"), call).values["completion"].value == "auto"
 
     def values(self, arithmetic: Arithmetic) -> Values:
         """The numbers of the model in an arithmetic, without overrides."""
@@ -219,17 +242,15 @@ class Pipeline:
             raise self._compiled
         return self._compiled
 
-    def prepare(self, arguments: Mapping[str, Any], wait: bool = True) -> Prepared:
-        """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run.
-
-        Unless it may ``wait``, the Python loop makes the run while another process compiles the model.
-        """
+    def prepare(self, arguments: Mapping[str, Any]) -> Prepared:
+        """Prepare a run from the arguments of `Model.simulate`: everything that does not change in a second run."""
         parameters, initial = (overrides_of(arguments, group, self.program) for group in ("parameters", "initial"))
         engine, precision = arguments.get("engine", "auto"), arguments.get("precision")
         options = self.resolve(arguments.get("settings"), {key: arguments.get(key) for key in KEYS})
-        engines.check(engine)
+        if engine not in ENGINES:
+            raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
         if options.values["completion"].value == "auto" and self.sliding is not self:
-            return self.sliding.prepare(arguments, wait)
+            return self.sliding.prepare(arguments)
         values = with_parameters(self.values(arithmetic_of(precision)), parameters)
         with applied(None if self._files is None else self._files.limits):
             settings = settings_of(options, values, recorded(parameters, initial, options))
@@ -246,8 +267,7 @@ class Pipeline:
         settings = following_digits(settings, options, values.kernel.arithmetic)
         start = cache(partial(self._moved, parameters, initial, arithmetic_of(precision), settings.until))
         problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x, waits, start)
-        awaited = None if wait or self._compiled is not None else self.program
-        return prepare(problem, engines.choose(engine, settings, precision, self._compile, awaited))
+        return prepare(problem, choose(engine, settings, precision, self._compile))
 
     def _moved(
         self, parameters: Mapping[str, Any], initial: Mapping[str, Any], arithmetic: Arithmetic, until: Number
@@ -297,7 +317,7 @@ class Pipeline:
     def derived(self, name: tuple[str, ...], make: Callable[[], HybridSystem]) -> Pipeline:
         """The pipeline of a system made of this one, whose program is kept under a name of its own."""
         part = (*self._part, name)
-        cached = None if self._files is None else program_cache.find(self._files, part)
+        cached = self._kept(part)
         if cached is not None:
             program, files = cached
             return Pipeline(None, 0.0, files, program, part)
@@ -307,12 +327,12 @@ class Pipeline:
         """The pipeline of these states and outputs with what they need; this one where that is the whole model."""
         began = time.perf_counter()
         part = (*self._part, names)
-        cached = None if self._files is None else program_cache.find(self._files, part)
+        cached = self._kept(part)
         if cached is not None:
             program, files = cached
             whole = program.left_out == self.program.left_out
             return self if whole else Pipeline(None, self.seconds["load"], files, program, part)
-        from hsdsl.language.elaborate.slicing import left_out, only
+        from hsdsl.language.elaborate.derived import left_out, only
 
         system = only(self.system, names)
         if system is self.system:
@@ -320,3 +340,40 @@ class Pipeline:
             return self
         spent = self.seconds["load"] + time.perf_counter() - began
         return Pipeline(system, spent, self._files, part=part, left_out=left_out(self.system, system))
+
+
+ENGINES = ("auto", "c", "python")
+
+
+def choose(
+    engine: str, settings: Settings, precision: int | None, make: Callable[[], CompiledModel]
+) -> CompiledModel | None:
+    """The compiled model that a run is for, None where the Python loop is to run it.
+
+    By ``auto`` the compiled loop runs where it can serve, else the Python loop.
+
+    Raises UsageError: ``c`` is given and cannot serve.
+    """
+    if engine == "python":
+        return None
+    if precision is not None:
+        why = "it computes with float64 only, and a precision is given"
+    elif settings.scheme not in SCHEMES:
+        why = f"scheme '{settings.scheme}' has no compiled loop"
+    else:
+        try:
+            compiled = make()
+            kernel.runtime()
+            return compiled
+        except NoCompiler as error:
+            why = str(error)
+        if engine == "auto":
+            _warn_once(why)
+    if engine == "c":
+        raise UsageError(f"engine 'c' cannot run this: {why}", "use engine 'python', or 'auto'")
+    return None
+
+
+@cache
+def _warn_once(why: str) -> None:
+    print(f"hsdsl: the Python engine runs this, 50 or more times slower than compiled code: {why}", file=sys.stderr)

@@ -1,6 +1,8 @@
-"""Numbers of a model: parameters with overrides, constants and initial states, of one run or of many instances.
+"""Numbers of a model: parameters with overrides, constants, initial states and settings, of one run or of many.
 
-Each number of an instance is computed by the routine of a single run, and is the same to the last bit.
+Each number of an instance is computed by the routine of a single run, and is the same to the last bit. Settings are
+options evaluated with the parameters that a run has, and checked. Where a run goes on from a `run.final.state`, the
+executions of events that wait beyond the first are numbers of its start.
 """
 
 from __future__ import annotations
@@ -9,19 +11,30 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from operator import index
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
+import numpy as np
+
+from hsdsl.base.defaults import kept_digits, least_relaxation
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import did_you_mean, without_memory
-from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.base.limits import current
+from hsdsl.base.names import did_you_mean, nth_memory, without_memory
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, TIE, Arithmetic, Number, multiprecision
 from hsdsl.base.parts import meant, numbers_of, of_all
 from hsdsl.engine.backends.python import PythonKernel, compile_routines
-from hsdsl.engine.preparation.options import KEYS, names_of
+from hsdsl.engine.execution import Array
+from hsdsl.engine.integrators import AUTO, Method
+from hsdsl.engine.integrators.stepper import State
+from hsdsl.engine.preparation.options import DEFAULT, FILE, KEYS, SCALE, Options, names_of
+from hsdsl.engine.simulate import Settings
 from hsdsl.engine.simulate.stops import show
-from hsdsl.mathematics.program import Program
+from hsdsl.engine.simulate.transitions import Waits
+from hsdsl.mathematics.program import ModeProgram, Program
 
 if TYPE_CHECKING:
     from hsdsl.language.system import HybridSystem
+
 
 _NUMBER = re.compile(r"-?[0-9]{1,30}(\.[0-9]{0,30})?([eE][+-]?[0-9]{1,2})?")  # needs no parsing
 Row = tuple[Number, ...]
@@ -306,3 +319,226 @@ def _following(columns: InstanceTable, given: Mapping[str, Sequence[Number]]) ->
         for instance, why in joined.refused.items():
             columns.refuse(instance, why)
     return numbers
+
+
+EVERY, COUNT = "every=", "count="  # before the time between samples, and before their number, which may do without
+LEAST_DIGITS, MOST_DIGITS = 16, 10_000
+
+
+def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) -> Settings:
+    """The settings of a single run; ``overrides`` are recorded in them.
+
+    Raises UsageError: a number that is out of its range, or a method that cannot serve this model.
+    """
+    arithmetic = values.kernel.arithmetic
+    numbers: dict[str, Any]
+    (numbers,) = setting_columns(options, values.alone())
+    numbers = {"step": None, "tolerance": None} | numbers
+    until, step, tolerance = numbers["until"], numbers["step"], numbers["tolerance"]
+    if step is not None and until > 0 and until + step == until:
+        raise UsageError(f"a step of {step} is lost in the round-off of until = {until}", "take a larger step")
+    check_method(options.method, values.program, arithmetic)
+    if tolerance is not None and tolerance < 2 * arithmetic.unit:
+        kind = f"{arithmetic.digits} digits" if arithmetic.digits else "float64"
+        raise UsageError(
+            f"a tolerance of {float(tolerance):.3g} is below the precision of {kind}, {float(2 * arithmetic.unit):.2g}",
+            "take a larger tolerance, or more digits by --precision",
+        )
+    method = options.method and options.method.for_tolerance(tolerance, arithmetic)
+    return Settings(
+        scheme=options.scheme,
+        completion=options.values["completion"].value,
+        method=method,
+        **numbers,
+        samples=_samples(options, values, until),
+        overrides=overrides,
+        memory=current().memory,
+    )
+
+
+def setting_columns(options: Options, columns: InstanceTable) -> list[dict[str, Any]]:
+    """The numbers of the settings of every instance, by their names in `Settings`."""
+    scales = [name for name in options.values if name.startswith(SCALE)]
+    names = ("until", "max_transitions", "relaxation", options.size, *scales)
+    numbers = zip(*(_column(options, columns, name) for name in names), strict=True)
+    rows: list[dict[str, Any]] = [dict(zip(names, row, strict=True)) for row in numbers]
+    by_default, refused = options.values["relaxation"].origin == DEFAULT, columns.refused
+    for i, row in enumerate(rows):
+        if i not in refused and (why := _refusal(row)):
+            columns.refuse(i, why)
+        if i not in refused:
+            row["max_transitions"] = int(row["max_transitions"])
+            if by_default:
+                row["relaxation"] = least_relaxation(row["relaxation"], row["until"])
+        row["scale"] = {name.removeprefix(SCALE): row.pop(name) for name in scales}
+    return rows
+
+
+def _column(options: Options, columns: InstanceTable, name: str) -> Sequence[Number]:
+    option, program = options.values[name], columns.values.program
+    state = name.removeprefix(SCALE)
+    if state != name and state not in program.all_states:
+        raise UsageError(f"{name}: the model has no state '{state}'", meant(state, program.all_states))
+    if option.origin != FILE:
+        return columns.expression(option.value, name)
+    place = program.scaled_states.index(state) if state != name else 0
+    return [row[place] for row in columns.constant("scale" if state != name else name, name)]
+
+
+def _refusal(row: Mapping[str, Any]) -> str | None:
+    most = row["max_transitions"]
+    if most < 0 or most != int(most):
+        return f"max_transitions must be a whole number, not {most}"
+    for name, number in row.items():
+        if name == "until" and number < 0:
+            return f"until must not be negative, not {number}"
+        if not number > 0 and name not in ("until", "max_transitions"):
+            return f"{name} must be positive, not {number}"
+    return None
+
+
+def following_digits(settings: Settings, options: Options, arithmetic: Arithmetic) -> Settings:
+    """The settings with a default tolerance that follows the digits of the numbers.
+
+    A method of fixed order would need steps shorter by as many orders of magnitude: with one the tolerance stays.
+    """
+    left_open = options.size == "tolerance" and options.values["tolerance"].origin == DEFAULT
+    method = settings.method
+    if not left_open or arithmetic.digits is None or method is None or not method.is_series:
+        return settings
+    tolerance = arithmetic.constant(Fraction(1, 10 ** kept_digits(arithmetic.digits)))
+    return replace(settings, tolerance=tolerance, method=method.for_tolerance(tolerance, arithmetic))
+
+
+def _samples(options: Options, values: Values, until: Number) -> int | tuple[Number, ...] | None:
+    """The times a run is sampled at, or how many equally spaced ones; `every=TIME` are its multiples."""
+    option = options.values.get("samples")
+    if option is None:
+        return None
+    value: Any = option.value
+    given: Any = value.tolist() if type(value) is np.ndarray else value  # pyright: ignore[reportUnknownMemberType]
+    if option.origin == FILE and values.has("sample_times"):
+        return values.constant("sample_times")
+    if option.origin == FILE and values.has("every"):
+        return _multiples(values.constant("every")[0], until, values)
+    if isinstance(given, str) and given.startswith(EVERY):
+        return _multiples(values.number(given.removeprefix(EVERY), "samples"), until, values)
+    given = given.removeprefix(COUNT) if isinstance(given, str) else given
+    if isinstance(given, Sequence) and not isinstance(given, str):
+        return tuple(values.number(t, "samples") for t in given)  # pyright: ignore[reportUnknownVariableType]
+    count = values.constant("sample_count")[0] if option.origin == FILE else values.number(given, "samples")
+    if count != int(count) or count < 2:
+        raise UsageError(f"samples must be a list of times or a whole number of at least 2, not {show(count)}")
+    _check_samples(int(count), values)
+    return int(count)
+
+
+def _multiples(step: Number, until: Number, values: Values) -> tuple[Number, ...]:
+    """The multiples of a time up to the end."""
+    if not step > 0:
+        raise UsageError(f"the time between samples must be positive, not {show(step)}")
+    count = int(until / step * (1 + TIE)) + 1
+    _check_samples(count, values)
+    return tuple(min(k * step, until) for k in range(count))
+
+
+def _check_samples(count: int, values: Values) -> None:
+    width = max(len(mode.states) for mode in values.program.modes)
+    check_memory(current().memory, count, "samples", 1 + width + len(values.program.outputs))
+
+
+def check_method(method: Method | None, program: Program, arithmetic: Arithmetic) -> None:
+    """Refuse a method that lacks digits, and Taylor series of a flow that has none everywhere."""
+    if method is not None and method.digits is not None and (arithmetic.digits or 0) > method.digits:
+        raise UsageError(
+            f"the coefficients of method '{method.name}' are known to {method.digits} digits, too few for a precision "
+            f"of {arithmetic.digits}",
+            f"use method '{AUTO}', whose coefficients are exact",
+        )
+    kinked = next((mode.name for mode in program.flows if mode.tape is None), None)
+    if method is not None and method.is_series and kinked is not None:
+        raise UsageError(
+            f"method '{method.name}' needs smooth flows; that of mode {kinked} has abs, sign, min, max, "
+            "floor or select of a state",
+            f"use method '{AUTO}'",
+        )
+
+
+def whole(value: Any, name: str, least: int) -> int:
+    """An argument that must be a whole number.
+
+    Raises UsageError: it is none, or below ``least``.
+    """
+    if isinstance(value, bool) or not isinstance(value, SupportsIndex):
+        raise UsageError(f"{name} must be a whole number, not {value!r}")
+    if index(value) < least:
+        raise UsageError(f"{name} must be at least {least}, not {value}")
+    return index(value)
+
+
+def check_memory(most: int, count: int, what: str, columns: int) -> None:
+    """Refuse more numbers than ``most`` bytes hold: so many of ``what``, each with so many numbers."""
+    needed = 8 * count * columns
+    if needed > most:
+        sentence = f"{count:.6g} {what} of {columns:.6g} numbers take {needed:.3g} bytes"
+        hint = f"allow more with --limit memory={10 * needed:.0e}"
+        raise UsageError(f"{sentence}, and the limit 'memory' is {most:.3g}", hint)
+
+
+def arithmetic_of(precision: int | None) -> Arithmetic:
+    """The arithmetic of a run: float64, or mpmath's with so many decimal digits."""
+    if precision is None:
+        return FLOAT64
+    if not LEAST_DIGITS <= precision <= MOST_DIGITS:
+        raise UsageError(f"precision is {LEAST_DIGITS} to {MOST_DIGITS} decimal digits, not {precision}")
+    return multiprecision(precision)
+
+
+_NUMBERED = re.compile(r"(.+@.+)\[(\d+)\]")
+
+
+def waiting_apart(program: Program, initial: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Initial values of states, and those of executions that wait behind the first of their event."""
+    known = {mode.states[i] for mode in program.modes for queue in mode.queues for i in queue.values}
+    waits = {name for name in initial if (found := _NUMBERED.fullmatch(name)) and found[1] in known}
+    apart = {name: value for name, value in initial.items() if name not in waits}
+    return apart, {name: initial[name] for name in waits}
+
+
+def initial_waits(
+    values: Values, mode: ModeProgram, x: State, given: Mapping[str, Any]
+) -> dict[str, tuple[Waits, ...]]:
+    """The executions that wait behind the first of each queue where a run starts, in the order in which they are made.
+
+    Raises UsageError: not as many are given as the number that wait says.
+    """
+    rest, found = dict(given), dict[str, tuple[Waits, ...]]()
+    for queue in mode.queues:
+        count = int(x[queue.waiting]) if len(x) == len(mode.states) else 0
+        rows: list[Waits] = []
+        for k in range(2, count + 1):
+            names = [nth_memory(mode.states[i], k) for i in queue.values]
+            if missing := [name for name in names if name not in rest]:
+                raise UsageError(f"{queue.name} is {count}, but no value is given for {missing[0]}")
+            rows.append(tuple(_number(values, name, rest.pop(name)) for name in names))
+        if rows:
+            found[queue.name] = tuple(sorted(rows, key=lambda row: row[0]))
+    if rest:
+        raise UsageError(f"fewer executions wait than have values: {min(rest)} is one too many")
+    return found
+
+
+def check_alone(mode: ModeProgram, start: Array) -> None:
+    """Refuse starts of many instances, by states, in which others than the first of a queue wait.
+
+    Raises UsageError: one does.
+    """
+    for queue in mode.queues if len(start) == len(mode.states) else ():
+        if (start[queue.waiting] > 1).any():
+            raise UsageError(
+                f"{queue.name} is above 1, and many instances start with one execution that waits, or none"
+            )
+
+
+def _number(values: Values, name: str, given: Any) -> Number:
+    return values.number(given, f"initial.{name}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,16 +20,19 @@ from hsdsl.engine.simulate import Prepared
 
 _AS_THEY_ARE = ("model", "digest", "engine", "scheme", "method", "output_names", "seconds", "digits", "title",
                 "overrides")  # fmt: skip
-_MADE_LATER = ("settings", "times", "outputs", "depth")
 
 
 def visible_run(run: Execution, prepared: Prepared) -> Execution:
     """What a run of a system of parts shows; the run itself where there are no parts."""
     if not prepared.program.parts:
         return run
-    view = _View(run, prepared)
-    later: dict[str, Callable[[Any], Any]] = {name: partial(_same, run, name) for name in _MADE_LATER}
-    later |= {
+    view, own = _View(run, prepared), run.noted
+    noted: Callable[[Any], str] | None = None if own is None else lambda _: own(run)
+    later: dict[str, Callable[[Any], Any]] = {
+        "settings": lambda _: run.settings,
+        "times": lambda _: run.times,
+        "outputs": lambda _: run.outputs,
+        "depth": lambda _: run.depth,
         "values": lambda _: view.of_states(run.values),
         "coefficients": lambda _: view.of_states(run.coefficients),
         "arcs": lambda _: view.arcs,
@@ -44,9 +47,8 @@ def visible_run(run: Execution, prepared: Prepared) -> Execution:
         output_function=None if run.output_function is None else view.output_values,
         assessment=view.assessment,
         repetition=view.repetition,
-        noted=run.noted and partial(_noted, run),
+        noted=noted,
         sampler=None,
-        _made=run.made,
     )
 
 
@@ -56,14 +58,6 @@ def with_output_function(run: Execution, prepared: Prepared) -> Execution:
     if prepared.program.parts:
         function = _View(replace(run, output_function=function), prepared).output_values
     return replace(run, output_function=function)
-
-
-def _same(run: Execution, name: str, _: Any) -> Any:
-    return getattr(run, name)
-
-
-def _noted(run: Execution, _: Execution) -> str:
-    return run.noted(run) if run.noted else ""
 
 
 class _View:

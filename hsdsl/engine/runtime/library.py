@@ -12,11 +12,11 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 from hsdsl.base import limits
-from hsdsl.base.cache import can_keep, find, is_made, keep, key_of, making
+from hsdsl.base.cache import find, keep, key_of, making
 from hsdsl.base.names import shown
 from hsdsl.engine.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
 from hsdsl.mathematics.program import Program
@@ -108,31 +108,6 @@ def _loaded(path: Path) -> ctypes.CDLL | None:
         return ctypes.CDLL(str(path))
     except OSError:
         return None  # made for something else than what runs now: it is made again
-
-
-def is_missing(content: str) -> bool:
-    """Whether the library of ``content`` is not there, and no process makes it.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    key = _key(content, find_compiler())
-    return not _shipped(content).exists() and find(KIND, key) is None and not is_made(KIND, key)
-
-
-def can_be_kept(content: str) -> bool:
-    """Whether the library of ``content`` will be there for other processes.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    return can_keep(KIND, _key(content, find_compiler()))
-
-
-def made_elsewhere(content: str) -> Callable[[], bool]:
-    """A function that says whether another process compiles ``content`` at the moment.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    return partial(is_made, KIND, _key(content, find_compiler()))
 
 
 def _key(content: str, compiler: Compiler) -> str:
@@ -236,30 +211,6 @@ def compiled(program: Program) -> ctypes.CDLL:
         return load(_content(program), SYMBOL, lambda: _source(program))
     except TooSlow as error:
         raise NoCompiler(f"{error}; {_longest(program)}") from None
-
-
-def keep_program(program: Program) -> bool:
-    """Compile a program and the loop for the cache, unless they are there or other processes do; False if it is closed.
-
-    Raises NoCompiler: there is no compiler, or it fails.
-    """
-    content = _content(program)
-    if not can_be_kept(content):
-        return False
-    if is_missing(content):
-        compiled(program)
-    if is_missing(LOOP[0]):
-        loop()
-    return True
-
-
-def under_way(program: Program) -> Callable[[], bool]:
-    """A function that says whether other processes compile a program, or the loop, at the moment.
-
-    Raises NoCompiler: there is no compiler.
-    """
-    looks = made_elsewhere(_content(program)), made_elsewhere(LOOP[0])
-    return lambda: any(look() for look in looks)
 
 
 def _content(program: Program) -> str:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 from hsdsl.engine.execution import Array, Execution, Stop
@@ -16,9 +17,9 @@ from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.moving import finer_settings
 from hsdsl.engine.simulate.output_buffers import Sink
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.recorder import OutOfRoom, Overtaken, Progress, Recorder, Room
+from hsdsl.engine.simulate.recorder import OutOfRoom, Progress, Recorder, Room
 from hsdsl.engine.simulate.result import about, from_recorder, written
-from hsdsl.engine.simulate.review import Judge, Review
+from hsdsl.engine.simulate.review import Judge, Judged, Review
 from hsdsl.engine.simulate.run import ModeState, Run
 from hsdsl.engine.simulate.settings import Settings
 from hsdsl.engine.simulate.stops import interrupted, memory
@@ -50,95 +51,71 @@ SCHEMES: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
     "paoli-schatzman": _paoli_schatzman,
 }
 Watch = Callable[[Progress], None]
-
-
-@dataclass
-class Pending:
-    """Compiled code that other processes make; when they do no more, it is taken, and there may be none."""
-
-    under_way: Callable[[], bool]
-    take: Callable[[], CompiledModel | None]
-    compiled: CompiledModel | None = None
-    taken: bool = False
-
-    def overtakes(self) -> bool:
-        """Whether the code is there."""
-        if not self.taken and not self.under_way():
-            self.compiled, self.taken = self.take(), True
-        return self.compiled is not None
+Streamed = tuple[Stop, CompiledRun, dict[str, Array]]
 
 
 @dataclass(frozen=True, eq=False)
 class Prepared(Problem):
-    """A problem ready to run any number of times.
-
-    ``plan`` is given where the compiled loop runs it, ``pending`` where the Python loop does until that can.
-    """
+    """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it."""
 
     plan: CompiledPlan | None
-    pending: Pending | None = None
-    judges: list[Judge] = field(default_factory=list[Judge])  # of the method, until a run has passed
     finer: dict[int, Prepared] = field(default_factory=dict[int, "Prepared"])  # by the rows of the run
 
-    def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] | None = None) -> Execution:
+    def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] = MappingProxyType({})) -> Execution:
         """Run to the end.
 
         ``watch`` is given something to look at before the run starts, so that another thread can show how far it is.
         An interrupt (Ctrl-C) ends the run with what was computed. ``seconds`` is what was spent before.
-
-        Raises BecomesStiff: by the judge.
         """
-        spent, began = dict(seconds or {}), time.perf_counter()
+        return self._run(None, watch, dict(seconds))
+
+    def judged(
+        self, judge: Judge, watch: Watch | None = None, seconds: Mapping[str, float] = MappingProxyType({})
+    ) -> tuple[Execution | None, Any]:
+        """Run to the end, or to a finding of the judge: the run, or None and the finding."""
         try:
-            if self.plan is not None:
-                execution = self._by_compiled_loop(self.plan, watch, spent)
-            else:
-                execution = self._by_python_loop(self._fresh(), watch, spent)
-        except Overtaken:
-            faster = self.prepared_with(self.settings)
-            faster.judges.extend(self.judges)
-            spent["compile"] = spent.get("compile", 0.0) + time.perf_counter() - began
-            return faster.simulate(watch, spent)
-        self.judges.clear()
-        return execution
+            return self._run(Review(judge), watch, dict(seconds)), None
+        except Judged as found:
+            return None, found.finding
 
-    def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Stop, CompiledRun, dict[str, Array]]:
-        """Run the compiled loop to the end and hand over what it writes, chunk by chunk.
+    def stream(self, sink: Sink, watch: Watch | None = None, judge: Judge | None = None) -> tuple[Streamed | None, Any]:
+        """Run the compiled loop to the end, or to a finding of the judge, and hand over what it writes, by chunks.
 
-        Returns why it stopped, the run with what it has noted, and the last chunk. Raises BecomesStiff: by the judge.
+        Returns why it stopped, the run with what it has noted, and the last chunk; or None and the finding.
         """
         assert self.plan is not None
-        under_way = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), self._review())
+        run = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), judge and Review(judge))
         if watch is not None:
-            watch(under_way)
-        stop, rest = under_way.stream(sink)
-        return stop, under_way, rest
+            watch(run)
+        try:
+            stop, rest = run.stream(sink)
+        except Judged as found:
+            return None, found.finding
+        return (stop, run, rest), None
 
     def again(self, execution: Execution) -> Execution:
         """Make the same run finer."""
         rows = len(execution.times)  # fewer where a run was interrupted
         if rows not in self.finer:
             settings = finer_settings(self.settings, execution, self.arithmetic)
-            self.finer[rows] = prepare(self.moved_with(settings), self._code)
+            self.finer[rows] = prepare(self.moved_with(settings), self.plan and self.plan.compiled)
         return self.finer[rows].simulate()
 
     def prepared_with(self, settings: Settings) -> Prepared:
         """Prepare the same problem with other settings."""
-        return prepare(self.with_settings(settings), self._code)
-
-    @property
-    def _code(self) -> CompiledModel | Pending | None:
-        return self.pending if self.plan is None else self.plan.compiled
+        return prepare(self.with_settings(settings), self.plan and self.plan.compiled)
 
     @cached_property
     def _about(self) -> dict[str, Any]:
         assert self.plan is not None
         return about(self.plan.problem, "c")
 
-    def _review(self) -> Review | None:
-        return Review(self.judges[0]) if self.judges else None
+    def _run(self, review: Review | None, watch: Watch | None, spent: dict[str, float]) -> Execution:
+        if self.plan is not None:
+            return self._by_compiled_loop(self.plan, review, watch, spent)
+        return self._by_python_loop(self._fresh(review), watch, spent)
 
-    def _fresh(self) -> Run:
+    def _fresh(self, review: Review | None) -> Run:
         """A run that nothing is recorded of yet."""
         settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
         degree = settings.method.degree if settings.method else 0
@@ -147,8 +124,7 @@ class Prepared(Problem):
         modes = tuple(mode.name for mode in program.modes)
         recorder = Recorder(
             arithmetic, settings.until, degree, outputs, room,
-            scales=dict(settings.scale), modes=modes, review=self._review(),
-            overtaken=self.pending and self.pending.overtakes,
+            scales=dict(settings.scale), modes=modes, review=review,
         )  # fmt: skip
         problem = vars(self.with_settings(settings))
         tails = Tails(self.waits)
@@ -174,8 +150,10 @@ class Prepared(Problem):
         spent["simulate"] = time.perf_counter() - began
         return from_recorder(run, stop, spent, self.again)
 
-    def _by_compiled_loop(self, plan: CompiledPlan, watch: Watch | None, spent: dict[str, float]) -> Execution:
-        under_way = CompiledRun(plan, plan.workspaces.take(), self._review())
+    def _by_compiled_loop(
+        self, plan: CompiledPlan, review: Review | None, watch: Watch | None, spent: dict[str, float]
+    ) -> Execution:
+        under_way = CompiledRun(plan, plan.workspaces.take(), review)
         if watch is not None:
             watch(under_way)
         began = time.perf_counter()
@@ -186,8 +164,6 @@ class Prepared(Problem):
         return written(self._about, under_way, whole, stop, spent, self.again)
 
 
-def prepare(problem: Problem, code: CompiledModel | Pending | None = None) -> Prepared:
-    """Prepare a run by compiled code; by the Python loop where there is none, or until it is there."""
-    pending = code if isinstance(code, Pending) and not code.overtakes() else None
-    compiled = code.compiled if isinstance(code, Pending) else code
-    return Prepared(**vars(problem), plan=compiled and CompiledPlan(problem, compiled), pending=pending)
+def prepare(problem: Problem, code: CompiledModel | None = None) -> Prepared:
+    """Prepare a run by compiled code, by the Python loop where there is none."""
+    return Prepared(**vars(problem), plan=code and CompiledPlan(problem, code))

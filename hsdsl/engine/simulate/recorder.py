@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from math import inf
 from typing import Any, Literal, Protocol
 
@@ -23,10 +24,6 @@ FLOAT, DIGITS, TUPLE = 32, 250, 56  # bytes of a number in a list: a float, one 
 
 class OutOfRoom(Exception):
     """The run keeps as many rows as it may."""
-
-
-class Overtaken(Exception):
-    """Compiled code makes the run in less time."""
 
 
 @dataclass
@@ -127,22 +124,15 @@ class Recorder:
     scales: dict[str, Number] = field(default_factory=dict[str, Number])  # of states in the arcs before the last
     modes: tuple[str, ...] = ()  # of the model, in order
     review: Review | None = None
-    overtaken: Callable[[], bool] | None = None  # by compiled code: looked at with every row
 
     def __post_init__(self) -> None:
-        self.room.due, self.room.look = self._due(), self._look
+        if self.review is not None:
+            self.room.due, self.room.look = self.review.due, partial(self._look, self.review)
 
-    def _due(self) -> float:
-        reviewed = inf if self.review is None else self.review.due
-        return reviewed if self.overtaken is None else min(reviewed, self.room.taken + 1)
-
-    def _look(self) -> float:
-        if self.overtaken is not None and self.overtaken():
-            raise Overtaken
-        if self.review is not None and self.room.taken == self.review.due:
-            arc = self.arcs[-1]
-            self.review.look(self.modes.index(arc.mode), arc.times[-1], arc.values[-1])
-        return self._due()
+    def _look(self, review: Review) -> float:
+        arc = self.arcs[-1]
+        review.look(self.modes.index(arc.mode), arc.times[-1], arc.values[-1])
+        return review.due
 
     @property
     def now(self) -> Number:

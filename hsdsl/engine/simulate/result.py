@@ -101,7 +101,7 @@ def _assessment_of(
 
 @cache
 def _of_compiled() -> Callable[..., Verdict]:
-    from hsdsl.engine.simulate.verdict.compiled_verdict import assess_compiled  # not every run needs one
+    from hsdsl.engine.simulate.verdict import assess_compiled  # not every run needs one
 
     return assess_compiled
 

@@ -10,12 +10,16 @@ from hsdsl.base.numbers.arithmetic import Number
 
 FIRST = 2048  # rows
 
-# whether the mode of this number is stiff at a time and a state, for steps of this mean length
+# what is found of the mode of this number at a time and a state, for steps of this mean length; None lets the run go on
 Judge = Callable[[int, Number, Sequence[Number], Number], Any]
 
 
-class BecomesStiff(Exception):
-    """The judge's finding, which ends the run: a method for stiff modes should make it from its start."""
+class Judged(Exception):
+    """The judge's ``finding``, which ends the run; `hsdsl.engine.simulate.plan` hands it to who has asked."""
+
+    def __init__(self, finding: Any) -> None:
+        super().__init__(finding)
+        self.finding = finding
 
 
 @dataclass
@@ -33,9 +37,9 @@ class Review:
     def look(self, mode: int, t: Number, x: Sequence[Number]) -> None:
         """Judge the last of the rows that are due.
 
-        Raises BecomesStiff.
+        Raises Judged: there is a finding.
         """
         finding = self.judge(mode, t, x, (t - self._time) / (self.due - self._rows))
         if finding is not None:
-            raise BecomesStiff(finding)
+            raise Judged(finding)
         self._rows, self._time, self.due = self.due, t, 2 * self.due + FIRST

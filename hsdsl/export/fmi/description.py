@@ -10,8 +10,8 @@ from typing import Any
 from xml.etree import ElementTree
 
 from hsdsl import __version__
-from hsdsl.analysis.lint.units import unit as units
-from hsdsl.analysis.lint.units.unit import UnknownUnit, read
+from hsdsl.analysis.lint import units
+from hsdsl.analysis.lint.units import UnknownUnit, read
 from hsdsl.base.names import visible
 from hsdsl.export.fmi.archive import token_of
 from hsdsl.export.fmi.variables import Unit, Variable, dependencies, initial_dependencies

@@ -22,7 +22,7 @@ from hsdsl.engine.backends.c.source import constant_bodies, routine_functions
 from hsdsl.engine.backends.python import compile_routines
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.simulate import Problem
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
+from hsdsl.engine.simulate.verdict.run_view import RunView
 from hsdsl.export import Modes
 from hsdsl.export.c.problem import array, comment, function, string
 from hsdsl.export.source import Source, derived, drivable, structural, used_by, with_sources
@@ -157,7 +157,7 @@ def _listed(modes: Sequence[str], first: int) -> str:
 def nominals(source: Source) -> list[float]:
     """A size for each state: as given, else the power of two that it stays below in the run that is exported."""
     run, given = source.model.simulate(**source.arguments), source.problem.settings.scale
-    sizes = RecordedRun(source.problem, run).sizes
+    sizes = RunView(source.problem, run).sizes
     own = {name: size for name, size in sizes.items() if not _is_roundoff(run, name)}
     return [float(given.get(name) or _power(own.get(name, 0.0))) for name in continuous(source)]
 

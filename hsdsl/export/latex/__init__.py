@@ -11,10 +11,10 @@ from hsdsl.export.automata import Pairs, document_of, pairs, texts
 from hsdsl.export.latex.automata import of_parts
 from hsdsl.export.latex.mathematics import Mathematics, equations, escaped, stacked
 from hsdsl.export.source import Source
-from hsdsl.language.elaborate.functions import named_functions
+from hsdsl.language.elaborate.definitions import named_functions
 from hsdsl.language.expression.plain import names_in
 from hsdsl.language.expression.scope import state
-from hsdsl.language.schema import ModeDocument, ModelDocument, TransitionDocument
+from hsdsl.language.schema.documents import ModeDocument, ModelDocument, TransitionDocument
 from hsdsl.language.system import Edge, HybridSystem, Mode
 
 _HEAD = r"""\documentclass[11pt,a4paper]{article}

@@ -17,8 +17,8 @@ from hsdsl.base.functions import below
 from hsdsl.base.names import visible
 from hsdsl.base.numbers import decimals
 from hsdsl.language.expression import plain
+from hsdsl.language.expression.algebra import cases
 from hsdsl.language.expression.scope import Function, symbol
-from hsdsl.language.expression.selection import cases
 
 _SIGNS = {">=": r"\geq", "<=": r"\leq", ">": ">", "<": "<"}
 _PARTS = re.compile(r"(.*?[^0-9])([0-9]+)")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from hsdsl.base.names import visible, without_memory
-from hsdsl.base.written import event_text, written_edges, written_modes
+from hsdsl.base.parts import event_text, written_edges, written_modes
 from hsdsl.export.automata import Automata, automata_of, pairs
 from hsdsl.export.source import Source
 from hsdsl.language.system import Edge, Mode

@@ -38,7 +38,7 @@ def with_scene(source: Source) -> Source:
     system = source.system
     if not system.scene:
         return source
-    from hsdsl.language.elaborate.scene import scene_as_outputs
+    from hsdsl.language.elaborate.modes import scene_as_outputs
     from hsdsl.mathematics.lower import lower
 
     system = scene_as_outputs(system)

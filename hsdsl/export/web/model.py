@@ -15,7 +15,7 @@ import numpy as np
 
 from hsdsl.analysis.plot.style import colours
 from hsdsl.analysis.report import words
-from hsdsl.analysis.report.alike import condensed
+from hsdsl.analysis.report.words import condensed
 from hsdsl.base import limits
 from hsdsl.base.defaults import DEFAULTS
 from hsdsl.base.graphs import closure

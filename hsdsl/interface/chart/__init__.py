@@ -4,29 +4,28 @@
 warm and in turns, and compares each result with the model's exact execution.
 
 ==============  ============================================================================================
-`scene`         a model with its numbers, its exact execution, and the times at which errors are taken
+`scene`         a model with its numbers, its exact execution, and when errors are taken; results of tools there
 `plan`          the runs: our own and those of peers
-`judge`         the error of a result, and whether it is the right execution
-`outcome`       one word for a run: right, wrong, warned of, stopped, refused, without an end
+`outcome`       the error of a result, whether it is the right execution, and what came of a run in one word
 `stopwatch`     warm times, in turns
 `rows`          rows as text and as CSV; `picture` draws them
 `peers`         other tools, each run as its own documentation shows
-`translation`   a model's mathematics as functions for another tool
-`by_arcs`       the loop around a tool that stops at events
+`translation`   a model's mathematics as functions for another tool, and the loop around one that stops at events
+`stability`     maps of outcomes over a plane of settings and numbers
 ==============  ============================================================================================
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import nan
 
-from hsdsl.interface.chart.judge import Judgement, judge, rho
+from hsdsl.interface.chart.outcome import Judgement, judge, rho
 from hsdsl.interface.chart.peers import PEERS
 from hsdsl.interface.chart.plan import ENGINES, SCHEMES, TOLERANCES, own_runs, peer_runs
-from hsdsl.interface.chart.result import Attempt, Refused, Result
 from hsdsl.interface.chart.rows import Row
-from hsdsl.interface.chart.scene import Scene
+from hsdsl.interface.chart.scene import Attempt, Refused, Result, Scene
 from hsdsl.interface.chart.stopwatch import Deadline, race
 
 __all__ = ["ENGINES", "PEERS", "SCHEMES", "TOLERANCES", "Judgement", "Refused", "Row", "Scene", "work_precision"]
@@ -85,7 +84,7 @@ def work_precision(
         if with_rho and result.execution is not None:
             watch(f"rho of {attempt.tool.label} {attempt.setting}")
             with Deadline(patience):  # the search itself looks at the time between its parts only
-                judgement = judgement.with_rho(rho(scene, result.execution, patience / 2))
+                judgement = replace(judgement, rho=rho(scene, result.execution, patience / 2))
         return judgement
 
     done = race(attempts, judged, rounds, patience, watch)

@@ -1,15 +1,16 @@
-"""The outcome of a run in one word: right, wrong, warned of, stopped, refused, or without an end."""
+"""What came of a run against the exact execution: in one word, its error, and whether it is right."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 
 import numpy as np
 
-from hsdsl.engine.execution import Verdict
-from hsdsl.interface.chart.result import Array, Result
-from hsdsl.interface.chart.scene import Scene, sampled
+from hsdsl.analysis.metrics import Interval
+from hsdsl.engine.execution import Execution, Verdict
+from hsdsl.interface.chart.scene import Array, Result, Scene, sampled
+from hsdsl.interface.model.distances import distance_of_runs
 
 FINER = 8  # points of the exact curve from sample to sample
 SAME_END = 1e-9  # of the run: ends nearer than this are one
@@ -139,3 +140,53 @@ def _difference(
     if not result.problem and missing:
         return "values", "no finite value where the exact execution has one"
     return ("values", f"an error of {error:.2g} of the span") if error > within.state else ("", "")
+
+
+OUT_OF_SCALE = 0.1  # of the span of the states: a larger error is a wrong result
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """``verdict`` is ``right``, ``wrong`` (another execution) or ``failed`` (no end); ``why`` is the reason.
+
+    ``error`` is the largest difference of any state over the samples clear of jumps at which both have it, NaN where
+    no sample compares.
+    """
+
+    verdict: str
+    error: float
+    transitions: int | None
+    why: str = ""
+    rho: Interval | None = None
+
+
+def judge(scene: Scene, result: Result) -> Judgement:
+    """Compare a result with the exact execution."""
+    clear = scene.clear
+    apart = np.abs(scene.exact_values[clear] - result.values[clear])
+    error = float(np.nanmax(np.where(np.isfinite(apart), apart, nan), initial=-inf))
+    error = nan if error == -inf else error
+    if result.problem:
+        return Judgement("failed", error, result.transitions, result.problem)
+    others = int(np.count_nonzero(scene.exact_modes[clear] != result.modes[clear]))
+    why = _wrong(scene, result, error, others)
+    return Judgement("wrong" if why else "right", error, result.transitions, why)
+
+
+def _wrong(scene: Scene, result: Result, error: float, others: int) -> str:
+    fewest, most = scene.countable
+    if result.transitions is not None and not fewest <= result.transitions <= most:
+        return f"{result.transitions} transitions instead of {most:g}"
+    if others:
+        return f"another mode at {others} of {len(scene.grid)} samples"
+    span = float(np.nanmax(scene.exact_values) - np.nanmin(scene.exact_values)) or 1.0
+    if not error <= OUT_OF_SCALE * span:
+        return f"an error of {error:.2g} where the states span {span:.2g}"
+    return ""
+
+
+def rho(scene: Scene, execution: Execution, seconds: float) -> Interval | None:
+    """Return the distance to the exact execution; None where the run does not get to its end."""
+    if not execution.stop.complete:
+        return None
+    return distance_of_runs(execution, scene.exact, model=scene.model, seconds=seconds).interval

@@ -11,8 +11,7 @@ from hsdsl.engine.execution import Execution
 from hsdsl.engine.integrators import METHODS
 from hsdsl.engine.simulate import SCHEMES as ALL_SCHEMES
 from hsdsl.interface.chart.peers import prepare
-from hsdsl.interface.chart.result import Attempt, Refused, Result, Tool
-from hsdsl.interface.chart.scene import Scene
+from hsdsl.interface.chart.scene import Attempt, Refused, Result, Scene, Tool
 
 SCHEMES = tuple(name for name in ALL_SCHEMES if name != "paoli-schatzman")
 ENGINES = ("c", "python")

@@ -10,8 +10,8 @@ from math import isfinite
 from typing import Any
 
 from hsdsl.analysis.report.words import aligned
-from hsdsl.interface.chart.judge import Judgement
-from hsdsl.interface.chart.result import Attempt
+from hsdsl.interface.chart.outcome import Judgement
+from hsdsl.interface.chart.scene import Attempt
 from hsdsl.interface.chart.stopwatch import Timed
 
 COLUMNS: tuple[str, ...] = (

@@ -17,7 +17,7 @@ from threading import Event, Lock, Thread, main_thread
 from types import TracebackType
 from typing import Any, TypeVar
 
-from hsdsl.interface.chart.result import Attempt, Result
+from hsdsl.interface.chart.scene import Attempt, Result
 
 Judged = TypeVar("Judged")
 ENOUGH = 0.02  # seconds of an attempt in one turn: a shorter one is repeated

@@ -1,22 +1,155 @@
-"""Arguments and options that several commands share, alone and in groups, with their completions."""
+"""Arguments and options that several commands share: alone, in groups, their values and their completions in shells."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from enum import StrEnum
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
-from typer import Argument, Option
+from typer import Argument, Context, Option
 
 from hsdsl.analysis.metrics.table import CURVE_METRICS
-from hsdsl.base.limits import NUMBERS, applied
-from hsdsl.base.numbers.decimals import number_of
+from hsdsl.base.errors import CODES, WARNINGS, ModelError, UsageError
+from hsdsl.base.limits import DEFAULT, NUMBERS, Limits, applied
+from hsdsl.base.names import did_you_mean, without_memory
 from hsdsl.engine.integrators import METHODS
-from hsdsl.interface.cli.completion import model_files, override_names
 from hsdsl.interface.cli.console import errors_reported, print_json
-from hsdsl.interface.cli.texts import limit_options
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def model_files(incomplete: str) -> list[str]:
+    """Model files, and folders; the content of a folder where it is the only candidate."""
+    while True:
+        head, _, start = incomplete.rpartition("/")
+        prefix = incomplete[: len(incomplete) - len(start)]
+        folder = Path(head or ("/" if prefix else "."))
+        candidates = sorted(
+            f"{prefix}{path.name}{'/' * path.is_dir()}"
+            for path in (folder.iterdir() if folder.is_dir() else ())
+            if path.name.startswith(start) and (path.is_dir() or path.suffix in SUFFIXES)
+            if start.startswith(".") or not path.name.startswith(".")
+        )
+        if len(candidates) != 1 or not candidates[0].endswith("/"):
+            return candidates
+        incomplete = candidates[0]
+
+
+def override_names(ctx: Context, incomplete: str) -> list[str]:
+    """Names for ``--set`` of the model on the command line, with ``=``."""
+    try:  # the option has no value yet, so the words before it are not assigned to arguments
+        return [f"{name}=" for word in ctx.args[:1] for name in _names(Path(word)) if name.startswith(incomplete)]
+    except (ModelError, UsageError):
+        return []
+
+
+def _names(path: Path) -> Iterator[str]:
+    from hsdsl.engine.preparation.options import KEYS
+    from hsdsl.interface.model import load
+
+    program = load(path).program
+    states = without_memory(program.modes[program.initial_mode].states)
+    yield from program.parameters
+    yield from ("initial.mode", *(f"initial.{state}" for state in states))
+    yield from (f"experiment.{name}" for name in KEYS)
+
+
+def rule_codes(incomplete: str) -> list[tuple[str, str]]:
+    """Codes of lint rules with their titles, after the last comma."""
+    listed, comma, _ = incomplete.rpartition(",")
+    return [(f"{listed}{comma}{code}", title) for code, title in codes() if code not in {*CODES, *WARNINGS}]
+
+
+def codes() -> list[tuple[str, str]]:
+    """Codes of errors, warnings of runs and lint rules with their titles."""
+    from hsdsl.analysis.lint.pages import titles
+
+    return list(titles().items())
+
+
+STATE = "state or output "
+PICTURES = (".png", ".svg")
+
+
+def limit_options(folders: Sequence[Path], pairs: Sequence[str]) -> Limits:
+    """Read ``--allow-path`` and ``--limit``.
+
+    Raises UsageError: no such limit, no positive number, or no such folder.
+    """
+    numbers: dict[str, Any] = {}
+    for pair in pairs:
+        name, _, value = (part.strip() for part in pair.partition("="))
+        if name not in NUMBERS:
+            raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
+        try:
+            numbers[name] = type(getattr(DEFAULT, name))(float(value))
+        except (ValueError, OverflowError):
+            raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--allow-path {folder}: there is no such folder")
+    return Limits(**numbers, folders=tuple(folders))
+
+
+def names_of(text: str | None) -> list[str]:
+    """The names in a text with commas between them."""
+    return [part.strip() for part in (text or "").split(",") if part.strip()]
+
+
+def known_names(
+    text: str | None, known: Sequence[str], name: str, kind: str = "", inputs: Sequence[str] = ()
+) -> tuple[str, ...]:
+    """The names in a text with commas between them; ``kind`` says in an error what they name, and ``inputs`` do not.
+
+    Raises UsageError: one of them is not known.
+    """
+    names = names_of(text)
+    for each in names:
+        if each not in known:
+            given = f"it is an input: write outputs: {{{each}: {each}}}" if each in inputs else None
+            raise UsageError(f"{name}: there is no {kind}'{each}'", given or did_you_mean(each, known))
+    return tuple(names)
+
+
+def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, str]] | None:
+    """Read ``--phase``; None where it is left out.
+
+    Raises UsageError: no pair, or no such state or output.
+    """
+    pairs: list[tuple[str, str]] = []
+    for text in texts or ():
+        if text.count(",") != 1 or len(names_of(text)) != 2:
+            raise UsageError(f"--phase: expected two names with a comma between them, got '{text}'")
+        first, second = known_names(text, known, "--phase", STATE)
+        pairs.append((first, second))
+    return pairs or None
+
+
+def check_target(
+    path: Path | None,
+    option: str,
+    suffixes: Sequence[str] = PICTURES,
+    others: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> None:
+    """Refuse a file that could not be written before a long run, not after it.
+
+    ``others`` has the suffixes of the files that other options of the verb write.
+    """
+    if path is None:
+        return
+    if path.suffix.lower() not in suffixes:
+        known = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
+        meant = next((name for name, own in others.items() if path.suffix.lower() in own), None)
+        raise UsageError(f"{option} {path}: the name must end in {known}", meant and f"{meant} {path} writes that")
+    if not path.parent.is_dir():
+        raise UsageError(f"{option} {path}: there is no folder {path.parent}")
+    if path.suffix.lower() == ".parquet":
+        from hsdsl.engine.execution.records import optional
+
+        optional("pyarrow", f"{option} {path}")
 
 
 def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | None = None) -> Any:
@@ -79,12 +212,6 @@ class Experiment(NamedTuple):
         """Arguments of `Model.simulate`."""
         given = self._asdict()
         return values_of(given.pop("overrides")) | with_method(given) | more
-
-    def in_numbers(self) -> bool:
-        """Whether all values are numbers, and no expressions of the model's parameters."""
-        given = [self.until, self.step, self.tolerance, self.relaxation]
-        texts = [text for text in given if text] + [o.partition("=")[2] for o in self.overrides or ()]
-        return None not in map(number_of, texts)
 
 
 class Located(NamedTuple):

@@ -1,4 +1,4 @@
-"""``hsdsl run``: simulate a model, summarise the run, and save it."""
+"""``hsdsl run``: simulate a model, summarise the run, save it and draw it."""
 
 from __future__ import annotations
 
@@ -12,17 +12,26 @@ from typer import Exit, Option
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
 from hsdsl.base.names import visible
-from hsdsl.base.progress import running
-from hsdsl.engine import ahead
+from hsdsl.base.progress import counted, running
 from hsdsl.interface.cli.console import progress, say
-from hsdsl.interface.cli.options import Answer, EngineName, Experiment, Model, Phases, option
-from hsdsl.interface.cli.shown import needed, shown_of, write_film
-from hsdsl.interface.cli.texts import PICTURES, STATE, check_target, known_names, pairs_of
-from hsdsl.language.files import ModelFiles, read_bytes
+from hsdsl.interface.cli.options import (
+    PICTURES,
+    STATE,
+    Answer,
+    EngineName,
+    Experiment,
+    Model,
+    Phases,
+    check_target,
+    known_names,
+    option,
+    pairs_of,
+)
 
 if TYPE_CHECKING:
     from hsdsl.engine.execution import Execution, Stop
     from hsdsl.interface.model.stream import Streamed
+
 
 STOPPED = 3
 PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
@@ -62,20 +71,19 @@ def run(
     """Simulate a model and summarise what happened."""
     with answer.reporting():
         _check_files(out, plot, animate, outputs)
-        text = read_bytes(model)
-        if outputs is None and plot is None and animate is None and experiment.in_numbers():
-            ahead.begin(ModelFiles.read(model, None, text), engine != "python" and precision is None)
         from hsdsl.interface.model import load
 
-        loaded = load(model, text=text)
+        loaded = load(model)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
-        shown = shown_of(loaded, names, pairs_of(phase, loaded.columns), plot, animate, speed)
+        shown = {"columns": names, "phases": pairs_of(phase, loaded.columns)}
+        _check_drawn(loaded, shown["phases"], plot, animate, speed)
+        needed = names and [*names, *(name for pair in shown["phases"] or () for name in pair)]
         result: Any
         with progress(answer.hidden) as show:
             settings["watch"] = show and partial(running, show)
             if every is None:
-                result = loaded.simulate(**settings, outputs=needed(shown))
+                result = loaded.simulate(**settings, outputs=needed)
             elif out is None or plot or animate or estimate or precision is not None:
                 raise UsageError(EVERY_ALONE)
             else:
@@ -84,7 +92,10 @@ def run(
         if every is None:
             _answer(loaded, result, shown, estimate, explain, out, plot, settings["parameters"], answer)
             if animate is not None:
-                write_film(loaded, animate, speed, settings, answer.hidden)
+                with progress(answer.hidden) as show:
+                    settings["watch"] = None
+                    loaded.animate(animate, speed=speed, progress=counted(show, "frames"), **settings)
+                say(f"wrote {animate}")
         else:
             _answer_streamed(result, model, answer)
     _leave(result.stop, answer)
@@ -191,3 +202,16 @@ def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
         },
         "seconds": {"simulate": run.seconds},
     }
+
+
+def _check_drawn(loaded: Any, pairs: Any, plot: Path | None, animate: Path | None, speed: float | None) -> None:
+    """Refuse before the run what cannot be drawn of it."""
+    if pairs is not None and plot is None:
+        raise UsageError("--phase is for a picture: give --plot FILE too")
+    if speed is not None and animate is None:
+        raise UsageError("--speed is of a film: give --animate FILE too")
+    if animate is not None:
+        from hsdsl.analysis.plot.animation import check
+
+        check(animate)
+        loaded.check_scene()

@@ -10,10 +10,8 @@ from typer import Argument, Exit
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
-from hsdsl.interface.cli.completion import model_files
 from hsdsl.interface.cli.console import progress, say
-from hsdsl.interface.cli.options import Answer, EngineName, Experiment, option
-from hsdsl.interface.cli.texts import check_target, names_of
+from hsdsl.interface.cli.options import Answer, EngineName, Experiment, check_target, model_files, names_of, option
 
 Model = Annotated[
     Path | None, Argument(metavar="[MODEL]", help="The model file; none with --show.", autocompletion=model_files)

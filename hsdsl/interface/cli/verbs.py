@@ -1,4 +1,4 @@
-"""The commands by name, each in a module of its name that is imported when the command runs."""
+"""The commands by name, each in a module that is imported when the command runs."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED, WORD
 from hsdsl.base.names import did_you_mean, visible
 
-VERBS = (
-    "run", "plot", "sweep", "validate", "lint", "explain", "distance", "sensitivity", "orbit", "fit", "chart",
-    "stability", "complete", "export", "import", "schema", "doctor",
-)  # fmt: skip
+VERBS = {  # with their modules
+    "run": "run", "plot": "runs", "sweep": "sweep", "validate": "check", "lint": "check", "explain": "check",
+    "distance": "runs", "sensitivity": "derivatives", "orbit": "derivatives", "fit": "derivatives", "chart": "charts",
+    "stability": "charts", "complete": "convert", "export": "convert", "import": "convert", "schema": "convert",
+    "doctor": "doctor",
+}  # fmt: skip
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
 _UNKNOWN = re.compile(r"No such (?:option|command):? '?([\w-]+)")
 _EXTRA = re.compile(r"unexpected extra argument\S* \((.+)\)")
@@ -51,7 +53,8 @@ def command(verb: str) -> Any:
     """Import a command."""
     single = Typer(add_completion=False, rich_markup_mode=None)
     name = f"{verb}_" if iskeyword(verb) else verb
-    single.command(verb, context_settings=SETTINGS)(flat(getattr(import_module(f"hsdsl.interface.cli.{verb}"), name)))
+    module = import_module(f"hsdsl.interface.cli.{VERBS[verb]}")
+    single.command(verb, context_settings=SETTINGS)(flat(getattr(module, name)))
     return get_command(single)
 
 

@@ -1,20 +1,20 @@
 """A model: from a YAML file to executions, ensembles and analyses.
 
 ================= ==========================================================================================
-``model``         :func:`load`, :func:`loads`, :class:`Model`: a model with its operations
-``call_cache``    runs prepared for the last calls
-``ensemble``      many instances, from an ``ensemble_request``; ``workers`` runs them
-``sweeps``        many instances into a dataset; ``chunk_work`` makes a part of it
-``stream``        a run that writes its rows to a file
+``model``         :func:`load`, :func:`loads`, :class:`Model`: what can be done with a model
+``runs``          its runs, and what all that is made of runs needs; ``call_cache`` has runs of the last calls
+``ensemble``      many instances
+``sweeps``        many instances into a dataset, chunk by chunk
+``stream``        a run whose rows go to a file while it goes on
 ``estimate``      a run's error, by a finer run
-``distances``     distances of runs; ``points`` those of points
+``distances``     distances of runs and of points
 ``differentiate`` sensitivities; ``fits`` to measurements
-``orbits``        periodic orbits; ``nearby`` orbital stability by nearby runs
+``orbits``        periodic orbits, and orbital stability by runs from nearby
 ``guards``        levels for pictures
 ================= ==========================================================================================
 """
 
 from hsdsl.engine.preparation.options import split_overrides
-from hsdsl.interface.model.model import Model, load, loads
+from hsdsl.interface.model.model import Model, distance, load, loads
 
-__all__ = ["Model", "load", "loads", "split_overrides"]
+__all__ = ["Model", "distance", "load", "loads", "split_overrides"]

@@ -8,8 +8,7 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.analysis.sensitivity.result import Sensitivity, Setting, Slopes
-from hsdsl.analysis.sensitivity.state_names import ERROR, SPAN, UNIT
-from hsdsl.analysis.sensitivity.targets import Target, listed, targets
+from hsdsl.analysis.sensitivity.targets import ERROR, SPAN, UNIT, Target, listed, targets
 from hsdsl.base.defaults import DEFAULT_TOLERANCE
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
@@ -20,12 +19,17 @@ from hsdsl.engine.integrators import AUTO, METHODS
 from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.settings import arithmetic_of
-from hsdsl.engine.preparation.values import Values, initial_layout, initial_state, start_of_parts, with_parameters
+from hsdsl.engine.preparation.values import (
+    Values,
+    arithmetic_of,
+    initial_layout,
+    initial_state,
+    start_of_parts,
+    with_parameters,
+)
 from hsdsl.engine.preparation.visible import visible_run
-from hsdsl.engine.simulate.review import BecomesStiff
 from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
-from hsdsl.engine.simulate.verdict.agreement import SAFE
+from hsdsl.engine.simulate.verdict.errors import SAFE
 from hsdsl.interface.model.call_cache import CallCache, call_key
 from hsdsl.mathematics.program import Program
 
@@ -56,12 +60,13 @@ class Differentiator:
         firsts = tuple(map(str, firsts))
         key = call_key(*wrt, None, *firsts, None, *arguments, None, *arguments.values())
         ready = self._prepared.find(key)
-        if ready is None:
+        if ready is not None:
+            run = ready.setting.augmented.simulate()
+        else:
             check_arguments(arguments, "a sensitivity", REFUSED)
-            ready = self._ready(wrt, arguments, firsts)
-        ready, run = self._run(ready)
+            ready, run = self._run(self._ready(wrt, arguments, firsts))
         if not ready.entries and (run.stop.reason == "not_finite" or run.enters_beyond):
-            ready, run = self._run(self._with_entries(ready))
+            ready, run = self._run(self._prepare(replace(ready, entries=True)))
         self._prepared.keep(key, ready)
         return Sensitivity(
             ready.labels, run, ready.setting, firsts, lambda first: self.sensitivity(wrt, arguments, first)
@@ -101,15 +106,14 @@ class Differentiator:
 
     def _run(self, ready: _Ready) -> tuple[_Ready, Execution]:
         """Run the augmented system; by the method for stiff modes where it comes to a stiff stretch."""
-        try:
-            return ready, ready.setting.augmented.simulate()
-        except BecomesStiff as found:
-            plain = automatic.instead(ready.setting.plain, found)
+        judge = automatic.judge_of(ready.setting.augmented, ready.setting.plain)
+        if judge is not None:
+            run, stiff = ready.setting.augmented.judged(judge)
+            if run is not None:
+                return ready, run
+            plain = automatic.instead(ready.setting.plain, stiff)
             ready = self._prepare(replace(ready, setting=replace(ready.setting, plain=plain)))
-            return ready, ready.setting.augmented.simulate()
-
-    def _with_entries(self, ready: _Ready) -> _Ready:
-        return self._prepare(replace(ready, entries=True))
+        return ready, ready.setting.augmented.simulate()
 
     def _prepare(self, ready: _Ready) -> _Ready:
         """Prepare the run of the augmented system with the numbers and the method of the plain one."""
@@ -141,7 +145,6 @@ class Differentiator:
             "precision": ready.call.get("precision"),
         }
         prepared = self._written(ready, method).prepare(arguments)
-        automatic.judged(prepared, ready.setting.plain)
         return replace(ready, setting=replace(ready.setting, augmented=prepared))
 
     def _written(self, ready: _Ready, method: str) -> Pipeline:

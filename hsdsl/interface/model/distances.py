@@ -1,4 +1,4 @@
-"""``hsdsl.distance``: between two runs, or between two points of a model.
+"""Distances between two runs, or between two points of a model, written as ``free x=13 v=5``.
 
 A run names its model; that is read again where its space is needed.
 """
@@ -6,61 +6,37 @@ A run names its model; that is read again where its space is needed.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.analysis.metrics.budget import Budget
+import numpy as np
+
 from hsdsl.analysis.metrics.curves import CurveDistance
-from hsdsl.analysis.metrics.interval import Interval
-from hsdsl.analysis.metrics.points import SpaceMetric, SpacePoint
-from hsdsl.analysis.metrics.table import CurvePair, between, check_same_model
-from hsdsl.base.calls import checks_arguments
+from hsdsl.analysis.metrics.geometry import TOLERANCE, Space
+from hsdsl.analysis.metrics.interval import Budget
+from hsdsl.analysis.metrics.points import PointDistance, SpaceMetric, SpacePoint, coordinates
+from hsdsl.analysis.metrics.points import distance as shortest
+from hsdsl.analysis.metrics.space import make_space
+from hsdsl.analysis.metrics.table import CURVE_METRICS, POINT_METRICS, CurvePair, between, check_same_model
+from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import called
+from hsdsl.base.names import called, checks_arguments, did_you_mean
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import parameters_of
+from hsdsl.engine.preparation.pipeline import pipeline_of
+from hsdsl.engine.preparation.values import Values
 from hsdsl.engine.simulate.stops import show
+from hsdsl.interface.model.runs import Runs
 
 if TYPE_CHECKING:
     from hsdsl.engine.preparation.values import Values
-    from hsdsl.interface.model import Model
+
 
 SECONDS = 60.0  # that a search may take, by default
-
-
-def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> Interval:
-    """Return the distance of two runs, or of two points of a model.
-
-    Parameters
-    ----------
-    first : Execution, Model or path
-        The first of two runs of a model; or a model, for the distance of two of its points.
-    second : Execution, str or SpacePoint
-        The second run; or a point, as ``"free x=13 v=5"``.
-    third : str or SpacePoint, optional
-        The second point.
-    **arguments
-        Further arguments of :func:`distance_of_runs`, or of :meth:`hsdsl.Model.distance`.
-
-    The interval contains the distance; :meth:`hsdsl.Model.distance` also returns the path, and :func:`distance_of_runs`
-    the time.
-
-    Raises UsageError: the arguments are neither, or do not fit the model.
-    """
-    from hsdsl.interface.model import Model, load
-
-    if isinstance(first, Execution) and isinstance(second, Execution) and third is None:
-        return distance_of_runs(first, second, **arguments).interval
-    model = load(first) if isinstance(first, (str, os.PathLike)) else first  # pyright: ignore[reportUnknownArgumentType]
-    if isinstance(model, Model) and isinstance(second, (str, SpacePoint)) and isinstance(third, (str, SpacePoint)):
-        return model.distance(second, third, **arguments).interval
-    raise UsageError(
-        "distance takes two runs, or a model and two of its points",
-        'for example distance(run, other) or distance(model, "free x=13 v=5", "free x=13 v=-4")',
-    )
 
 
 @checks_arguments
@@ -70,7 +46,7 @@ def distance_of_runs(
     metric: str = "rho",
     *,
     relaxation: Any = None,
-    model: Model | str | os.PathLike[str] | None = None,
+    model: Runs | str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     coordinates: Sequence[str] | None = None,
     hops: int | None = None,
@@ -119,7 +95,7 @@ def plot_distance(
     path: str | os.PathLike[str],
     *,
     relaxation: Any = None,
-    model: Model | str | os.PathLike[str] | None = None,
+    model: Runs | str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     hops: int | None = None,
     seconds: float = SECONDS,
@@ -128,7 +104,7 @@ def plot_distance(
 
     After ``seconds`` the remaining times have wide bounds.
     """
-    from hsdsl.analysis.metrics.profile import profiles
+    from hsdsl.analysis.metrics.labelled import profiles
     from hsdsl.analysis.plot.analyses import plot_over_time
 
     check_same_model(run, other)
@@ -159,7 +135,7 @@ class _RunSpace:
 
     run: Execution
     other: Execution
-    model: Model | str | os.PathLike[str] | None
+    model: Runs | str | os.PathLike[str] | None
     parameters: Mapping[str, Any] | None
     budget: Budget
     hops: int | None
@@ -168,9 +144,8 @@ class _RunSpace:
     @cached_property
     def values(self) -> Values:
         from hsdsl.engine.preparation.values import with_parameters
-        from hsdsl.interface.model import Model
 
-        model = self.model if isinstance(self.model, Model) else _load(self.model, self.run)
+        model = self.model if isinstance(self.model, Runs) else _load(self.model, self.run)
         if model.system.digest != self.run.digest:
             raise UsageError(
                 f"{model.system.path} is not the model that the run is of, or was edited since",
@@ -193,7 +168,7 @@ class _RunSpace:
 
     def space(self, depth: float | None) -> SpaceMetric:
         from hsdsl.analysis.metrics.space import make_space
-        from hsdsl.language.elaborate.product import flat_part
+        from hsdsl.language.elaborate.derived import flat_part
 
         visited = dict.fromkeys(arc.mode for run in (self.run, self.other) for arc in run.arcs)
         system = flat_part(self.values.system, visited)
@@ -211,11 +186,102 @@ def _differences(first: Values, second: Values) -> str:
     return f"The runs have different parameters ({', '.join(apart)}): guards and resets are those of the first."
 
 
-def _load(path: str | os.PathLike[str] | None, run: Execution) -> Model:
-    from hsdsl.interface.model import load
-
+def _load(path: str | os.PathLike[str] | None, run: Execution) -> Runs:
     if path is None and not os.path.exists(run.model):
         raise UsageError(
             f"the run is of {run.model}, which is not there: the distance needs the model", "give it as model="
         )
-    return load(run.model if path is None else path)
+    return Runs(pipeline_of(run.model if path is None else path, None))
+
+
+_ASSIGNMENT = re.compile(r"([^\W\d]\w*)\s*=(?!=)")
+
+
+def distance_of_points(
+    values: Values,
+    p: str | SpacePoint,
+    q: str | SpacePoint,
+    metric: str,
+    relaxation: Any,
+    hops: int | None,
+    budget: Budget,
+    plot: str | os.PathLike[str] | None = None,
+) -> PointDistance:
+    """Return how far apart two points of a model's space are; see `Model.distance`."""
+    if metric not in POINT_METRICS and metric in CURVE_METRICS:
+        raise UsageError(
+            f"'{metric}' is a distance between runs, not between points",
+            f"between points: {' or '.join(POINT_METRICS)}",
+        )
+    if metric not in POINT_METRICS:
+        raise UsageError(f"there is no distance '{metric}' between points", did_you_mean(metric, POINT_METRICS))
+    if metric == "quotient" and relaxation is not None:
+        raise UsageError("the quotient distance has no relaxation", "ask for the metric 'relaxed'")
+    depth = None if metric == "quotient" else _relaxation(values, relaxation)
+    check_hops(hops)
+    space = make_space(values.system, [float(v) for v in values.parameters])
+    start, end = (read_point(values, space, given) if isinstance(given, str) else given for given in (p, q))
+    try:
+        _check_inside(space, start, end)
+        budget.start()
+        result = shortest(space, start, end, depth, hops, budget)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
+    if plot is not None:
+        from hsdsl.analysis.plot.analyses import plot_path
+
+        plot_path(plot, space, result.path, f"Shortest path, length {result.interval.upper:.6g}")
+    return result
+
+
+def read_point(values: Values, space: Space, text: str) -> SpacePoint:
+    """Read ``MODE STATE=VALUE ...``; values are expressions of parameters.
+
+    Raises UsageError: it is not of that form, names no mode, or does not give every state once.
+    """
+    mode, _, rest = text.strip().partition(" ")
+    if mode not in space.modes:
+        raise UsageError(f"'{text}': the model has no mode '{mode}'", did_you_mean(mode, space.modes))
+    names = space.domains[space.mode_index(mode)].coordinates
+    example = "for example: " + " ".join([mode, *(f"{name}=0" for name in names)])
+    before, *parts = _ASSIGNMENT.split(rest)
+    if before.strip():
+        raise UsageError(f"'{text}': after the mode come its states, as NAME=VALUE", example)
+    given: dict[str, str] = {}
+    for name, value in zip(parts[::2], parts[1::2], strict=True):
+        if name in given:
+            raise UsageError(f"'{text}': {name} is given twice")
+        if name == "t" and not space.timed:
+            sentence = "time is no coordinate here, since no guard or reset depends on it"
+            raise UsageError(f"'{text}': {sentence}", "leave out t")
+        if name not in names:
+            raise UsageError(f"'{text}': mode {mode} has no state '{name}'", did_you_mean(name, names))
+        given[name] = value.strip().rstrip(",").strip()
+    if missing := [name for name in names if name not in given]:
+        raise UsageError(f"'{text}': no value is given for {', '.join(missing)}", example)
+    numbers = [float(values.number(given[name], f"{mode} {name}")) for name in names]
+    return SpacePoint(mode, tuple(numbers[:-1]), t=numbers[-1]) if space.timed else SpacePoint(mode, tuple(numbers))
+
+
+def _relaxation(values: Values, given: Any) -> float:
+    if given is None and values.has("relaxation"):
+        given = values.constant("relaxation")[0]
+    elif given is None:
+        given = least_relaxation(float(DEFAULTS["relaxation"]), float(values.constant("until")[0]))
+    number = float(values.number(given, "relaxation"))
+    if number <= 0:
+        raise UsageError(f"relaxation must be positive, not {show(number)}")
+    return number
+
+
+def _check_inside(space: Space, *places: SpacePoint) -> None:
+    """Refuse points that are in no domain: the distance is between points of the space."""
+    points = [coordinates(space, place) for place in places]
+    size = max(float(np.linalg.norm(x)) for _, x in points)
+    for place, (mode, x) in zip(places, points, strict=True):
+        domain = space.domains[mode]
+        excess, text = domain.excess(x, size)
+        if not excess <= TOLERANCE:
+            at = ", ".join(f"{n} = {show(v)}" for n, v in zip(domain.coordinates, x.tolist(), strict=True))
+            beyond = f"where `{text}` has no value" if np.isnan(excess) else f"beyond `{text}`"
+            raise UsageError(f"{at} is not in the domain of mode {place.mode}: it is {beyond}")

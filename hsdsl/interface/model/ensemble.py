@@ -1,34 +1,47 @@
-"""``Model.ensemble``: many runs of one model, by the compiled loop on all cores, or one after the other in Python."""
+"""``Model.ensemble``: many runs of one model, by the compiled loop on all cores, or one after the other in Python.
+
+A request has what every run shares, the arrays that vary, and the times of samples; prepared, it has numbers of every
+instance. What runs keep is put into arrays.
+"""
 
 from __future__ import annotations
 
 import math
+import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
-from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.engine.execution import Array, Ensemble, Execution, TransitionTable
-from hsdsl.engine.execution.sampling import columns_by_name
+from hsdsl.base.names import INITIAL
+from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
+from hsdsl.engine.execution import Array, Ensemble, Execution, Transition, TransitionTable
+from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation import automatic
-from hsdsl.engine.preparation.options import KEYS, Options
-from hsdsl.engine.preparation.settings import check_memory, setting_columns, whole
-from hsdsl.engine.preparation.values import InstanceTable, evaluate_parameters, initial_columns, start_of_parts
-from hsdsl.engine.preparation.waiting import check_alone
+from hsdsl.engine.preparation.options import KEYS, Options, check_arguments, overrides_of
+from hsdsl.engine.preparation.values import (
+    InstanceTable,
+    check_alone,
+    check_memory,
+    evaluate_parameters,
+    initial_columns,
+    setting_columns,
+    start_of_parts,
+    whole,
+)
+from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate import Prepared, Settings
 from hsdsl.engine.simulate.columns import StateLayouts
-from hsdsl.engine.simulate.ensemble import Instances, Kept
-from hsdsl.interface.model.ensemble_request import EnsembleRequest
-from hsdsl.interface.model.workers import ArrayRecorder, Progress, run_compiled, run_in_turn
+from hsdsl.engine.simulate.compiled import CompiledPlan
+from hsdsl.engine.simulate.ensemble import CompiledEnsemble, Instances, Kept, Logged
 
 if TYPE_CHECKING:
-    from hsdsl.interface.model import Model
+    from hsdsl.interface.model.runs import Runs
 
 
 class NothingToRunError(UsageError):
@@ -40,27 +53,9 @@ class NothingToRunError(UsageError):
 
 
 @dataclass(frozen=True, eq=False)
-class SingleRuns:
-    """Single runs of the instances of an ensemble, by their places."""
-
-    model: Model
-    request: EnsembleRequest
-
-    def __call__(self, place: tuple[int, ...]) -> Execution:
-        """Run one."""
-        shape = self.request.shape
-        return self.numbered(int(np.ravel_multi_index(place, shape)) if shape else 0)
-
-    def numbered(self, index: int) -> Execution:
-        """Run the one with this number."""
-        return self.model.simulate(**self.request.single(index))
-
-
-@dataclass(frozen=True, eq=False)
 class PreparedEnsemble:
     """An ensemble that can start: ``places`` are the numbers of the instances that are not refused."""
 
-    model: Model
     request: EnsembleRequest
     base: Prepared
     columns: InstanceTable
@@ -73,11 +68,6 @@ class PreparedEnsemble:
         """The states of all modes."""
         return tuple(dict.fromkeys(name for kind in self.kinds for name in kind))
 
-    @property
-    def again(self) -> SingleRuns:
-        """Single runs."""
-        return SingleRuns(self.model, self.request)
-
     def run(self, threads: int, progress: Progress | None) -> Ensemble:
         """Run all instances."""
         began, program = time.perf_counter(), self.base.program
@@ -86,13 +76,60 @@ class PreparedEnsemble:
         crossings, logs = self.request.transition_times, self.request.every_transition
         kept = Kept(len(self.places), width, len(program.outputs), len(self.names), samples, crossings, logs)
         if plan is None:
-            again = [partial(self.again.numbered, place) for place in self.places]
-            run_in_turn(again, ArrayRecorder(self.instances, kept, self.names, self.kinds, program), progress)
+            with suppress(KeyboardInterrupt):  # those that are done are kept
+                self._run_in_turn(kept, progress)
         else:
             run_compiled(plan, self.instances, kept, self.names, threads, progress)
         for i in np.flatnonzero(kept.stop == "stuck").tolist():  # only the message of such a run tells its reason
-            kept.stop[i] = self.again.numbered(self.places[i]).stop.reason
+            kept.stop[i] = self.request.run(self.places[i]).stop.reason
         return self._ensemble(kept, time.perf_counter() - began)
+
+    def _run_in_turn(self, kept: Kept, progress: Progress | None) -> None:
+        """Run all instances one after the other, and record each."""
+        for i, place in enumerate(self.places):
+            execution = self.request.run(place)
+            if execution.stop.reason == "interrupted":
+                return
+            self._record(kept, i, execution)
+            if progress is not None:
+                progress(i + 1, len(self.places))
+
+    def _record(self, kept: Kept, i: int, execution: Execution) -> None:
+        """Record the execution of an instance."""
+        last, program = execution.arcs[-1], self.base.program
+        n, end = len(last.states), execution.times[-1]
+        kept.stop[i] = execution.stop.reason
+        modes = program.mode_names
+        kept.noted[i] = execution.noted(execution) if execution.noted else ""
+        kept.mode[i] = modes.index(last.mode)
+        kept.kind[i] = self.kinds.index(last.states)
+        kept.transitions[i] = len(execution.transitions)
+        kept.ended[i] = end
+        kept.final[i, :n] = execution.values[-1, :n]
+        kept.outputs[i] = execution.outputs[-1]
+        times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
+        kept.crossed[i, : len(times)] = times
+        inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
+        samples = execution.sample(self.instances.time[i][inside])
+        for k, name in enumerate(self.names):
+            if name in samples.states:
+                kept.states[i, k, inside] = samples[name]
+        kept.results[i, inside] = samples.output_columns
+        if kept.logs:
+            kept.log[i] = self._logged(kept.width, execution.transitions)
+
+    def _logged(self, width: int, transitions: Sequence[Transition]) -> Logged:
+        nan, program = float("nan"), self.base.program
+        table = np.zeros(len(transitions), structures.TRANSITION)
+        before, after = np.full((2, len(transitions), width), nan)
+        for k, made in enumerate(transitions):
+            source = program.mode_names.index(made.source)
+            edges = [edge.name for edge in program.modes[source].edges]
+            resumed = nan if made.resumed is None else made.resumed
+            table[k] = made.time, resumed, source, edges.index(made.edge), made.entry, len(made.alternatives)
+            before[k, : len(made.before)] = list(made.before.values())
+            after[k, : len(made.after or ())] = list((made.after or {}).values())
+        return table, before, after
 
     def _ensemble(self, kept: Kept, seconds: float) -> Ensemble:
         shape, settings = self.request.shape, self.base.settings
@@ -133,7 +170,7 @@ class PreparedEnsemble:
             seconds={"simulate": seconds},
             refusals={tuple(map(int, np.unravel_index(k, shape))): why for k, why in refused},
             transition_table=self._transition_table(kept, placed(kept.transitions, 0)) if kept.logs else None,
-            again=self.again,
+            again=self.request,
             title=self.base.program.title,
         )
 
@@ -152,12 +189,13 @@ class PreparedEnsemble:
         return TransitionTable(first, made["time"], known[number], made["entry"] != 0, before, after)
 
 
-def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble:
+def prepare_ensemble(request: EnsembleRequest) -> PreparedEnsemble:
     """Compute the numbers of every instance.
 
     Raises UsageError: none of them can be run.
     """
-    pipeline, call = model.pipeline, request.call
+    model, call = request.model, request.call
+    pipeline = model.pipeline
     values = pipeline.values(FLOAT64)
     columns = InstanceTable(values, [()] * math.prod(request.shape))
     evaluate_parameters(columns, call["parameters"], request.arrays(initial=False))
@@ -187,7 +225,7 @@ def prepare_ensemble(model: Model, request: EnsembleRequest) -> PreparedEnsemble
         time=times()[places],
     )
     kinds = list(StateLayouts(model.program, base.states).kinds)
-    return PreparedEnsemble(model, request, base, columns, places, instances, kinds)
+    return PreparedEnsemble(request, base, columns, places, instances, kinds)
 
 
 def _settings(columns: InstanceTable, base: Settings, options: Options) -> dict[int, Settings]:
@@ -200,7 +238,7 @@ def _settings(columns: InstanceTable, base: Settings, options: Options) -> dict[
 
 
 def run_ensemble(
-    model: Model,
+    model: Runs,
     call: dict[str, Any],
     samples: Any,
     transition_times: int,
@@ -211,6 +249,174 @@ def run_ensemble(
     """Run many instances of a model; see `Model.ensemble`."""
     if threads is not None:
         whole(threads, "threads", least=1)
-    request = EnsembleRequest.of(model.program, call, samples, transition_times, every_transition)
-    completion = model.resolve(call.get("settings"), {"completion": call.get("completion")}).values["completion"].value
-    return prepare_ensemble(model.sliding if completion == "auto" else model, request).run(threads or cores(), progress)
+    model = model.sliding if model.pipeline.slides(call) else model
+    request = EnsembleRequest.of(model, call, samples, transition_times, every_transition)
+    return prepare_ensemble(request).run(threads or cores(), progress)
+
+
+@dataclass(frozen=True, eq=False)
+class EnsembleRequest:
+    """The arguments of an ensemble: ``call`` has those of every single run, and ``varied`` the arrays by name.
+
+    The arrays are flattened; ``shape`` is their common shape. Called with a place there it runs that instance.
+    """
+
+    model: Runs
+    call: dict[str, Any]
+    varied: dict[str, Array]
+    shape: tuple[int, ...]
+    samples: int | Array | str | None
+    transition_times: int
+    every_transition: bool = False
+
+    @staticmethod
+    def of(
+        model: Runs, call: dict[str, Any], samples: Any, transition_times: int, every_transition: bool = False
+    ) -> EnsembleRequest:
+        """Sort the arguments.
+
+        Raises UsageError: an argument that a run does not take, a value that is no number, no expression and no array
+        of numbers, arrays without a common shape, or samples that are neither a number of them nor times.
+        """
+        check_arguments(call, "an ensemble", without=("samples", "precision"))
+        whole(transition_times, "transition_times", least=0)
+        varied: dict[str, Array] = {}
+        for group, prefix in (("parameters", ""), ("initial", INITIAL)):
+            given = overrides_of(call, group, model.program)
+            varied |= {prefix + name: _array(name, value) for name, value in given.items() if np.ndim(value) > 0}
+            call = call | {group: {name: _plain(value) for name, value in given.items() if np.ndim(value) == 0}}
+        try:
+            common = np.broadcast_arrays(*varied.values())
+        except ValueError:
+            shapes = ", ".join(f"{name} has {array.shape}" for name, array in varied.items())
+            several = [name for name, array in varied.items() if array.ndim == 1]
+            hint = f"for every combination give columns and rows: {several[0]} as array[:, None]" if several else None
+            raise UsageError(f"the arrays of an ensemble have no common shape: {shapes}", hint) from None
+        shape = common[0].shape if common else ()
+        flat = {name: array.reshape(-1) for name, array in zip(varied, common, strict=True)}
+        return EnsembleRequest(model, call, flat, shape, _samples(samples), transition_times, every_transition)
+
+    def arrays(self, initial: bool) -> dict[str, list[float]]:
+        """The columns of initial states or of parameters, by name."""
+        columns = ((name, array) for name, array in self.varied.items() if name.startswith(INITIAL) == initial)
+        return {name.removeprefix(INITIAL): array.tolist() for name, array in columns}
+
+    def __call__(self, place: tuple[int, ...]) -> Execution:
+        """Run the instance at a place."""
+        return self.run(int(np.ravel_multi_index(place, self.shape)) if self.shape else 0)
+
+    def run(self, index: int) -> Execution:
+        """Run the instance with this number by itself."""
+        return self.model.simulate(**self.single(index))
+
+    def single(self, index: int) -> dict[str, Any]:
+        """The arguments of the single run of one instance."""
+        own = {"parameters": dict(self.call["parameters"]), "initial": dict(self.call["initial"])}
+        for name, array in self.varied.items():
+            group = "initial" if name.startswith(INITIAL) else "parameters"
+            own[group][name.removeprefix(INITIAL)] = float(array[index])
+        return self.call | own
+
+    def times(self, until: Array, table: InstanceTable) -> tuple[int, Callable[[], Array]]:
+        """The number of samples of an instance, and what makes their times, shape (instances, samples).
+
+        Behind the last sample of an instance that has fewer than others is not-a-number.
+        """
+        given = self.samples
+        if given is None:
+            return 0, lambda: np.empty((len(until), 0))
+        if isinstance(given, str):
+            return _times_every(np.array(table.expression(given, "the time between samples"), float), until)
+        if isinstance(given, int):
+            return given, lambda: _evenly(until, given)
+        return len(given), lambda: np.tile(given, (len(until), 1))
+
+
+def _evenly(until: Array, count: int) -> Array:
+    return np.concatenate([until[:, None] * np.arange(count - 1) / (count - 1), until[:, None]], axis=1)
+
+
+def _times_every(step: Array, until: Array) -> tuple[int, Callable[[], Array]]:
+    """Multiples of each instance's step up to its end."""
+    if wrong := [value for value in step[np.isfinite(until)].tolist() if not value > 0]:
+        raise UsageError(f"the time between samples must be positive, not {wrong[0]:g}")
+    with np.errstate(invalid="ignore"):
+        count = np.floor(until / step * (1 + TIE)) + 1
+    most = int(min(np.nanmax(count, initial=0), 2**62))
+
+    def times() -> Array:
+        times = step[:, None] * np.arange(most)
+        return np.where(np.arange(most) < count[:, None], np.minimum(times, until[:, None]), math.nan)
+
+    return most, times
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def _array(name: str, value: Any) -> Array:
+    if np.ma.is_masked(value):
+        raise UsageError(f"{name}: elements of the array are masked, and have no value", "leave those instances out")
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        raise UsageError(f"{name}: expected a number, an expression or an array of numbers") from None
+
+
+def _samples(given: Any) -> int | Array | str | None:
+    """A number of samples, their times, or the time between them as an expression of parameters."""
+    if given is None or isinstance(given, str):
+        return given
+    if np.ndim(given) == 1 and not isinstance(given, str):
+        times = np.asarray(given, dtype=float)
+        if np.isfinite(times).all() and (times >= 0).all() and (np.diff(times) >= 0).all():
+            return times
+    elif isinstance(given, int) and not isinstance(given, bool) and given >= 2:
+        return given
+    raise UsageError("samples of an ensemble are times from 0 on that never decrease, or a whole number of at least 2")
+
+
+SLICE = 32  # instances that a thread takes at a time
+INTERVAL = 0.1  # seconds between looks at how far it is
+Progress = Callable[[int, int], None]
+
+
+def run_compiled(
+    plan: CompiledPlan,
+    instances: Instances,
+    kept: Kept,
+    names: tuple[str, ...],
+    threads: int,
+    progress: Progress | None,
+) -> None:
+    """Run all instances on so many threads; at Ctrl-C finished ones are kept."""
+    ensemble, count = CompiledEnsemble(plan, instances, kept, names), len(instances.settings)
+    firsts, failed = iter(range(0, count, SLICE)), list[BaseException]()
+
+    def work() -> None:
+        try:
+            place = ensemble.place()
+            while not ensemble.stopped and (first := next(firsts, None)) is not None:  # one at a time: the GIL
+                ensemble.work(first, min(first + SLICE, count), place)
+        except BaseException as error:
+            failed.append(error)
+            ensemble.stop()
+
+    workers = [threading.Thread(target=work, daemon=True) for _ in range(min(threads, max(1, -(-count // SLICE))))]
+    for worker in workers:
+        worker.start()
+    try:
+        for worker in workers:
+            while worker.is_alive():
+                worker.join(INTERVAL)
+                if progress is not None:
+                    progress(int(np.count_nonzero(kept.reason >= 0)), count)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        ensemble.stop()
+        for worker in workers:
+            worker.join()
+    if failed:
+        raise failed[0]

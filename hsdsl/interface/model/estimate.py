@@ -6,12 +6,12 @@ from bisect import bisect_right
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hsdsl.base.calls import checks_methods
 from hsdsl.base.errors import UsageError
+from hsdsl.base.names import checks_methods
 from hsdsl.base.numbers.arithmetic import TIE, Number
 from hsdsl.engine.execution import Execution, Transition
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.agreement import Errors
+from hsdsl.engine.simulate.verdict.errors import Errors
 
 SAMPLES = 1000
 

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.fitting.data import Measurements, measurements
-from hsdsl.analysis.fitting.fit import Fit
-from hsdsl.analysis.fitting.least_squares import fitted
-from hsdsl.analysis.fitting.objective import Objective, Progress
+from hsdsl.analysis.fitting.fit import Fit, Measurements, measurements
+from hsdsl.analysis.fitting.least_squares import Objective, Progress, fitted
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.analysis.sensitivity.targets import Target
 from hsdsl.base.errors import UsageError
@@ -23,13 +21,13 @@ from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.interface.model.differentiate import start_by, varied
 
 if TYPE_CHECKING:
-    from hsdsl.interface.model.model import Model
+    from hsdsl.interface.model.runs import Runs
 
 REFUSED = ("step", "scheme", "samples", "precision", "until")
 
 
 def fit(
-    model: Model,
+    model: Runs,
     data: Any,
     wrt: str | Sequence[str],
     sigma: Mapping[str, float] | float | None,
@@ -58,7 +56,7 @@ def fit(
     return replace(fitted(objective, bounds, bool(sigma), scales), units=model.program.units)
 
 
-def _evaluate(model: Model, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:
+def _evaluate(model: Runs, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:
     labels = [t.label for t in by]
 
     def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:

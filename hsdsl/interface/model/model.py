@@ -3,44 +3,36 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.base.calls import checks_arguments, checks_methods
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits
-from hsdsl.base.names import NO_FILE, called, did_you_mean, visible
+from hsdsl.base.names import NO_FILE, called, checks_arguments, checks_methods, visible
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.base.progress import counted, counted_runs, in_notebook, running
-from hsdsl.base.written import written_modes
+from hsdsl.base.parts import written_modes
+from hsdsl.base.progress import counted, counted_runs, in_notebook
 from hsdsl.engine.execution import Ensemble, Execution
 from hsdsl.engine.preparation import automatic
-from hsdsl.engine.preparation.options import ARGUMENTS, Options, arguments_of, overrides_of
-from hsdsl.engine.preparation.pipeline import Pipeline, pipeline_of
+from hsdsl.engine.preparation.options import arguments_of
+from hsdsl.engine.preparation.pipeline import pipeline_of
 from hsdsl.engine.preparation.values import with_parameters
-from hsdsl.engine.preparation.visible import visible_run, with_output_function
-from hsdsl.engine.simulate import Prepared
+from hsdsl.engine.preparation.visible import with_output_function
 from hsdsl.engine.simulate.recorder import Progress
-from hsdsl.engine.simulate.review import BecomesStiff
-from hsdsl.interface.model.call_cache import CallCache, call_key
-from hsdsl.mathematics.program import Program
+from hsdsl.interface.model.runs import Runs, elsewhere
 
 if TYPE_CHECKING:
     from hsdsl.analysis.fitting.fit import Fit
+    from hsdsl.analysis.metrics.interval import Interval
     from hsdsl.analysis.metrics.points import PointDistance, SpacePoint
-    from hsdsl.analysis.orbits.branch import Branch
+    from hsdsl.analysis.orbits.continuation import Branch
     from hsdsl.analysis.orbits.orbit import Orbit
     from hsdsl.analysis.orbits.sampling import OrbitalStability
-    from hsdsl.analysis.sensitivity.result import Sensitivity
     from hsdsl.analysis.sweep import Sweep
-    from hsdsl.interface.model.differentiate import Differentiator
     from hsdsl.interface.model.estimate import Estimate
     from hsdsl.interface.model.stream import Streamed
-    from hsdsl.language.system import HybridSystem
-
-MOST_PREPARED = 16
 
 
 @checks_arguments
@@ -67,53 +59,12 @@ def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limit
     return Model(pipeline_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
 
 
-ELSEWHERE = {
-    "parameters": "their names are model.program.parameters",
-    "states": "their names are model.program.all_states, with outputs model.columns",
-    "outputs": "their names are model.program.outputs",
-    "inputs": "write their numbers as parameters in the file, and give these to model.simulate(parameters=...)",
-    "run": "model.simulate() runs it",
-}
-
-
-def _elsewhere(model: Model, name: str) -> str | None:
-    """Say where to give a name that is no argument of a method."""
-    if name in model.program.parameters:
-        return f"it is a parameter: parameters={{'{name}': ...}}"
-    if name in model.program.all_states:
-        return f"it is a state: initial={{'{name}': ...}}"
-    return ELSEWHERE.get(name)
-
-
-@partial(checks_methods, elsewhere=_elsewhere)
-class Model:
+@partial(checks_methods, elsewhere=elsewhere)
+class Model(Runs):
     """A checked model: ``system`` is the mathematics, ``program`` its routines for an engine, ``pipeline`` both.
 
     It does not change if its file changes later, and it can be pickled.
     """
-
-    def __init__(self, of: HybridSystem | Pipeline) -> None:
-        self.pipeline = of if isinstance(of, Pipeline) else Pipeline(of)
-        self._smaller: dict[tuple[str, ...], Model] = {}
-        self._prepared: CallCache[Prepared] = CallCache(MOST_PREPARED)
-        self._slides: CallCache[bool] = CallCache(MOST_PREPARED)  # whether runs of a call slide
-
-    @cached_property
-    def _differentiator(self) -> Differentiator:
-        from hsdsl.interface.model.differentiate import Differentiator
-
-        return Differentiator(self.pipeline)
-
-    def __reduce__(self) -> tuple[type[Model], tuple[Pipeline]]:
-        return type(self), (self.pipeline,)
-
-    if not TYPE_CHECKING:
-
-        def __getattr__(self, name: str) -> Any:
-            try:
-                return object.__getattribute__(self, name)
-            except AttributeError as error:
-                raise AttributeError(f"{error}{'; ' * (name in ELSEWHERE)}{ELSEWHERE.get(name, '')}") from None
 
     def __repr__(self) -> str:
         name = visible(called(None, Path(self.program.path).name).removeprefix("a model "))
@@ -129,165 +80,10 @@ class Model:
 
         return model_html(self.system, self.program)
 
-    @property
-    def system(self) -> HybridSystem:
-        """The mathematics; a cached model elaborates it at the first use."""
-        return self.pipeline.system
-
-    @property
-    def program(self) -> Program:
-        """The model lowered to routines, free of SymPy."""
-        return self.pipeline.program
-
-    @property
-    def columns(self) -> list[str]:
-        """Names of all states and outputs."""
-        return self.pipeline.columns
-
-    def resolve(self, settings: Mapping[str, Any] | None = None, call: Mapping[str, Any] | None = None) -> Options:
-        """Resolve the options of the file, of ``settings`` and of a call (see `hsdsl.engine.preparation.options`)."""
-        return self.pipeline.resolve(settings, call)
-
-    def simulate(
-        self,
-        until: Any = None,
-        *,
-        scheme: str | None = None,
-        method: str | None = None,
-        step: Any = None,
-        tolerance: Any = None,
-        relaxation: Any = None,
-        scale: Mapping[str, Any] | None = None,
-        samples: Any = None,
-        max_transitions: Any = None,
-        completion: str | None = None,
-        parameters: Mapping[str, Any] | None = None,
-        initial: Mapping[str, Any] | None = None,
-        settings: Mapping[str, Any] | None = None,
-        engine: str = "auto",
-        precision: int | None = None,
-        outputs: Sequence[str] | None = None,
-        watch: Callable[[Progress], None] | None = None,
-    ) -> Execution:
-        """Run the model from t = 0.
-
-        A number may be given as an expression of the model's parameters, such as ``"40*pi"``.
-
-        Parameters
-        ----------
-        until : number or str, optional
-            End of the run.
-        scheme, method : str, optional
-            A name in `simulate.SCHEMES`; a name in `integrators.METHODS`, or ``auto``.
-        step, tolerance : number or str, optional
-            Fixed step, or bound on the local error relative to the largest size each state has had; they exclude each
-            other.
-        relaxation : number or str, optional
-            The paper's epsilon: a depth in the model's own units, and a time.
-        scale : mapping, optional
-            Typical sizes of states by name: the scale of a state is this size until the state becomes larger.
-        samples : int, str or sequence, optional
-            The number of equally spaced samples, their times, or ``every=TIME`` for its multiples; files have rows at
-            these times.
-        max_transitions : int or str, optional
-            The largest number of transitions; the run stops before it makes another one.
-        completion : {"contact", "auto", "none"}, optional
-            The motion that follows accumulating transitions.
-        parameters, initial : mapping, optional
-            Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed again.
-        settings : mapping, optional
-            Settings as of ``--set experiment.NAME``: the arguments above override them, and they override the file's.
-        engine : {"auto", "c", "python"}
-            Compiled code, or the Python loop. ``auto`` is ``c`` if there is a compiler, except that the Python loop may
-            finish while another process compiles the model.
-        precision : int, optional
-            Decimal digits (mpmath numbers) instead of float64.
-        outputs : sequence of str, optional
-            States and outputs of the result; states on which none of them depends are not integrated (see
-            :meth:`only`).
-        watch : callable, optional
-            Called with the recorder before the run starts.
-
-        Raises UsageError: a name, value or combination is not valid.
-        """
-        arguments = (
-            until, scheme, method, step, tolerance, relaxation, scale, samples, max_transitions, completion,
-            parameters, initial, settings, engine, precision,
-        )  # fmt: skip
-        if outputs is not None:
-            return self._reduced_run(outputs, dict(zip(ARGUMENTS, arguments, strict=True)), watch)
-        key = call_key(*arguments)
-        ready = self._prepared.find(key)
-        if ready is None:
-            call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
-            ready = self._kept(key, automatic.judged(self.pipeline.prepare(call, wait=False)))
-        with in_notebook() as show:
-            watch = watch or (show and partial(running, show))
-            try:
-                run = ready.simulate(watch, self.pipeline.seconds)
-            except BecomesStiff as found:
-                ready = self._kept(key, automatic.instead(ready, found))
-                run = ready.simulate(watch, self.pipeline.seconds)
-        run = visible_run(run, ready)
-        run.__dict__["differentiation"] = partial(self._differentiate, arguments)
-        run.__dict__["look"] = partial(self.look, parameters)
-        return run
-
-    def _kept(self, key: Hashable | None, ready: Prepared) -> Prepared:
-        """Return a prepared run, which is kept for the same call; it is prepared again if its code is still being
-        compiled.
-        """
-        if ready.pending is None:
-            self._prepared.keep(key, ready)
-        return ready
-
-    def _differentiate(self, arguments: tuple[Any, ...], wrt: str | Sequence[str]) -> Sensitivity:
-        call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
-        return self._sliding_for(call)._differentiator.of_run(call, wrt)
-
     def _flat(self, what: str) -> None:
         """Refuse operations that systems of parts do not support yet."""
         if self.program.parts:
             raise UsageError(f"{what} cannot be had of a system of parts", "write the modes of a small one out")
-
-    def _sliding_for(self, arguments: Mapping[str, Any]) -> Model:
-        """Return the model of a run with these arguments: with modes of sliding if its completion is `auto`."""
-        settings, completion = arguments.get("settings"), arguments.get("completion")
-        key = call_key(settings, completion)
-        slides = self._slides.find(key)
-        if slides is None:
-            slides = self.resolve(settings, {"completion": completion}).values["completion"].value == "auto"
-            self._slides.keep(key, slides)
-        return self.sliding if slides else self
-
-    def _reduced_run(
-        self, outputs: Sequence[str], arguments: dict[str, Any], watch: Callable[[Progress], None] | None
-    ) -> Execution:
-        """Run the model reduced to some outputs; initial values and scales of removed states are ignored."""
-        smaller = self.only(outputs)
-        gone = set(self.columns) - {"mode", *smaller.columns}
-        for group in ("initial", "scale"):
-            arguments[group] = {
-                name: value for name, value in overrides_of(arguments, group, self.program).items() if name not in gone
-            }
-        return smaller.simulate(**arguments, watch=watch)
-
-    def sensitivity(self, wrt: str | Sequence[str], **arguments: Any) -> Sensitivity:
-        """Differentiate a run's end, transition times, states and outputs, through its jumps.
-
-        The derivatives are those of the located execution. They follow from its variational equations and saltation
-        matrices.
-
-        Parameters
-        ----------
-        wrt : str or sequence of str
-            Parameters by name and initial states as ``initial.NAME``; a text may have several, with commas.
-        **arguments
-            Arguments of :meth:`simulate`, except ``step`` and ``outputs``. The scheme is ``located``.
-
-        Raises UsageError: an unknown name, or an argument that is not valid.
-        """
-        return self._sliding_for(arguments)._differentiator.sensitivity(wrt, arguments)
 
     def orbit(
         self,
@@ -387,7 +183,7 @@ class Model:
 
         Raises UsageError: an unknown name, or radii that do not decrease.
         """
-        from hsdsl.interface.model.nearby import orbital_stability
+        from hsdsl.interface.model.orbits import orbital_stability
 
         self._flat("orbital stability from runs nearby")
         with in_notebook() as show:
@@ -463,11 +259,13 @@ class Model:
 
         self._flat("rows in a file while a run goes on")
         target = check(path, every, columns, arguments, self)
-        prepared = automatic.judged(self.pipeline.prepare(arguments | {"engine": "c"}))
-        try:
-            return stream(prepared, target, every, columns, watch)
-        except BecomesStiff as found:
-            return stream(automatic.instead(prepared, found), target, every, columns, watch)
+        prepared = self.pipeline.prepare(arguments | {"engine": "c"})
+        judge = automatic.judge_of(prepared)
+        made, stiff = stream(prepared, target, every, columns, watch, judge)
+        if made is None:
+            made, _ = stream(automatic.instead(prepared, stiff), target, every, columns, watch)
+        assert made is not None
+        return made
 
     def ensemble(
         self,
@@ -544,7 +342,7 @@ class Model:
         seed : int
             Seed of the draws. A row has the same values for any number of workers.
         record : str or sequence of str
-            Records of each run besides its end (`hsdsl.analysis.sweep.recording`).
+            Records of each run besides its end (`hsdsl.analysis.sweep.manifest`).
         outputs : sequence of str, optional
             States and outputs, as for :meth:`simulate`; the others have no columns.
         cluster : str, optional
@@ -560,17 +358,12 @@ class Model:
 
         Raises UsageError: an unknown name, a folder of another sweep, or a cluster that does not answer.
         """
-        from hsdsl.interface.model.sweeps import Request, sweep
+        from hsdsl.interface.model.sweeps import sweep
 
         with in_notebook() as show:
             progress = progress or counted(show, "rows")
-            request = Request(vary, random, seed, record, outputs, chunk, arguments)
-            return sweep(self, request, Path(out), cluster, processes, progress)
-
-    @cached_property
-    def sliding(self) -> Model:
-        """The model with a sliding mode for each surface towards which two flows point; this model if there is none."""
-        return self if self.pipeline.sliding is self.pipeline else Model(self.pipeline.sliding)
+            asked = {"vary": vary, "random": random, "seed": seed, "record": record, "outputs": outputs}
+            return sweep(self, Path(out), cluster, processes, chunk, progress, **asked, arguments=arguments)
 
     def completed(self) -> str | None:
         """Return the text of the model with modes for motion along guards and for sliding; None if there are none.
@@ -595,21 +388,6 @@ class Model:
             hint = "write it as a state: its flow 1 in each mode, and since: 0 in each reset"
             raise UsageError("a model that uses `since` or events cannot be written with its completions", hint)
         return text
-
-    def only(self, outputs: Sequence[str]) -> Model:
-        """Return the model reduced to these states and outputs, and to all that they or any transition depend on.
-
-        It runs as a model without the other states: adaptive steps depend on the remaining states alone, and a state
-        that is left out can neither stop a run nor prevent a rest.
-        """
-        names = tuple(sorted(set(outputs)))
-        for name in names:
-            if name not in self.columns:
-                raise UsageError(f"the model has no state or output '{name}'", did_you_mean(name, self.columns))
-        if names not in self._smaller:
-            smaller = self.pipeline.only(names)
-            self._smaller[names] = self if smaller is self.pipeline else Model(smaller)
-        return self._smaller[names]
 
     def estimate(self, execution: Execution) -> Estimate:
         """Compare an execution of this model with a finer run (see `hsdsl.interface.model.estimate`)."""
@@ -685,7 +463,7 @@ class Model:
     @cached_property
     def _staged(self) -> Model:
         """Return the model with the numbers of its scene as further outputs."""
-        from hsdsl.language.elaborate.scene import scene_as_outputs
+        from hsdsl.language.elaborate.modes import scene_as_outputs
 
         self.check_scene()
         return Model(scene_as_outputs(self.system))
@@ -704,15 +482,6 @@ class Model:
             return run
         arguments = arguments_of(run.overrides) | {"precision": run.digits, "engine": "python"}
         return with_output_function(run, self.pipeline.prepare(arguments))
-
-    def look(self, parameters: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Return what a picture shows of the model: its units, levels of its guards, and the program of its mode
-        graph.
-        """
-        from hsdsl.interface.model.guards import guard_lines
-
-        values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
-        return {"guards": guard_lines(values), "units": self.program.units, "program": self.program}
 
     def distance(
         self,
@@ -748,10 +517,42 @@ class Model:
 
         Raises UsageError: a point or a number does not fit the model, or a point is outside its mode's domain.
         """
-        from hsdsl.interface.model.distances import budget_of
-        from hsdsl.interface.model.points import distance_of_points
+        from hsdsl.interface.model.distances import budget_of, distance_of_points
 
         self._flat("a distance of two points")
 
         values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
         return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)
+
+
+def distance(first: Any, second: Any, third: Any = None, **arguments: Any) -> Interval:
+    """Return the distance of two runs, or of two points of a model.
+
+    Parameters
+    ----------
+    first : Execution, Model or path
+        The first of two runs of a model; or a model, for the distance of two of its points.
+    second : Execution, str or SpacePoint
+        The second run; or a point, as ``"free x=13 v=5"``.
+    third : str or SpacePoint, optional
+        The second point.
+    **arguments
+        Further arguments of :func:`distance_of_runs`, or of :meth:`hsdsl.Model.distance`.
+
+    The interval contains the distance; :meth:`hsdsl.Model.distance` also returns the path, and :func:`distance_of_runs`
+    the time.
+
+    Raises UsageError: the arguments are neither, or do not fit the model.
+    """
+    from hsdsl.analysis.metrics.points import SpacePoint
+    from hsdsl.interface.model.distances import distance_of_runs
+
+    if isinstance(first, Execution) and isinstance(second, Execution) and third is None:
+        return distance_of_runs(first, second, **arguments).interval
+    model = load(first) if isinstance(first, (str, os.PathLike)) else first  # pyright: ignore[reportUnknownArgumentType]
+    if isinstance(model, Model) and isinstance(second, (str, SpacePoint)) and isinstance(third, (str, SpacePoint)):
+        return model.distance(second, third, **arguments).interval
+    raise UsageError(
+        "distance takes two runs, or a model and two of its points",
+        'for example distance(run, other) or distance(model, "free x=13 v=5", "free x=13 v=-4")',
+    )

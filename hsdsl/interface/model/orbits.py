@@ -1,34 +1,48 @@
-"""Periodic orbits of a model: sections, guesses from a run, and what was found."""
+"""Periodic orbits of a model, and orbital stability of its execution.
+
+Orbits are found from sections and guesses of a run; stability is tested by runs from nearby and their distances.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.orbits.branch import Branch
-from hsdsl.analysis.orbits.continuation import CIRCLE, Follower, branch
+from hsdsl.analysis.orbits.continuation import CIRCLE, Branch, Follower, branch
 from hsdsl.analysis.orbits.orbit import Orbit, judged, multipliers_of, returning
-from hsdsl.analysis.orbits.section import LONGER, NoReturn, Return, Section, without_noise
-from hsdsl.analysis.orbits.shooting import COARSER, Closed, NotClosed, closed
+from hsdsl.analysis.orbits.sampling import OrbitalStability, directions, sampled
+from hsdsl.analysis.orbits.section import (
+    COARSER,
+    LONGER,
+    Closed,
+    NoReturn,
+    NotClosed,
+    Return,
+    Section,
+    closed,
+    without_noise,
+)
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import counted, did_you_mean
+from hsdsl.base.names import called, counted, did_you_mean
 from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
-from hsdsl.base.parts import meant_alone, numbers_of
-from hsdsl.base.written import written_edges
+from hsdsl.base.parts import meant_alone, numbers_of, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.settings import whole
-from hsdsl.engine.preparation.values import with_parameters
-from hsdsl.interface.model.differentiate import FINEST
+from hsdsl.engine.preparation.values import whole, with_parameters
+from hsdsl.interface.model.differentiate import FINEST, located_arguments, start_by, varied
+from hsdsl.interface.model.distances import distance_of_runs
 
 if TYPE_CHECKING:
-    from hsdsl.engine.execution import Array, Transition
-    from hsdsl.interface.model.model import Model
+    from hsdsl.engine.execution import Array
+    from hsdsl.interface.model.runs import Runs
+
 
 REFUSED = ("step", "scheme", "samples", "precision")
 MOST_GUESSES = 6
@@ -68,13 +82,7 @@ class Orbits:
     """The orbits of a model through one section, with the arguments of its runs."""
 
     def __init__(
-        self,
-        model: Model,
-        section: str,
-        laps: int,
-        period: Any,
-        progress: Progress | None,
-        arguments: Mapping[str, Any],
+        self, model: Runs, section: str, laps: int, period: Any, progress: Progress | None, arguments: Mapping[str, Any]
     ) -> None:
         from hsdsl.analysis.orbits.forcing import PHASE, forced, shifted
 
@@ -87,7 +95,7 @@ class Orbits:
             raise UsageError("the model does not depend on time, so its forcing has no period")
         self._period = period
         self._phase = PHASE if self.forced else None
-        self._moving: Model = type(model)(Pipeline(shifted(model.system))) if self.forced else model
+        self._moving: Runs = type(model)(Pipeline(shifted(model.system))) if self.forced else model
         self._stiff = False
         self._progress, self._runs, self._followed = progress, 0, ""
         self._guess: Guess | None = None
@@ -151,7 +159,8 @@ class Orbits:
     def guesses(self, run: Execution) -> list[Guess]:
         """States after the section's transitions in a run, those first that a lap changes least."""
         passed = [made for made in run.transitions if made.edge == self.edge and made.after is not None]
-        places = [self._entered_by(made) for made in passed]
+        parts = self.model.program.parts
+        places = [(made.target, tuple(made.after or {})) if parts else self._entered() for made in passed]
         points = [np.array([(made.after or {})[x] for x in states], float)
                   for made, (_, states) in zip(passed, places, strict=True)]  # fmt: skip
         times = [float(made.time) for made in passed]
@@ -173,18 +182,12 @@ class Orbits:
         lasting = [(change, guess) for change, guess in found if guess.time > least]
         return [_with_sizes(guess, run) for _, guess in sorted(lasting, key=lambda each: each[0])[:MOST_GUESSES]]
 
-    def _entered_by(self, made: Transition) -> Entered:
-        """The mode and the states that a transition of the section leads to."""
-        if not self.model.program.parts:
-            return self._entered()
-        return made.target, tuple(made.after or {})
-
     def find(self) -> Orbit:
         """Find the orbit that the model's own run comes closest to.
 
         Raises UsageError: the run does not pass the section, or no orbit is found.
         """
-        run = self.model.simulate(scheme="located", **self._run_arguments())
+        run = self.model.simulate(**located_arguments(self.model.pipeline, self.arguments))
         self._stiff = run.method == "radau"
         guesses = self.guesses(run)
         ending = "" if run.stop.complete else f"; the run stops at t = {run.times[-1]:g}: {run.stop.message}"
@@ -222,11 +225,6 @@ class Orbits:
         passed = [float(made.time) for made in run.transitions if made.edge == self.edge]
         lasted = np.diff(passed)
         return len(lasted) > 1 and bool(np.all(np.diff(lasted) < 0))
-
-    def _run_arguments(self) -> dict[str, Any]:
-        from hsdsl.interface.model.differentiate import located_arguments
-
-        return {k: v for k, v in located_arguments(self.model.pipeline, self.arguments).items() if k != "scheme"}
 
     def shoot(self, guess: Guess, parameters: Mapping[str, Any]) -> Orbit:
         """Find the orbit near a guess.
@@ -350,7 +348,7 @@ class Orbits:
         return sides
 
 
-def _numbers(model: Model, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def _numbers(model: Runs, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """The parameters that a call gives, as numbers: its runs need not read their texts again."""
     given = overrides_of(arguments, "parameters", model.program)
     values = with_parameters(model.pipeline.values(FLOAT64), given)
@@ -377,7 +375,7 @@ def _still(found: Closed) -> bool:
     return bool(np.max(moved, initial=0.0) <= SHRUNK)
 
 
-def _edge(model: Model, section: str) -> str:
+def _edge(model: Runs, section: str) -> str:
     names = [edge.name for mode in model.program.modes for edge in written_edges(mode.edges)]
     if section not in names:
         hint = did_you_mean(section, names)
@@ -385,3 +383,47 @@ def _edge(model: Model, section: str) -> str:
             hint = "a section is a transition, by its name; " + (hint or "")
         raise UsageError(f"the model has no transition '{section}'", hint)
     return section
+
+
+def orbital_stability(
+    model: Runs,
+    wrt: str | Sequence[str] | None,
+    radii: Sequence[float],
+    samples: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None,
+    arguments: Mapping[str, Any],
+) -> OrbitalStability:
+    """Test an execution; see `Model.orbital_stability`."""
+    check_arguments(arguments, "a stability test", REFUSED)
+    if len(radii) < 2 or not all(0 < b < a for a, b in pairwise(radii)):
+        raise UsageError(f"expected at least two radii that fall, got {', '.join(map(str, radii))}")
+    call = located_arguments(model.pipeline, arguments)
+    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters", model.program))
+    by, known = start_by(wrt, call, values)
+    run = model.simulate(**call)
+    sizes = run.sizes()
+    scales = np.array([abs(known[t.label]) or sizes.get(t.name, 0.0) or 1.0 for t in by])
+    ways = directions(len(by), whole(samples, "samples", 1), seed)
+    total, done = len(radii) * len(ways), 0
+
+    def moved_run(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
+        nonlocal done
+        moved = {label: number + shift[label] for label, number in known.items()}
+        other = model.simulate(**varied(call, by, moved, model.program))
+        found = _distance(run, other, model)
+        done += 1
+        if progress is not None:
+            progress(done, total)
+        return (*found, tuple(made.edge for made in other.transitions))
+
+    title = called(run.title, run.model)
+    return sampled([t.label for t in by], scales, list(radii), ways, moved_run, title)
+
+
+def _distance(run: Execution, other: Execution, model: Runs) -> tuple[float, float]:
+    """How far apart two runs are; one that stops for another reason is nowhere near."""
+    if run.stop.reason != other.stop.reason:
+        return inf, inf
+    found = distance_of_runs(run, other, model=model).interval
+    return float(found.lower), float(found.upper)

@@ -12,22 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.store.sidecar import forget_sidecar
-from hsdsl.analysis.store.table import write_csv
+from hsdsl.analysis.store.table import forget_sidecar, write_csv
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import without_memory
 from hsdsl.engine.execution import Array, RunWarning, Samples, Stop
-from hsdsl.engine.execution.samples import split
-from hsdsl.engine.execution.sampling import columns_by_name
+from hsdsl.engine.execution.records import split
+from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation.options import check_arguments
-from hsdsl.engine.preparation.settings import whole
+from hsdsl.engine.preparation.values import whole
 from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.plan import Prepared, Watch
+from hsdsl.engine.simulate.review import Judge
 from hsdsl.engine.simulate.stops import loop_remarks, warnings_of
 from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
-    from hsdsl.interface.model.model import Model
+    from hsdsl.interface.model.runs import Runs
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Rows:
 
 
 def check(
-    path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, arguments: Mapping[str, Any], model: Model
+    path: str | os.PathLike[str], every: int, columns: Sequence[str] | None, arguments: Mapping[str, Any], model: Runs
 ) -> Path:
     """Refuse arguments that a streamed run does not take, and return the path of its rows."""
     check_arguments(arguments, "a streamed run", without=("samples", "precision"))
@@ -132,11 +132,17 @@ def check(
     return target
 
 
-def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | None, watch: Watch | None) -> Streamed:
-    """Run to the end, and write the rows to a CSV file.
+def stream(
+    prepared: Prepared,
+    path: Path,
+    every: int,
+    columns: Sequence[str] | None,
+    watch: Watch | None,
+    judge: Judge | None = None,
+) -> tuple[Streamed | None, Any]:
+    """Run to the end, or to a finding of the judge, rows going to a CSV file: the run, or None and the finding.
 
     Raises UsageError: the file cannot be written, or not on to its end (a full disk); what was written stays.
-    Raises BecomesStiff: the method that `auto` has chosen does not serve.
     """
     plan, settings = prepared.plan, prepared.settings
     assert plan is not None and settings.method is not None
@@ -146,14 +152,17 @@ def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | 
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
         try:
             rows = Rows(prepared.program, prepared.states, every, columns, lambda text: _write_all(file, text))
-            stop, run, rest = prepared.stream(rows.take, watch)
+            made, finding = prepared.stream(rows.take, watch, judge)
+            if made is None:
+                return None, finding
+            stop, run, rest = made
             final = rows.take(rest, at_end=True)
         finally:
             os.close(file)
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror or error}") from None
     assert final is not None
-    return Streamed(
+    streamed = Streamed(
         path=path,
         rows=rows.written,
         steps=rows.steps,
@@ -167,6 +176,7 @@ def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | 
         seconds=time.perf_counter() - began,
         overrides=dict(settings.overrides),
     )
+    return streamed, None
 
 
 def _write_all(file: int, text: bytes) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -9,12 +11,12 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from hsdsl.analysis.sweep import Sweep, recording, variation
+import numpy as np
+
+from hsdsl.analysis.sweep import Recording, Sweep, variation
 from hsdsl.analysis.sweep import manifest as manifests
-from hsdsl.analysis.sweep.dataset import damaged, write_chunk
-from hsdsl.analysis.sweep.manifest import Manifest
-from hsdsl.analysis.sweep.rows import library
-from hsdsl.analysis.sweep.schedule import Run, run_here
+from hsdsl.analysis.sweep.dataset import Run, damaged, encoded, run_here, write_chunk
+from hsdsl.analysis.sweep.manifest import Manifest, library, refused, table
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import INITIAL, without_memory
@@ -23,35 +25,27 @@ from hsdsl.base.parts import meant, of_all
 from hsdsl.base.processes import can_fork
 from hsdsl.engine.preparation.options import KEYS, as_written, check_arguments, overrides_of
 from hsdsl.engine.preparation.values import with_parameters
-from hsdsl.interface.model.chunk_work import ChunkWork, chunk_size
-from hsdsl.interface.model.workers import Progress
+from hsdsl.interface.model.ensemble import NothingToRunError, Progress, run_ensemble
 
 if TYPE_CHECKING:
-    from hsdsl.interface.model import Model
-
-
-@dataclass(frozen=True)
-class Request:
-    """What a sweep is to compute; see `Model.sweep`."""
-
-    vary: Sequence[str] | Mapping[str, Any]
-    random: int | None
-    seed: int
-    record: str | Sequence[str]
-    outputs: Sequence[str] | None
-    chunk: int | None
-    arguments: dict[str, Any]
+    from hsdsl.interface.model.runs import Runs
 
 
 def sweep(
-    model: Model, request: Request, folder: Path, cluster: str | None, processes: int | None, progress: Progress | None
+    model: Runs,
+    folder: Path,
+    cluster: str | None,
+    processes: int | None,
+    chunk: int | None,
+    progress: Progress | None,
+    **asked: Any,
 ) -> Sweep:
-    """Run a sweep, or what is missing of it."""
+    """Run a sweep, or what is missing of it; what is ``asked`` for is in its manifest."""
     library("pyarrow.parquet")
-    model = model if request.outputs is None else model.only(request.outputs)
-    planned = _planned(model, request)
+    model = model if asked["outputs"] is None else model.only(asked["outputs"])
+    planned = _planned(model, chunk, **asked)
     with _place(cluster, processes or cores()) as run:
-        work, missing = _begun(model, planned, folder, request.chunk, processes or cores(), cluster is None)
+        work, missing = _begun(model, planned, folder, chunk, processes or cores(), cluster is None)
         _fill(work, folder, missing, run, progress)
     return Sweep(folder, work.manifest)
 
@@ -62,7 +56,7 @@ def _place(cluster: str | None, processes: int) -> Generator[Run]:
     if cluster is None:
         yield partial(run_here, processes=processes if can_fork() else 1)
         return
-    from hsdsl.engine.execution.samples import optional
+    from hsdsl.engine.execution.records import optional
 
     optional("distributed", "a sweep on a cluster", "cluster")
     from hsdsl.analysis.sweep.cluster import connected
@@ -90,21 +84,27 @@ def _fill(work: ChunkWork, folder: Path, missing: Sequence[int], run: Run, progr
         run(work, missing, write)
 
 
-def _planned(model: Model, request: Request) -> Manifest:
+def _planned(
+    model: Runs,
+    chunk: int | None,
+    vary: Sequence[str] | Mapping[str, Any],
+    random: int | None,
+    seed: int,
+    record: str | Sequence[str],
+    outputs: Sequence[str] | None,
+    arguments: Mapping[str, Any],
+) -> Manifest:
     """The manifest of a sweep that is still to be measured."""
-    chunk, outputs = request.chunk, request.outputs
     given = {
         name: value
-        for name, value in request.arguments.items()
+        for name, value in arguments.items()
         if value not in (None, {}) and (name, value) != ("engine", "auto")
     }
     check_arguments(given, "a sweep", without=("samples", "precision"))
     fixed: dict[str, Mapping[str, Any]] = {group: given.get(group) or {} for group in ("parameters", "initial")}
     shared = overrides_of(given, "parameters", model.program)
     values = with_parameters(model.pipeline.values(FLOAT64), shared)
-    varied = variation.read(
-        request.vary, request.random, request.seed, lambda value, where: float(values.number(value, where))
-    )
+    varied = variation.read(vary, random, seed, lambda value, where: float(values.number(value, where)))
     _check_names(model, varied.names, fixed)
     if chunk is not None and chunk < 1:
         raise UsageError(f"--chunk: expected at least 1 row, got {chunk}")
@@ -117,21 +117,21 @@ def _planned(model: Model, request: Request) -> Manifest:
         title=program.title,
         units=program.units,
         variation=varied,
-        recording=recording.read(request.record),
-        arguments={name: _plain(value) for name, value in given.items()},
+        recording=Recording.read(record),
+        arguments={name: _as_data(value) for name, value in given.items()},
         states=tuple(name for name in states if name in kept),
         outputs=tuple(name for name in program.outputs if name in kept),
         chunk=chunk or 1,
     )
 
 
-def _plain(value: Any) -> Any:
+def _as_data(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: as_written(item) for name, item in cast("Mapping[str, Any]", value).items()}
     return as_written(value)
 
 
-def _check_names(model: Model, names: Sequence[str], fixed: Mapping[str, Mapping[str, Any]]) -> None:
+def _check_names(model: Runs, names: Sequence[str], fixed: Mapping[str, Mapping[str, Any]]) -> None:
     """Refuse what cannot be varied, and what is given as well."""
     program = model.program
     known = [*program.parameters, *(f"{INITIAL}{state}" for state in program.all_states)]
@@ -147,7 +147,7 @@ def _check_names(model: Model, names: Sequence[str], fixed: Mapping[str, Mapping
 
 
 def _begun(
-    model: Model, planned: Manifest, folder: Path, chunk: int | None, processes: int, here: bool
+    model: Runs, planned: Manifest, folder: Path, chunk: int | None, processes: int, here: bool
 ) -> tuple[ChunkWork, list[int]]:
     """The work of a sweep that goes on in a folder, or begins there, and the chunks that are missing."""
     threads = processes if here and not can_fork() else 1
@@ -172,3 +172,85 @@ def _begun(
         raise UsageError(f"{folder} cannot be made: {error.strerror or error}") from None
     manifest.write(folder)
     return ChunkWork(model, manifest, threads), list(range(manifest.chunks))
+
+
+PROBES, BYTES, MOST_ROWS = 16, 64e6, 100_000
+SECONDS, LEAST_SECONDS = 2.0, 0.1  # of a chunk
+CHUNKS_A_CORE = 16  # so that no core waits long for the last chunk
+
+
+@dataclass(frozen=True, eq=False)
+class ChunkWork:
+    """What makes a chunk: it can be sent to other processes and machines."""
+
+    model: Runs
+    manifest: Manifest
+    threads: int = 1
+
+    def __call__(self, chunk: int) -> bytes:
+        """The bytes of a chunk's file."""
+        return encoded(self.rows(*self.manifest.rows_of(chunk)))
+
+    def prepare(self) -> None:
+        """Compile what the first chunk needs."""
+        self.rows(0, 1)
+
+    def rows(self, first: int, last: int) -> Any:
+        """The rows from ``first`` up to ``last`` as a table.
+
+        A row that stops all others from being run is found by halves, and is refused by itself.
+        """
+        try:
+            return table(self.manifest, first, self._ensemble(first, last))
+        except UsageError as error:
+            if last - first == 1:
+                why = error.why if isinstance(error, NothingToRunError) else str(error)
+                return refused(self.manifest, first, last, why)
+        middle = (first + last) // 2
+        return library().concat_tables([self.rows(first, middle), self.rows(middle, last)])
+
+    def _ensemble(self, first: int, last: int) -> Any:
+        call: dict[str, Any] = dict(self.manifest.arguments)
+        groups = {group: dict(call.pop(group, {})) for group in ("parameters", "initial")}
+        for name, values in self.manifest.variation.values(first, last).items():
+            groups["initial" if name.startswith(INITIAL) else "parameters"][name.removeprefix(INITIAL)] = values
+        kept = self.manifest.recording
+        found = run_ensemble(self.model, call | groups, kept.samples, 0, self.threads, None, kept.transitions)
+        if "interrupted" in found.reasons:
+            raise KeyboardInterrupt
+        return found
+
+    def check(self, rows: Sequence[int]) -> None:
+        """Refuse a sweep of which no row can be run, all for one reason: a setting is wrong.
+
+        Raises UsageError: the reason.
+        """
+        refusals: list[UsageError] = []
+        for k in rows:
+            try:
+                self._ensemble(k, k + 1)
+                return
+            except UsageError as error:
+                refusals.append(error)
+        if len({str(error) for error in refusals}) == 1:
+            raise refusals[0]
+
+
+def chunk_size(work: ChunkWork, processes: int) -> int:
+    """How many rows a chunk should have: some seconds of work, little memory, and enough chunks for every process.
+
+    A few rows are run for that. What they refuse for another reason than their own values is refused here.
+    """
+    rows = work.manifest.variation.rows
+    work.check(np.unique(np.linspace(0, rows - 1, min(rows, PROBES)).astype(int)).tolist())
+    first, shared = rows // 2, math.ceil(rows / (CHUNKS_A_CORE * processes))
+    work.rows(first, first + 1)  # what is imported and compiled only once does not count
+    count, seconds, size = 1, 0.0, 0.0
+    while seconds < LEAST_SECONDS and 2 * count <= rows - first:
+        count *= 2
+        began = time.perf_counter()
+        size = work.rows(first, first + count).nbytes / count
+        seconds = time.perf_counter() - began
+    pace = count / max(seconds, 1e-6)
+    shared = max(shared, min(LEAST_SECONDS * pace, rows / processes))
+    return max(1, int(min(BYTES / max(1.0, size), SECONDS * pace, shared, MOST_ROWS)))

@@ -1,18 +1,17 @@
 # pyright: basic
-"""Documents to mathematics: names resolved, everything substituted, every error reported.
+"""Text to mathematics: names resolved, everything substituted, every error reported.
 
-A document goes through these, in this order; `symbols` has what its names mean, `resolver` reads its expressions.
+`elaborate_files` is the way of a right model: decode, compose, read, elaborate. A document goes through these, in this
+order; `symbols` has what its names mean, and reads its expressions.
 
 ================= ===========================================================================
-``definitions``   parameters and `let`; ``functions``, ``inputs`` and ``solve`` what else has a name
-``modes``         flow, walls and outputs of modes; ``edges`` their transitions
+``definitions``   parameters, functions, `let`, `solve` and units; ``inputs``
+``modes``         flow, walls, outputs and scene of modes, and their transitions
 ``parts``         in the place of these: a system of parts as one mode
-``scene``         the shapes of the scene
-``experiment``    start and settings; ``reference`` what is known of runs
-``events``        transitions with a memory, then ``timers``: the time in a mode
+``experiment``    start, settings, and what is known of runs
+``events``        transitions with a memory
+``derived``       the time in a mode; smaller systems, and flat ones of parts
 ================= ===========================================================================
-
-Of the system that this gives, ``slicing`` makes a smaller one, and ``product`` a flat one of parts.
 """
 
 from __future__ import annotations
@@ -20,36 +19,34 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NoReturn
+from typing import Any
 
 from hsdsl.base import limits
 from hsdsl.base.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
 from hsdsl.base.names import SINCE
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.definitions import (
+    define_functions,
     define_lets,
     define_parameters,
     elaborate_units,
+    named_functions,
     substituted_definitions,
 )
+from hsdsl.language.elaborate.derived import with_timers
 from hsdsl.language.elaborate.events import with_events
-from hsdsl.language.elaborate.experiment import elaborate_experiment, elaborate_initial
-from hsdsl.language.elaborate.functions import define_functions, named_functions
+from hsdsl.language.elaborate.experiment import elaborate_experiment, elaborate_initial, elaborate_reference
 from hsdsl.language.elaborate.inputs import define_inputs, switch_name
-from hsdsl.language.elaborate.modes import elaborate_modes, elaborate_outputs
+from hsdsl.language.elaborate.modes import elaborate_modes, elaborate_outputs, elaborate_scene, scene_of
 from hsdsl.language.elaborate.parts import Parts
-from hsdsl.language.elaborate.parts.files import read_automata
-from hsdsl.language.elaborate.reference import elaborate_reference
-from hsdsl.language.elaborate.resolver import ExpressionResolver, resolved_expression
-from hsdsl.language.elaborate.scene import elaborate_scene, scene_of
-from hsdsl.language.elaborate.symbols import SymbolTable
-from hsdsl.language.elaborate.timers import with_timers
+from hsdsl.language.elaborate.parts.instances import read_automata
+from hsdsl.language.elaborate.symbols import SymbolTable, resolved_expression
+from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.syntax import ExpressionError
-from hsdsl.language.expression.timebox import PARTS, OutOfTime, timebox
+from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
 from hsdsl.language.files import ModelFiles
-from hsdsl.language.schema import AutomatonDocument, ModelDocument, SystemDocument, read
+from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, SystemDocument
+from hsdsl.language.schema.read import read
 from hsdsl.language.source import Node, Text, compose, decode
 from hsdsl.language.system import HybridSystem, switch_parameter
 
@@ -100,32 +97,42 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
 
     Raises ModelError: the model has errors; all of them are carried, in source order.
     """
+    findings = Findings(files.path)
     with limits.applied(files.limits):
-        findings = Findings(files.path)
         text = decode(files.path, files.text)
         root = compose(text, findings)
         data = read_automata(root, files, findings)
+        known = dict(findings.diagnostics)
         document = read(root, findings)
-        symbols = SymbolTable(document, ExpressionResolver(findings), files, data=data, drivable=drivable)
+        well_formed = findings.diagnostics == known
         try:
-            with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.resolver.box:
-                system = with_events(_system(symbols))
-                system = with_timers(system) if symbols.timed else system
-        except OutOfTime:
-            _report_timeout(symbols.resolver)
-        except ValueError as error:  # a check at birth that no diagnostic foresaw
-            raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
-        top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
-        return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
+            return _elaborated(SymbolTable(document, findings, files, data=data, drivable=drivable), root, text)
+        except ModelError:
+            from hsdsl.language.diagnosis.corrections import rename_states
+
+            findings = Findings(files.path, known)
+            if not (well_formed and rename_states(root, findings)):
+                raise
+            document = read(root, findings)  # the same with other names of states
+            return _elaborated(SymbolTable(document, findings, files, data=data, drivable=drivable), root, text)
 
 
-def _report_timeout(resolver: ExpressionResolver) -> NoReturn:
-    message = "working this expression out takes too long"
-    hint = "make parts of it states, or allow more time with --limit seconds=600"
-    if resolver.at is not None:
-        resolver.report(resolver.at.place, TOO_LONG, message, hint)
-    resolver.findings.raise_if_any()
-    raise ModelError([Diagnostic(TOO_LONG, message, None, hint)])
+def _elaborated(symbols: SymbolTable, root: Node, text: Text) -> Elaboration:
+    try:
+        with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.box:
+            system = with_events(_system(symbols))
+            system = with_timers(system) if symbols.timed else system
+    except OutOfTime:
+        message = "working this expression out takes too long"
+        hint = "make parts of it states, or allow more time with --limit seconds=600"
+        if symbols.at is not None:
+            symbols.report(symbols.at.place, TOO_LONG, message, hint)
+        symbols.findings.raise_if_any()
+        raise ModelError([Diagnostic(TOO_LONG, message, None, hint)]) from None
+    except ValueError as error:  # a check at birth that no diagnostic foresaw
+        raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
+    top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
+    return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
 
 
 def _system(symbols: SymbolTable) -> HybridSystem:
@@ -150,7 +157,10 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     experiment = elaborate_experiment(symbols)
     units = of_parts | elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)
-    symbols.resolver.findings.raise_if_any()
+    symbols.findings.raise_if_any()
+    kinds = document.automata.values() if isinstance(document, SystemDocument) else ()
+    tables = (document.modes, *(kind.modes for kind in kinds if isinstance(kind, AutomatonDocument)))
+    solves = [document.solve, *(mode.solve for table in tables for mode in table.values())]
     return HybridSystem(
         path=symbols.files.path,
         digest=symbols.files.with_data(symbols.data).digest,
@@ -169,16 +179,9 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         parts=parts,
         definitions=tuple(substituted_definitions(document)),
         functions=functions,
-        unknowns=_unknowns(document),
+        unknowns=tuple(str(name) for solve in solves if solve is not None for name in solve.unknowns),
         assumptions=tuple(filter(None, map(symbols.text, document.assumptions))),
     )
-
-
-def _unknowns(document: ModelDocument) -> tuple[str, ...]:
-    kinds = document.automata.values() if isinstance(document, SystemDocument) else ()
-    tables = (document.modes, *(kind.modes for kind in kinds if isinstance(kind, AutomatonDocument)))
-    given = [document.solve, *(mode.solve for modes in tables for mode in modes.values())]
-    return tuple(str(name) for solve in given if solve is not None for name in solve.unknowns)
 
 
 def parameter_expression(system: HybridSystem, text: str, where: str, allowed: Sequence[str] | None = None) -> Any:
@@ -189,7 +192,15 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
     Raises UsageError: it is not an expression, or uses something else.
     """
     usable = {p.name for p in system.parameters} if allowed is None else set(allowed)
-    scope = Scope(_override_values(system, usable), place=where)
+    others = {"t": "the time", SINCE: "the time since the mode was entered", **dict.fromkeys(system.states, "a state")}
+    others |= dict.fromkeys((i.name for i in system.inputs), "an input")
+    values: dict[str, Meaning] = {
+        name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
+    }
+    for name in (parameter.name for parameter in system.parameters):
+        late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
+        values[name] = Value(symbol(name)) if name in usable else late
+    scope = Scope(values | named_functions(system.functions, values), place=where)
     try:
         with deep_stack(), timebox(limits.current().seconds / PARTS):
             return resolved_expression(text, scope).expr
@@ -197,15 +208,3 @@ def parameter_expression(system: HybridSystem, text: str, where: str, allowed: S
         raise UsageError(f"{where}: {error.message}", error.hint) from None
     except OutOfTime:
         raise UsageError(f"{where}: working this expression out takes too long") from None
-
-
-def _override_values(system: HybridSystem, usable: set[str]) -> dict[str, Meaning]:
-    others = {"t": "the time", SINCE: "the time since the mode was entered", **dict.fromkeys(system.states, "a state")}
-    others.update(dict.fromkeys((i.name for i in system.inputs), "an input"))
-    values: dict[str, Meaning] = {
-        name: Refusal("HS117", f"'{name}' is {kind}; only parameters can be used here") for name, kind in others.items()
-    }
-    for name in (parameter.name for parameter in system.parameters):
-        late = Refusal("HS302", f"'{name}' cannot be used here: only earlier parameters can")
-        values[name] = Value(symbol(name)) if name in usable else late
-    return values | named_functions(system.functions, values)

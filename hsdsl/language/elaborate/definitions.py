@@ -1,18 +1,27 @@
 # pyright: basic
-"""Parameters, the named subexpressions of `let`, and the units of names."""
+"""What a file gives a name: parameters, functions, `let`, unknowns of `solve`; and the units of names."""
 
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 
-from hsdsl.base.names import did_you_mean, shown
-from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
-from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, definition_order
-from hsdsl.language.expression.scope import Scope, Value, symbol
-from hsdsl.language.schema import AutomatonDocument, ModelDocument, ParameterEntry
-from hsdsl.language.source import Scalar
-from hsdsl.language.system import Definition, Parameter
+from hsdsl.base.graphs import cycle
+from hsdsl.base.names import counted, did_you_mean, shown
+from hsdsl.language.elaborate.symbols import KINDS, Meanings, SymbolTable, definition_order
+from hsdsl.language.expression import parse
+from hsdsl.language.expression.algebra import Solved, linear_solutions
+from hsdsl.language.expression.scope import Function, Meaning, Refusal, Scope, Value, functions_called, symbol
+from hsdsl.language.schema.documents import (
+    AutomatonDocument,
+    FunctionDocument,
+    ModelDocument,
+    ParameterEntry,
+    SolveDocument,
+)
+from hsdsl.language.source import ABSENT, Key, Scalar
+from hsdsl.language.system import Definition, FunctionText, Parameter
 
 _UNDER_LET = "give it under `let`, which may use everything"
 _ONLY_PARAMETERS = "a parameter is an expression of earlier parameters"
@@ -49,28 +58,19 @@ def define_parameter(
     bounds = [symbols.number(s, scope, finite_now=True) if s is not None else None for s in (entry.min, entry.max)]
     if value is None:
         return None, None
-    _check_bounds(symbols, name, scalar, value, *bounds)
-    least, most = (None if bound is None else bound.expr for bound in bounds)
-    parameter = Parameter(name, value.expr, scalar.value, None, least, most, symbols.text(entry.about))
-    return Value(symbol(name), value.number), parameter
-
-
-def _check_bounds(
-    symbols: SymbolTable, name: str, scalar: Scalar, value: Value, least: Value | None, most: Value | None
-) -> None:
+    least, most = bounds
     message, hint = None, None
     if least is not None and most is not None and least.number > most.number:
         message, hint = f"the least value of '{name}' is above its largest", "exchange `min` and `max`"
     elif least is not None and value.number < least.number:
-        message = f"'{name}' is {_number(value)}, below its least value {_number(least)}"
+        message = f"'{name}' is {float(value.number):.6g}, below its least value {float(least.number):.6g}"
     elif most is not None and value.number > most.number:
-        message = f"'{name}' is {_number(value)}, above its largest value {_number(most)}"
+        message = f"'{name}' is {float(value.number):.6g}, above its largest value {float(most.number):.6g}"
     if message:
         symbols.report(scalar.place, "HS309", message, hint)
-
-
-def _number(value: Value) -> str:
-    return f"{float(value.number):.6g}"
+    low, high = (None if bound is None else bound.expr for bound in bounds)
+    parameter = Parameter(name, value.expr, scalar.value, None, low, high, symbols.text(entry.about))
+    return Value(symbol(name), value.number), parameter
 
 
 def define_lets(symbols: SymbolTable) -> None:
@@ -124,3 +124,111 @@ def units_of(symbols: SymbolTable, document: ModelDocument | AutomatonDocument, 
             message = f"the parameter '{key}' has the unit '{shown(unit)}' here and '{shown(units[key])}' in `units`"
             symbols.report(key.place, "HS316", message, "keep one of them")
     return units
+
+
+_WHAT = "a function uses its arguments, parameters and other functions"
+
+
+def define_functions(symbols: SymbolTable) -> tuple[FunctionText, ...]:
+    """The meaning of every function, in ``symbols.values``, and what was written for it.
+
+    The parameters that a function uses count as they are known at a call: see ``symbols.of_functions``.
+    """
+    documents = symbols.document.functions
+    later = "'{}' is not defined yet: a parameter is an expression of earlier ones"
+    symbols.of_functions |= {str(name): Refusal("HS302", later.format(name)) for name in symbols.document.parameters}
+    made = {str(name): _function(symbols, name, document) for name, document in documents.items()}
+    symbols.values.update(made)
+    symbols.of_functions.update(made)
+
+    def spoil(function: Function) -> None:
+        """Mark a function as broken and reported."""
+        symbols.values[function.name] = symbols.of_functions[function.name] = replace(function, tree=None)
+
+    parameters: Meanings = {str(name): Value(symbol(name)) for name in symbols.document.parameters}
+    names = symbols.scope((), _WHAT, {**parameters, **made}, "make it an argument").values
+    for key, document in documents.items():
+        function = made[str(key)]
+        own: Meanings = {argument: Value(symbol(argument)) for argument in function.arguments}
+        scope = Scope(ChainMap(own, names))  # pyright: ignore[reportArgumentType]
+        if function.tree is not None and not symbols.names_known(document.expression, function.tree, scope):
+            spoil(function)
+    calls = {name: tuple(functions_called(f.tree)) if f.tree is not None else () for name, f in made.items()}
+    while (found := cycle(calls)) is not None:
+        message = f"`{found[0]}` is defined by itself: {' -> '.join((*found, found[0]))}"
+        place = next(key for key in documents if key == found[0]).place
+        symbols.report(place, "HS302", message, "no function may lead back to itself")
+        for name in found:
+            calls[name] = ()
+            spoil(made[name])
+    return tuple(FunctionText(f.name, f.arguments, f.text) for f in made.values())
+
+
+def named_functions(texts: Iterable[FunctionText], values: Mapping[str, Meaning]) -> dict[str, Function]:
+    """The functions of a system, over the meaning of the parameters that they use."""
+    names: dict[str, Meaning] = {}
+    others = ChainMap(names, values)  # pyright: ignore[reportArgumentType]
+    made = {f.name: Function(f.name, f.arguments, parse(f.text), f.text, others) for f in texts}
+    names.update(made)
+    return made
+
+
+def _function(symbols: SymbolTable, name: Key, document: FunctionDocument) -> Function:
+    known = ABSENT not in document.of
+    for place, argument in enumerate(document.of):
+        kind = symbols.names.get(argument)
+        if argument in document.of[:place]:
+            symbols.report(argument.place, "HS301", f"`{name}` has two arguments '{argument}'", "give one another name")
+            known = False
+        elif kind in ("parameters", "functions"):
+            message = f"the argument '{argument}' of `{name}` has the name of {KINDS[kind]}"
+            symbols.report(argument.place, "HS301", message, "give one of them another name")
+            known = False
+    tree = symbols.tree(document.expression)
+    arguments, text = tuple(map(str, document.of)), document.expression.value
+    return Function(str(name), arguments, tree if known else None, text, symbols.of_functions)
+
+
+def placeholders(document: SolveDocument | None, mode: str = "") -> Meanings:
+    """A symbol of its own for each unknown, until the equations are solved."""
+    return {str(name): Value(symbol(_inner(name, mode))) for name in (document.unknowns if document else ())}
+
+
+def _inner(name: str, mode: str) -> str:
+    return f"unknown {name} {mode}"
+
+
+def solutions(symbols: SymbolTable, document: SolveDocument, scope: Scope, mode: str = "") -> Solved | None:
+    """What each unknown is, with its placeholder; None where something is reported."""
+    for name in document.unknowns:
+        kind = symbols.names.get(name)
+        if kind is not None and not (kind == "unknowns" and not mode):
+            message = f"'{name}' is an unknown of `solve` here, and also {KINDS[kind]}"
+            symbols.report(name.place, "HS301", message, "give one of them another name")
+            return None
+    if len(document.unknowns) != len(document.equations):
+        lists = {"unknown": document.unknowns, "equation": document.equations}
+        count = " and ".join(counted(len(items), what) for what, items in lists.items())
+        place = document.unknowns[0].place if document.unknowns else document.equations[0].place
+        symbols.report(place, "HS325", f"`solve` has {count}", "give one equation for each unknown")
+        return None
+    sides = [symbols.equation(scalar, scope) for scalar in document.equations]
+    if any(pair is None for pair in sides):
+        return None
+    unknowns = [symbol(_inner(name, mode)) for name in document.unknowns]
+    made = linear_solutions([pair for pair in sides if pair is not None], unknowns)
+    if isinstance(made, Solved):
+        return made
+    place, why, hint = made
+    symbols.report(document.equations[place].place, "HS325", why, hint)
+    return None
+
+
+def with_solutions(values: Mapping[str, object], solved: Solved) -> Meanings:
+    """Values with the solutions in the place of the unknowns' symbols."""
+    made: Meanings = {}
+    for name, value in values.items():
+        if isinstance(value, Value) and value.expr.free_symbols & solved.values.keys():
+            uses, size = value.uses | solved.uses, value.size + solved.size
+            made[name] = replace(value, expr=value.expr.xreplace(solved.values), uses=uses, size=size, number=None)
+    return made

@@ -1,5 +1,5 @@
 # pyright: basic
-"""The initial mode and state, and the experiment."""
+"""The initial mode and state, the experiment, and references: exact knowledge of runs, checked against the model."""
 
 from __future__ import annotations
 
@@ -9,13 +9,19 @@ from hsdsl.base.errors import STEP_AND_TOLERANCE
 from hsdsl.base.graphs import cycle
 from hsdsl.base.names import SINCE, closest, did_you_mean, shown
 from hsdsl.base.parts import for_all, meant, of_all
-from hsdsl.language.elaborate.edges import known_mode
+from hsdsl.language.elaborate.modes import known_mode
 from hsdsl.language.elaborate.symbols import SymbolTable
+from hsdsl.language.expression.parse import Name, walk
 from hsdsl.language.expression.scope import Scope, Value, state
-from hsdsl.language.expression.syntax import Name, walk
-from hsdsl.language.schema import MultiplesDocument
-from hsdsl.language.source import ABSENT, Key, Scalar
-from hsdsl.language.system import Experiment, Initial, started
+from hsdsl.language.schema.documents import (
+    ExperimentDocument,
+    MultiplesDocument,
+    ReferenceDocument,
+    ReferenceStateDocument,
+    ReferenceTransitionDocument,
+)
+from hsdsl.language.source import ABSENT, Key, Scalar, SourceRange
+from hsdsl.language.system import Experiment, Initial, KnownState, KnownTransition, Mode, Reference, started
 
 _OWN = ("step", "tolerance", "relaxation")
 _POSITIVE = (*_OWN, "every")
@@ -42,7 +48,7 @@ def elaborate_initial(symbols: SymbolTable) -> Initial:
 
 def _in_order(symbols: SymbolTable, given: dict[Key, Scalar]) -> list[str]:
     """The states with an initial value, each behind those whose value it uses; values in a cycle are left out."""
-    trees = {str(key): symbols.resolver.tree(scalar) for key, scalar in given.items()}
+    trees = {str(key): symbols.tree(scalar) for key, scalar in given.items()}
     uses = {
         name: [] if tree is None else [n.name for n in walk(tree) if isinstance(n, Name) and n.name in trees]
         for name, tree in trees.items()
@@ -92,15 +98,21 @@ def elaborate_experiment(symbols: SymbolTable) -> Experiment:
     end = symbols.parameter_scope(sentence, "to end with an event, let a transition lead to a mode with final: true")
     method = document.method  # checked where methods are known, with its place
     until = _setting(symbols, end, "until", document.until)
-    given = document.samples
+    given: Any = document.samples
     every = given.every if isinstance(given, MultiplesDocument) else None
+    samples: Any = None if every else given
+    if isinstance(given, list):
+        times = [symbols.number(scalar, scope, finite_now=True) for scalar in given]
+        samples = tuple(time.expr for time in times if time is not None)
+    elif samples is not None:
+        samples = _setting(symbols, scope, "samples", samples)
     numbers = {key: _setting(symbols, scope, key, getattr(document, key)) for key in (*_OWN, "max_transitions")}
     return Experiment(
         until=until,
         scheme=symbols.text(document.scheme),
         completion=symbols.text(document.completion),
         method=Key.at(method.value, method.place) if method and method.value != ABSENT else None,
-        samples=None if every else _samples(symbols, scope, given),
+        samples=samples,
         every=_setting(symbols, scope, "every", every),
         scale=_scale(symbols, scope, document.scale),
         **numbers,
@@ -144,8 +156,84 @@ def _scale(symbols: SymbolTable, scope: Scope, given: dict[Key, Scalar]) -> tupl
     return tuple((name, size) for name, size in for_all(sizes, states).items() if size is not None)
 
 
-def _samples(symbols: SymbolTable, scope: Scope, given: Any) -> Any:
-    if not isinstance(given, list):
-        return _setting(symbols, scope, "samples", given)
-    values = [symbols.number(scalar, scope, finite_now=True) for scalar in given]
-    return tuple(v.expr for v in values if v is not None)
+_WORDS = ("initial.mode", "experiment.scheme", "experiment.method")
+
+
+def elaborate_reference(symbols: SymbolTable, modes: tuple[Mode, ...]) -> tuple[Reference, ...]:
+    """The references of the file."""
+    checker = _Checker(symbols, modes)
+    return tuple(checker.reference(document) for document in symbols.document.reference)
+
+
+class _Checker:
+    """References against one model."""
+
+    def __init__(self, symbols: SymbolTable, modes: tuple[Mode, ...]) -> None:
+        self.symbols = symbols
+        self.scope: Scope = symbols.parameter_scope("a reference has numbers or expressions of parameters")
+        self.edges = list(dict.fromkeys(edge.name for mode in modes for edge in mode.edges))
+        self.complete = bool(modes) if symbols.parts else len(modes) == len(symbols.document.modes)
+        self.parameters = [name for name, kind in symbols.names.items() if kind == "parameters"]
+
+    def reference(self, document: ReferenceDocument) -> Reference:
+        """One reference."""
+        return Reference(
+            settings=self.settings(document.settings),
+            source=self.symbols.text(document.source),
+            trust=None if document.trust is None else self.number(document.trust),
+            transitions=tuple(self.transition(event) for event in document.transitions),
+            states=tuple(self.state(state) for state in document.states),
+        )
+
+    def settings(self, given: dict[Key, Scalar]) -> dict[str, str]:
+        """What differs from the file."""
+        for key, scalar in given.items():
+            group, dot, rest = key.partition(".")
+            if key == "initial.mode":
+                known_mode(self.symbols, scalar)
+            elif key not in _WORDS:
+                self.number(scalar)
+            if not dot or key in self.parameters:
+                self.known(str(key), key.place, "parameter", self.parameters)
+            elif group == "initial":
+                self.known(rest, key.place, "state", ["mode", *self.symbols.all_states()])
+            elif group == "experiment" and rest.startswith("scale."):
+                self.known(rest.removeprefix("scale."), key.place, "state", [*self.symbols.all_states()])
+            elif group == "experiment":
+                self.known(rest, key.place, "setting", list(ExperimentDocument.model_fields))
+            else:
+                self.known(group, key.place, "group", ["initial", "experiment"])
+        return {str(key): scalar.value for key, scalar in given.items()}
+
+    def transition(self, event: Scalar | ReferenceTransitionDocument) -> KnownTransition:
+        """A transition, also where its time alone is given."""
+        if isinstance(event, Scalar):
+            return KnownTransition(self.number(event))
+        edge = self.symbols.text(event.edge)
+        if event.edge is not None and edge is not None and self.complete:
+            self.known(edge, event.edge.place, "transition", self.edges)
+        before, after = self.numbers(event.before), self.numbers(event.after)
+        return KnownTransition(self.number(event.time), edge, before, after)
+
+    def state(self, state: ReferenceStateDocument) -> KnownState:
+        """A state at a time."""
+        mode = None if state.mode is None else known_mode(self.symbols, state.mode)
+        return KnownState(self.number(state.time), mode, self.numbers(state.__pydantic_extra__))
+
+    def numbers(self, given: dict[Key, Scalar]) -> dict[str, str]:
+        """Meanings of states and outputs."""
+        columns = [*self.symbols.all_states(), *self.symbols.all_outputs]
+        for key in given:
+            self.known(key, key.place, "state or output", columns)
+        return {str(key): self.number(scalar) for key, scalar in given.items()}
+
+    def number(self, scalar: Scalar) -> str:
+        """The text of an expression of parameters."""
+        self.symbols.number(scalar, self.scope)
+        return scalar.value
+
+    def known(self, name: str, place: SourceRange, kind: str, names: list[str]) -> None:
+        """Report a name that nothing has."""
+        if name not in names:
+            message = f"there is no {kind} '{shown(name)}'"
+            self.symbols.report(place, "HS314", message, did_you_mean(name, names))

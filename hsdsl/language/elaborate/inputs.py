@@ -19,7 +19,7 @@ from hsdsl.base.samples import Hold, in_order
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable
 from hsdsl.language.expression.scope import Refusal, Scope, Value, symbol
 from hsdsl.language.files import DataRefused
-from hsdsl.language.schema import InputFile, InputSamples
+from hsdsl.language.schema.documents import InputFile, InputSamples
 from hsdsl.language.source import ABSENT, Key, Scalar
 from hsdsl.language.system import SampledInput
 
@@ -115,7 +115,7 @@ def read_samples(symbols: SymbolTable, name: Key, entry: InputFile) -> Samples |
     table = _Table(str(symbols.files.folder / file.value), lines, entry.hold)
     table.read(name if column is None else column.value.strip(), file.value if column is None else None)
     for diagnostic in table.faults:
-        symbols.resolver.findings.add(diagnostic)
+        symbols.findings.add(diagnostic)
     return None if table.faults else (tuple(table.times), tuple(table.values))
 
 

@@ -1,5 +1,9 @@
 # pyright: basic
-"""Constants as numbers, to know that they have a finite real value. Bounded: nothing here grows with a value."""
+"""Bounds on the work of SymPy: constants as numbers, exact numbers of millions of digits, expressions without end.
+
+SymPy folds numbers wherever they meet, also inside symbolic powers, so every operation is measured before it is done.
+Nothing here grows with a value.
+"""
 
 from __future__ import annotations
 
@@ -81,3 +85,68 @@ def _guarded(function: Any, arguments: list[Any]) -> Any:
 def _real(number: Any) -> Any:
     number = _context.convert(number)
     return number if isinstance(number, _context.mpf) and finite(number) else NAN
+
+
+LARGEST_EXPONENT = 1000
+MOST_BITS = 6_000  # of one exact number: the product of two must still print as a decimal (4,300 digits)
+MOST_BITS_WITHIN = 1_000_000  # of the numbers SymPy meets when it brings sums to a common denominator
+MOST_BITS_WITHIN_A_POWER = 12_000  # of those it meets in powers of sums: now and then it asks whether one is prime
+MOST_NODES = 100_000
+MOST_NODES_OF_A_CONSTANT = 500  # SymPy computes one as often as it asks for its sign
+MOST_LEVELS_OF_A_CONSTANT = 12  # and computes it anew at each of its levels
+MOST_LEVELS = 100  # SymPy's time grows with the cube of it
+LARGEST_NUMBER = 2**1024  # no float is as large
+
+
+def bits(expr: Any) -> int:
+    """The length of the exact numbers that are factors of an expression."""
+    if expr.is_Rational:
+        return max(int(expr.p).bit_length(), int(expr.q).bit_length())
+    if expr.is_Mul:
+        return sum(bits(factor) for factor in expr.args if factor.is_Rational or factor.is_Pow)
+    if expr.is_Pow and expr.args[0].is_Rational:
+        return bits(expr.args[0]) * _constant_part(expr.args[1])
+    return 0
+
+
+def _constant_part(exponent: Any) -> int:
+    constant = exponent if exponent.is_Rational else exponent.as_coeff_Add()[0]
+    return int(abs(constant)) + 1 if constant.is_Rational else 1
+
+
+def beyond_floats(expr: Any) -> bool:
+    """Whether a term of an expression has a coefficient that no float holds."""
+    coefficients: list[Any] = [term.as_coeff_Mul()[0] for term in sp.Add.make_args(expr)]
+    return any(c.is_Rational and abs(c.p) >= LARGEST_NUMBER * c.q for c in coefficients)
+
+
+def sum_bits(terms: list[Any]) -> int:
+    """How long the common denominator of like terms of a sum can get."""
+    denominators: dict[Any, set[int]] = {}
+    for term in terms:
+        for part in sp.Add.make_args(term):
+            split: tuple[Any, Any] = part.as_coeff_Mul()
+            coefficient, rest = split
+            if coefficient.is_Rational and coefficient.q != 1:
+                denominators.setdefault(rest, set()).add(int(coefficient.q))
+    return max((sum(q.bit_length() for q in group) for group in denominators.values()), default=0)
+
+
+def power_bits(base: Any, exponent: Any) -> int:
+    """How long the number is that ``base**exponent`` contains."""
+    return bits(base) * _constant_part(exponent)
+
+
+def large_exponent(exponent: Any) -> bool:
+    """Whether a numeric exponent is above the cap, also one hidden in a logarithm: ``exp(10**9*log(3))``."""
+    if exponent.is_Rational:
+        return abs(exponent) > LARGEST_EXPONENT
+    return any(_large_logarithm(term) for term in sp.Add.make_args(exponent))
+
+
+def _large_logarithm(term: Any) -> bool:
+    coefficient, rest = term.as_coeff_Mul()
+    logarithms = [f for f in sp.Mul.make_args(rest) if isinstance(f, sp.log)]
+    if not logarithms:
+        return False
+    return abs(coefficient) * max([1, *(bits(f.args[0]) // 64 for f in logarithms)]) > LARGEST_EXPONENT

@@ -1,25 +1,304 @@
-"""Tokens to a tree, by operator precedence. The precedence is Python's."""
+"""Text to tokens, and tokens to a tree by operator precedence, which is Python's. Each node has its range."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+import re
+from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
-from typing import Literal
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Literal, Protocol
 
-from hsdsl.base.functions import FUNCTIONS
-from hsdsl.base.names import shown
-from hsdsl.language.expression import syntax
-from hsdsl.language.expression.expression_hints import CASES, compared, measured, power_of, side_by_side, timed
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.syntax import Expected, ExpressionError, Tree
-from hsdsl.language.expression.tokens import Token, tokenize
+from hsdsl.base.names import LOOKALIKES, normalised, shown
+from hsdsl.language.expression.timebox import deep_stack
+
+Expected = Literal["number", "condition", "inequality"]
+
+
+class Ranged(Protocol):
+    """A token or a node: it has a range of characters."""
+
+    @property
+    def start(self) -> int: ...
+    @property
+    def end(self) -> int: ...
+
+
+class ExpressionError(Exception):
+    """A fault at the characters ``start`` to ``end`` of an expression."""
+
+    def __init__(self, code: str, message: str, start: int, end: int, hint: str | None = None) -> None:
+        super().__init__(message)
+        self.code = code
+        self.message = message
+        self.start = start
+        self.end = end
+        self.hint = hint
+
+    @classmethod
+    def at(cls, node: Ranged, code: str, message: str, hint: str | None = None) -> ExpressionError:
+        """A fault at a token or a node."""
+        return cls(code, message, node.start, node.end, hint)
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number, exactly as written."""
+
+    value: Fraction
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Name:
+    """A name."""
+
+    name: str
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Negative:
+    """``-operand``."""
+
+    operand: Tree
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Sum:
+    """Terms added (False) or subtracted (True), from left to right."""
+
+    terms: tuple[tuple[bool, Tree], ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Product:
+    """Factors multiplied (False) or divided by (True), from left to right."""
+
+    factors: tuple[tuple[bool, Tree], ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Power:
+    """``base**exponent``."""
+
+    base: Tree
+    exponent: Tree
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """``function(argument, ...)``."""
+
+    function: str
+    arguments: tuple[Tree, ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """``a < b <= c``: one operator fewer than operands."""
+
+    operands: tuple[Tree, ...]
+    operators: tuple[str, ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Logic:
+    """Conditions joined by `and` or by `or`."""
+
+    operator: Literal["and", "or"]
+    operands: tuple[Tree, ...]
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Not:
+    """``not operand``."""
+
+    operand: Tree
+    start: int
+    end: int
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """`true` or `false`."""
+
+    value: bool
+    start: int
+    end: int
+
+
+Tree = Number | Name | Negative | Sum | Product | Power | Call | Comparison | Logic | Not | Truth
+CONDITIONS = (Comparison, Logic, Not, Truth)
+
+
+def children(tree: Tree) -> tuple[Tree, ...]:
+    """The nodes directly below one."""
+    match tree:
+        case Number() | Name() | Truth():
+            return ()
+        case Negative() | Not():
+            return (tree.operand,)
+        case Sum():
+            return tuple(term for _, term in tree.terms)
+        case Product():
+            return tuple(factor for _, factor in tree.factors)
+        case Power():
+            return (tree.base, tree.exponent)
+        case Call():
+            return tree.arguments
+        case Comparison() | Logic():
+            return tree.operands
+
+
+def walk(tree: Tree) -> Iterator[Tree]:
+    """Every node, in the order of the text."""
+    waiting = [tree]
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting.extend(reversed(children(node)))
+
+
+def mapped(tree: Tree, change: Callable[[Tree], Tree]) -> Tree:
+    """A node with other nodes directly below it."""
+    match tree:
+        case Number() | Name() | Truth():
+            return tree
+        case Negative() | Not():
+            return replace(tree, operand=change(tree.operand))
+        case Sum():
+            return replace(tree, terms=tuple((minus, change(term)) for minus, term in tree.terms))
+        case Product():
+            return replace(tree, factors=tuple((below, change(factor)) for below, factor in tree.factors))
+        case Power():
+            return replace(tree, base=change(tree.base), exponent=change(tree.exponent))
+        case Call():
+            return replace(tree, arguments=tuple(map(change, tree.arguments)))
+        case Comparison() | Logic():
+            return replace(tree, operands=tuple(map(change, tree.operands)))
+
+
+LONGEST = 10_000  # characters
+LARGEST_INTEGER = 10**18
+_MOST_DIGITS = 1000
+_NUMBER = re.compile(r"0[xX][0-9a-fA-F]+|0[oO][0-7]+|([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_OPERATOR = re.compile(r"\*\*|<=|>=|==|!=|[-+*/(),<>]")
+_MEMBER = re.compile(r"(\[[^\[\]\n]{1,100}\])?\.([^\W\d]\w*)")  # of an instance of a part
+_GROUPED = re.compile(r"[0-9]+(_[0-9]+)+")
+
+
+@dataclass(frozen=True, slots=True)
+class Token:
+    """A number, a name, an operator, or the end."""
+
+    kind: Literal["number", "name", "operator", "end"]
+    text: str
+    start: int
+    end: int
+    value: Fraction = Fraction(0)
+
+
+def tokenize(text: str, expected: Expected) -> list[Token]:
+    """The tokens of an expression, the last one being the end.
+
+    Raises ExpressionError: at the first character that begins none.
+    """
+    if len(text) > LONGEST:
+        message = f"the expression has {len(text):,} characters; the most is {LONGEST:,}"
+        raise ExpressionError("HS110", message, 0, 1, "name its parts under `let`")
+    tokens: list[Token] = []
+    at = 0
+    while at < len(text):
+        if text[at].isspace():
+            at += 1
+            continue
+        token = _number(text, at) or _name(text, at) or _operator(text, at, expected)
+        tokens.append(token)
+        at = token.end
+    tokens.append(Token("end", "", len(text), len(text)))
+    return tokens
+
+
+def _number(text: str, at: int) -> Token | None:
+    grouped = _GROUPED.match(text, at)
+    if grouped:
+        plain = grouped.group().replace("_", "")
+        raise ExpressionError("HS105", "digits are not grouped by `_`", at, grouped.end(), f"write {shown(plain)}")
+    match = _NUMBER.match(text, at)
+    if not match:
+        return None
+    return Token("number", match.group(), at, match.end(), _value(match, at))
+
+
+def _value(match: re.Match[str], at: int) -> Fraction:
+    digits, exponent = match.group(1), match.group(2)
+    if len(match.group()) > _MOST_DIGITS:
+        raise ExpressionError("HS124", f"the number has more than {_MOST_DIGITS:,} digits", at, match.end())
+    if digits is None or (digits.isdigit() and not exponent):
+        value = int(match.group(), 10 if digits else 0)
+        if value > LARGEST_INTEGER:
+            hint = "write it with an exponent: 2.5e20"
+            raise ExpressionError("HS124", "a whole number is at most 1e18", at, match.end(), hint)
+        return Fraction(value)
+    power = int(exponent[1:]) if exponent else 0
+    return _scaled(Fraction(digits), power, at, match.end())
+
+
+def _scaled(mantissa: Fraction, power: int, start: int, end: int) -> Fraction:
+    """``mantissa * 10**power``, refused where a float could not hold it, before anything large is computed."""
+    if mantissa == 0:
+        return mantissa
+    if abs(power) <= 2 * _MOST_DIGITS:
+        value = mantissa * Fraction(10) ** power
+        if Fraction(1, 2**1074) <= value < 2**1024:
+            return value
+    if power > 0:
+        raise ExpressionError("HS118", "the number is too large to have a finite value", start, end)
+    raise ExpressionError("HS105", "the number is below the smallest float", start, end, "write 0")
+
+
+def _name(text: str, at: int) -> Token | None:
+    if not text[at].isidentifier():
+        return None
+    end = at + 1
+    while end < len(text) and ("a" + text[end]).isidentifier() and text[end] not in LOOKALIKES:
+        end += 1
+    member = _MEMBER.match(text, end)
+    end = member.end() if member and member.group(2).isidentifier() else end
+    return Token("name", normalised(text[at:end]), at, end)
+
+
+def _operator(text: str, at: int, expected: Expected) -> Token:
+    match = _OPERATOR.match(text, at)
+    if match:
+        return Token("operator", match.group(), at, match.end())
+    from hsdsl.language.diagnosis.expressions import strange_sign
+
+    raise ExpressionError(*strange_sign(text, at, expected))
+
 
 DEEPEST = 200
 _COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 _OR, _AND, _NOT, _COMPARE, _ADD, _MULTIPLY, _POWER = range(1, 8)
 _BINDING = {"or": _OR, "and": _AND, "+": _ADD, "-": _ADD, "*": _MULTIPLY, "/": _MULTIPLY, "**": _POWER}
 _BINDING.update(dict.fromkeys(_COMPARISONS, _COMPARE))
-_FOREIGN_WORDS = ("if", "else", "for", "in", "is", "lambda", "then", "AND", "OR", "NOT")
 
 
 def parse(text: str, expected: Expected = "number") -> Tree:
@@ -31,12 +310,11 @@ def parse(text: str, expected: Expected = "number") -> Tree:
     if tokens[0].kind == "end":
         raise ExpressionError("HS121", "an expression is missing", 0, 1, "write a number or an expression")
     with deep_stack():
-        return _Parser(text, tokens, expected).whole()
+        return _Parser(tokens, expected).whole()
 
 
 class _Parser:
-    def __init__(self, text: str, tokens: list[Token], expected: Expected) -> None:
-        self.text = text
+    def __init__(self, tokens: list[Token], expected: Expected) -> None:
         self.expected = expected
         self.tokens = tokens
         self.at = 0
@@ -45,9 +323,8 @@ class _Parser:
     def whole(self) -> Tree:
         """The tree of all tokens."""
         tree = self.expression(0)
-        token = self.tokens[self.at]
-        if token.kind != "end":
-            raise self.unexpected(token)
+        if self.tokens[self.at].kind != "end":
+            raise self.unexpected()
         return tree
 
     def expression(self, weakest: int) -> Tree:
@@ -67,7 +344,7 @@ class _Parser:
             self.at += 1
             with self.deeper():
                 exponent = self.expression(_POWER)
-            return syntax.Power(left, exponent, begin, self.tokens[self.at - 1].end)
+            return Power(left, exponent, begin, self.tokens[self.at - 1].end)
         operators: list[str] = []
         operands = [left]
         while _BINDING.get(self.tokens[self.at].text, 0) == binding:
@@ -82,12 +359,12 @@ class _Parser:
         if first.text in ("-", "+"):
             negative = self.skipped(("-", "+")).count("-") % 2 == 1
             operand = self.expression(_POWER)
-            return syntax.Negative(operand, first.start, self.tokens[self.at - 1].end) if negative else operand
+            return Negative(operand, first.start, self.tokens[self.at - 1].end) if negative else operand
         if first.text == "not":
             denied = len(self.skipped(("not",))) % 2 == 1
             operand = self.expression(_COMPARE)
-            inner = syntax.Not(operand, first.start, self.tokens[self.at - 1].end)
-            return inner if denied else syntax.Not(inner, inner.start, inner.end)
+            inner = Not(operand, first.start, self.tokens[self.at - 1].end)
+            return inner if denied else Not(inner, inner.start, inner.end)
         return self.operand()
 
     def skipped(self, texts: tuple[str, ...]) -> list[str]:
@@ -102,22 +379,24 @@ class _Parser:
         token = self.tokens[self.at]
         if token.kind == "number":
             self.at += 1
-            return syntax.Number(token.value, token.start, token.end)
+            return Number(token.value, token.start, token.end)
         if token.kind == "name" and token.text in ("true", "false"):
             self.at += 1
-            return syntax.Truth(token.text == "true", token.start, token.end)
+            return Truth(token.text == "true", token.start, token.end)
         if token.kind == "name" and token.text not in ("and", "or"):
             self.at += 1
             if self.tokens[self.at].text == "(":
                 return self.call(token)
-            return syntax.Name(token.text, token.start, token.end)
+            return Name(token.text, token.start, token.end)
         if token.text == "(":
             self.at += 1
             with self.deeper():
                 inner = self.expression(0)
             self.close(token)
             return inner
-        raise self.missing(token)
+        from hsdsl.language.diagnosis.expressions import missing_operand
+
+        raise ExpressionError(*missing_operand(self.tokens, self.at))
 
     def call(self, function: Token) -> Tree:
         """A function's arguments."""
@@ -131,7 +410,7 @@ class _Parser:
                     break
                 self.at += 1
         end = self.close(opened)
-        return syntax.Call(function.text, tuple(arguments), function.start, end)
+        return Call(function.text, tuple(arguments), function.start, end)
 
     def close(self, opened: Token) -> int:
         """Take the closing parenthesis of ``opened``."""
@@ -141,7 +420,7 @@ class _Parser:
             return token.end
         if token.kind == "end":
             raise ExpressionError.at(opened, "HS103", "this parenthesis is never closed", "add `)`")
-        raise self.unexpected(token)
+        raise self.unexpected()
 
     @contextmanager
     def deeper(self) -> Generator[None]:
@@ -154,84 +433,19 @@ class _Parser:
         yield
         self.depth -= 1
 
-    def missing(self, token: Token) -> ExpressionError:
-        """The error for a missing operand."""
-        before = self.tokens[self.at - 1] if self.at else None
-        if before is None:
-            if token.text == ")":
-                return ExpressionError.at(token, "HS103", "this parenthesis closes nothing", "remove it")
-            return ExpressionError.at(token, "HS102", f"an operand is missing before `{token.text}`")
-        if before.text == "(" and token.text == ")":
-            return ExpressionError("HS102", "there is nothing between the parentheses", before.start, token.end)
-        hint = "write `**` for a power" if before.text == "**" and token.text == "*" else None
-        if before.text == "/" and token.text == "/":
-            hint = "write floor(x/y) for a whole quotient, and `#` before a comment"
-        hint = hint or f"write what follows `{before.text}`, or remove it"
-        return ExpressionError.at(before, "HS102", f"an operand is missing after `{before.text}`", hint)
+    def unexpected(self) -> ExpressionError:
+        """The error for something after an operand that is no operator."""
+        from hsdsl.language.diagnosis.expressions import unexpected
 
-    def unexpected(self, token: Token) -> ExpressionError:
-        """Something after an operand that is no operator."""
-        before = self.tokens[self.at - 1]
-        if token.text == ")":
-            return ExpressionError.at(token, "HS103", "this parenthesis closes nothing", "remove it")
-        if token.text == ",":
-            after = self.tokens[self.at + 1]
-            decimal = before.kind == after.kind == "number"
-            hint = "parentheses hold one expression" if self.depth else "write one expression here"
-            hint = _decimal(before.text, after.text) if decimal else hint
-            if self.expected == "inequality" and not self.depth:
-                hint = "write one inequality here: the rest of a `when` under `if`, of a `domain` as further items"
-            return ExpressionError.at(token, "HS102", "a comma separates only arguments of a function", hint)
-        return self.no_operator(before, token)
-
-    def no_operator(self, before: Token, token: Token) -> ExpressionError:
-        """Two operands side by side."""
-        left, right = shown(before.text, 30), shown(token.text, 30)
-        if token.text in _FOREIGN_WORDS or before.text in _FOREIGN_WORDS:
-            word = token if token.text in _FOREIGN_WORDS else before
-            hint = f"write `{word.text.lower()}`" if word.text.isupper() else CASES
-            return ExpressionError.at(word, "HS109", f"`{word.text}` is not a word of the language", hint)
-        if before.text in FUNCTIONS:
-            message = f"`{before.text}` is a function and needs parentheses"
-            hint = f"write {before.text}({right})"
-            return ExpressionError.at(before, "HS112", message, hint)
-        if token.text == "(" and self.power_of_function():
-            message = f"`{self.tokens[self.at - 3].text}` is a function and needs parentheses"
-            hint = power_of(self.tokens[self.at - 3].text)
-            return ExpressionError("HS112", message, self.tokens[self.at - 3].start, before.end, hint)
-        if token.text == "(":
-            left, right = (left, "(...)") if before.text != ")" else ("(...)", "(...)")
-        elif before.text == ")":
-            left = "(...)"
-        message = f"an operator is missing between `{left}` and `{right}`"
-        return ExpressionError("HS104", message, before.start, token.end, _joined(before, token, left, right))
-
-    def power_of_function(self) -> bool:
-        """Whether the last tokens are ``sin**2``."""
-        function, power = self.tokens[max(0, self.at - 3)], self.tokens[max(0, self.at - 2)]
-        return function.text in FUNCTIONS and power.text == "**"
-
-
-def _joined(before: Token, token: Token, left: str, right: str) -> str:
-    if before.kind == token.kind == "number":
-        plain = right == "1" and before.end < token.start  # as in 1.2 1/h
-        return measured(left) if plain else "a number has one decimal point, and no blanks"
-    known = side_by_side(left, right) if (before.kind, token.kind) == ("number", "name") else compared(left, right)
-    known = known or timed(left, right)
-    return known or f"write {left}*{right} for a product"
-
-
-def _decimal(left: str, right: str) -> str:
-    both = f"{shown(left)}.{shown(right)}"
-    return f"write {shown(left)}{shown(right)}, or {both}" if len(right) == 3 else f"write {both}"
+        return ExpressionError(*unexpected(self.tokens, self.at, self.expected, self.depth))
 
 
 def _chain(binding: int, operators: list[str], operands: list[Tree], start: int, end: int) -> Tree:
     if binding in (_OR, _AND):
         word: Literal["and", "or"] = "or" if binding == _OR else "and"
-        return syntax.Logic(word, tuple(operands), start, end)
+        return Logic(word, tuple(operands), start, end)
     if binding == _COMPARE:
-        return syntax.Comparison(tuple(operands), tuple(operators), start, end)
+        return Comparison(tuple(operands), tuple(operators), start, end)
     inverted = [False, *(operator in ("-", "/") for operator in operators)]
     pairs = tuple(zip(inverted, operands, strict=True))
-    return syntax.Sum(pairs, start, end) if binding == _ADD else syntax.Product(pairs, start, end)
+    return Sum(pairs, start, end) if binding == _ADD else Product(pairs, start, end)

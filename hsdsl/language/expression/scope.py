@@ -13,9 +13,8 @@ from typing import Any
 import sympy as sp
 
 from hsdsl.base.functions import CONSTANTS, FUNCTIONS
-from hsdsl.base.names import SINCE, WORDS, closest, did_you_mean, shown
-from hsdsl.language.expression.expression_hints import MISCOUNTED, NAMES, derivative_of, timed, unit
-from hsdsl.language.expression.syntax import Call, ExpressionError, Name, Number, Product, Tree, walk
+from hsdsl.base.names import SINCE, WORDS, did_you_mean, shown
+from hsdsl.language.expression.parse import Call, ExpressionError, Name, Number, Product, Tree, walk
 
 TIME = sp.Symbol("t", real=True)
 RESERVED = (TIME.name, *CONSTANTS, *FUNCTIONS, *WORDS)
@@ -95,16 +94,17 @@ class Scope:
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
         faults: list[ExpressionError] = []
-        end, measured = 0, frozenset(_behind_numbers(tree))
+        end = 0
         for node in walk(tree):
             if node.start < end:
                 continue
             fault = None
             if isinstance(node, Name):
-                fault = self._name(node, node.start in measured)
-            elif isinstance(node, Call):
-                fault = self._call(node)
-                end = node.end if fault and timed(node.function, None) else end  # its units mean nothing here
+                fault = self._name(node, tree)
+            elif isinstance(node, Call) and (fault := self._call(node)):
+                from hsdsl.language.diagnosis.expressions import timed
+
+                end = node.end if timed(node.function, None) else end  # its units mean nothing here
             if fault and fault.message not in [other.message for other in faults]:
                 faults.append(fault)
         return faults
@@ -117,7 +117,7 @@ class Scope:
             isinstance(function, Function) and function.tree is None for function in called
         )
 
-    def _name(self, node: Name, measured: bool) -> ExpressionError | None:
+    def _name(self, node: Name, tree: Tree) -> ExpressionError | None:
         if node.name in CONSTANTS:
             return None
         if node.name in FUNCTIONS or isinstance(self.values.get(node.name), Function):
@@ -126,8 +126,11 @@ class Scope:
         if self.expanded is None and "." in node.name:
             return _dotted(node, node.name)
         if node.name not in self.values:
-            message = f"nothing here is called '{shown(node.name)}'"
-            return ExpressionError.at(node, "HS111", message, self._hint(node.name, measured))
+            from hsdsl.language.diagnosis.expressions import unknown_name
+
+            known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
+            hint = unknown_name(node.name, known, node.start in _behind_numbers(tree))
+            return ExpressionError.at(node, "HS111", f"nothing here is called '{shown(node.name)}'", hint)
         value = self.values[node.name]
         if isinstance(value, Refusal):
             return ExpressionError.at(node, value.code, value.message, value.hint)
@@ -160,29 +163,13 @@ class Scope:
                 own = [name for name, value in self.values.items() if isinstance(value, Function)]
                 first = node.arguments[0] if node.arguments else None
                 time = f"{float(first.value):g}" if isinstance(first, Number) else getattr(first, "name", None)
-                hint = (
-                    timed(node.function, time)
-                    or NAMES.get(node.function)
-                    or _nearest(node.function, own)
-                    or f"functions: {' '.join((*FUNCTIONS, *own))}, and those under `functions`"
-                )
+                from hsdsl.language.diagnosis.expressions import unknown_function
+
+                hint = unknown_function(node.function, time, own)
             return ExpressionError("HS112", message, node.start, end, hint)
         _, fewest, most = FUNCTIONS[node.function]
         arguments = "x" if most == fewest == 1 else "x, y"
         return _miscounted(node, fewest, most, f"{node.function}({arguments})")
-
-    def _hint(self, name: str, measured: bool) -> str | None:
-        """What to write for an unknown name; one that is ``measured`` is the factor behind a number."""
-        known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
-        if measured and unit(name) and closest(name, known) is None:
-            return unit(name)
-        if name in NAMES:
-            return NAMES[name]
-        if owned := [n for n in known if n.rpartition(".")[2] == name and n != name]:
-            return f"write {' or '.join(owned[:2])}: names of parts have the part in front"
-        define = "define it, under `parameters`, `inputs` or `let`"
-        near = derivative_of(name, known) or did_you_mean(name, [*known, *CONSTANTS], define) or ""
-        return near + "; a unit belongs under `units`" * bool(unit(name))
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states
@@ -221,20 +208,14 @@ def _miscounted(node: Call, fewest: int, most: int | None, example: str) -> Expr
     given = len(node.arguments)
     if given >= fewest and (most is None or given <= most):
         return None
-    number = f"{fewest}" if most == fewest else f"at least {fewest}"
-    noun = "argument" if fewest == 1 else "arguments"
-    message = f"`{node.function}` takes {number} {noun}, not {given}"
-    return ExpressionError.at(node, "HS113", message, MISCOUNTED.get((node.function, given)) or f"write {example}")
+    from hsdsl.language.diagnosis.expressions import miscounted
+
+    return ExpressionError.at(node, "HS113", *miscounted(node.function, given, fewest, most, example))
 
 
 def functions_called(tree: Tree) -> Iterator[str]:
     """The name of every function that an expression calls."""
     return (node.function for node in walk(tree) if isinstance(node, Call))
-
-
-def _nearest(name: str, own: list[str]) -> str | None:
-    best = closest(name, (*own, *FUNCTIONS))
-    return f"did you mean '{best}'?" if best else None
 
 
 @lru_cache(maxsize=10_000)

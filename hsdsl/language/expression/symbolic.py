@@ -10,11 +10,26 @@ import sympy as sp
 from hsdsl.base import functions
 from hsdsl.base.functions import CONSTANTS, FUNCTIONS
 from hsdsl.base.names import shown
-from hsdsl.language.expression import bounds, numeric, syntax
-from hsdsl.language.expression.expression_hints import CASES
+from hsdsl.language.expression import numeric
+from hsdsl.language.expression.algebra import chosen
+from hsdsl.language.expression.parse import (
+    CONDITIONS,
+    Call,
+    Comparison,
+    ExpressionError,
+    Logic,
+    Name,
+    Negative,
+    Not,
+    Number,
+    Power,
+    Product,
+    Sum,
+    Tree,
+    Truth,
+    children,
+)
 from hsdsl.language.expression.scope import Function, Scope, Value
-from hsdsl.language.expression.selection import chosen
-from hsdsl.language.expression.syntax import CONDITIONS, ExpressionError, Tree, children
 
 _RELATIONS = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge, "==": sp.Eq, "!=": sp.Ne}
 _DECIMAL, _SIMPLIFY = "write its value as a decimal", "make it a state or simplify it"
@@ -62,38 +77,39 @@ class _Builder:
         waiting = [(tree, 0)]
         while waiting:
             node, depth = waiting.pop()
-            depth += isinstance(node, (syntax.Call, syntax.Power))
-            if depth > bounds.MOST_LEVELS:
+            depth += isinstance(node, (Call, Power))
+            if depth > numeric.MOST_LEVELS:
                 raise self.too_deep(tree)
             waiting.extend((child, depth) for child in children(node))
 
     def number(self, tree: Tree) -> Value:
         """The value of a node that must be a number."""
         if isinstance(tree, CONDITIONS):
-            hint = f"write {int(tree.value)}" if isinstance(tree, syntax.Truth) else CASES
-            raise ExpressionError.at(
-                tree, "HS114", f"expected a number, got the condition `{self.text_of(tree)}`", hint
-            )
+            from hsdsl.language.diagnosis.expressions import CASES
+
+            hint = f"write {int(tree.value)}" if isinstance(tree, Truth) else CASES
+            message = f"expected a number, got the condition `{self.text_of(tree)}`"
+            raise ExpressionError.at(tree, "HS114", message, hint)
         match tree:
-            case syntax.Number():
+            case Number():
                 expr: Any = sp.Rational(tree.value.numerator, tree.value.denominator)
-                return Value(expr, numeric.of_rational(expr), True, bits=bounds.bits(expr))
-            case syntax.Name():
+                return Value(expr, numeric.of_rational(expr), True, bits=numeric.bits(expr))
+            case Name():
                 return self.name(tree)
-            case syntax.Negative():
+            case Negative():
                 inner = self.number(tree.operand)
                 return self.value(tree, -inner.expr, numeric.product([inner.number, -1]), [inner])
-            case syntax.Sum():
+            case Sum():
                 return self.sum(tree)
-            case syntax.Product():
+            case Product():
                 return self.product(tree)
-            case syntax.Power():
+            case Power():
                 return self.power(tree)
-            case syntax.Call():
+            case Call():
                 return self.call(tree)
         raise AssertionError(tree)
 
-    def name(self, tree: syntax.Name) -> Value:
+    def name(self, tree: Name) -> Value:
         """A constant, or a name of the scope."""
         if tree.name in CONSTANTS:
             return Value(CONSTANTS[tree.name], numeric.PI, True)
@@ -101,17 +117,17 @@ class _Builder:
         assert isinstance(value, Value)
         return value
 
-    def sum(self, tree: syntax.Sum) -> Value:
+    def sum(self, tree: Sum) -> Value:
         """Terms added; the common denominator is measured first."""
         values = [self.number(term) for _, term in tree.terms]
         terms = [-v.expr if minus else v.expr for v, (minus, _) in zip(values, tree.terms, strict=True)]
-        if bounds.sum_bits(terms) > bounds.MOST_BITS:
+        if numeric.sum_bits(terms) > numeric.MOST_BITS:
             raise self.too_long(tree)
         signed = zip(values, tree.terms, strict=True)
         numbers = [v.number if v.number is None or not minus else -v.number for v, (minus, _) in signed]
         return self.value(tree, self.made(tree, sp.Add, *terms), numeric.total(numbers), values)
 
-    def product(self, tree: syntax.Product) -> Value:
+    def product(self, tree: Product) -> Value:
         """Factors multiplied; the length of their exact numbers is measured first."""
         values = [self.number(factor) for _, factor in tree.factors]
         for value, (divided, factor) in zip(values, tree.factors, strict=True):
@@ -124,26 +140,26 @@ class _Builder:
         number = numeric.product(numbers)
         if all(v.constant for v in values):
             self.refuse_unless_finite(tree, number)
-        if sum(bounds.bits(v.expr) for v in values) > bounds.MOST_BITS:
+        if sum(numeric.bits(v.expr) for v in values) > numeric.MOST_BITS:
             raise self.too_long(tree)
         factors = [1 / v.expr if d else v.expr for v, d in zip(values, divided, strict=True)]
         return self.value(tree, self.made(tree, sp.Mul, *factors), number, values)
 
-    def power(self, tree: syntax.Power) -> Value:
+    def power(self, tree: Power) -> Value:
         """A power; the work that it gives SymPy is measured first."""
         base, exponent = self.number(tree.base), self.number(tree.exponent)
-        if bounds.large_exponent(exponent.expr):
+        if numeric.large_exponent(exponent.expr):
             text = self.text_of(tree.exponent)
-            message = f"the exponent `{text}` is above {bounds.LARGEST_EXPONENT:,} in magnitude"
+            message = f"the exponent `{text}` is above {numeric.LARGEST_EXPONENT:,} in magnitude"
             raise ExpressionError.at(tree.exponent, "HS119", message)
         number = numeric.power(base.number, exponent.number)
         if base.constant and exponent.constant:
             self.refuse_unless_finite(tree, number)
-        if bounds.power_bits(base.expr, exponent.expr) > bounds.MOST_BITS:
+        if numeric.power_bits(base.expr, exponent.expr) > numeric.MOST_BITS:
             raise self.too_long(tree)
         return self.value(tree, self.made(tree, functions.power, base.expr, exponent.expr), number, [base, exponent])
 
-    def call(self, tree: syntax.Call) -> Value:
+    def call(self, tree: Call) -> Value:
         """A function of the language or of the file. min and max of many are taken in pairs."""
         values = [self.number(argument) for argument in tree.arguments]
         own = self.scope.values.get(tree.function)
@@ -153,8 +169,8 @@ class _Builder:
         if all(v.constant for v in values):
             self.refuse_unless_finite(tree, number)
         exprs = [v.expr for v in values]
-        if tree.function == "exp" and bounds.large_exponent(exprs[0]):
-            sentence = f"is a power with an exponent above {bounds.LARGEST_EXPONENT:,} in magnitude"
+        if tree.function == "exp" and numeric.large_exponent(exprs[0]):
+            sentence = f"is a power with an exponent above {numeric.LARGEST_EXPONENT:,} in magnitude"
             raise ExpressionError.at(tree, "HS119", f"`{self.text_of(tree)}` {sentence}")
         if tree.function == "select":
             return self.value(tree, self.made(tree, chosen, *exprs), number, values)
@@ -163,7 +179,7 @@ class _Builder:
         expr = self.made(tree, _pairwise, function, exprs) if pairwise else self.made(tree, function, *exprs)
         return self.value(tree, expr, number, values)
 
-    def written_out(self, tree: syntax.Call, function: Function, values: tuple[Value, ...]) -> Value:
+    def written_out(self, tree: Call, function: Function, values: tuple[Value, ...]) -> Value:
         """A function of the file with values for its arguments; its faults are faults of the call."""
         if values in function.made:
             return function.made[values]
@@ -176,7 +192,7 @@ class _Builder:
         except ExpressionError as error:
             message = error.message if error.message.startswith("in `") else f"in `{function.name}`: {error.message}"
             raise ExpressionError.at(tree, error.code, message, error.hint) from None
-        if value.depth > bounds.MOST_LEVELS:
+        if value.depth > numeric.MOST_LEVELS:
             raise self.too_deep(tree)
         return function.made.setdefault(values, value)
 
@@ -192,9 +208,9 @@ class _Builder:
         """A value made of parts, checked."""
         constant = all(part.constant for part in parts)
         expr = _with_our_functions(expr)
-        if _not_real(expr) or bounds.beyond_floats(expr):
+        if _not_real(expr) or numeric.beyond_floats(expr):
             raise self.not_finite(tree)
-        if bounds.bits(expr) > bounds.MOST_BITS:
+        if numeric.bits(expr) > numeric.MOST_BITS:
             raise self.too_long(tree)
         if expr.is_Rational:
             number = numeric.of_rational(expr)
@@ -202,29 +218,26 @@ class _Builder:
             self.refuse_unless_finite(tree, number)
         uses = frozenset().union(*(part.uses for part in parts))
         size, depth = 1 + sum(p.size for p in parts), _levels(tree, expr, parts)
-        if size > bounds.MOST_NODES:
+        if size > numeric.MOST_NODES:
             message = "the expression grows too large once the names of `let` and inputs are written out"
             raise ExpressionError.at(tree, "HS120", message, _SIMPLIFY)
-        if constant and not expr.is_Rational:
-            self.refuse_large_constant(tree, size, depth)
+        if constant and not expr.is_Rational:  # SymPy would compute it for ever
+            sentence = None
+            if size > numeric.MOST_NODES_OF_A_CONSTANT:
+                sentence = f"is a constant of more than {numeric.MOST_NODES_OF_A_CONSTANT} operations"
+            elif depth > numeric.MOST_LEVELS_OF_A_CONSTANT:
+                most = numeric.MOST_LEVELS_OF_A_CONSTANT
+                sentence = f"is a constant whose functions are nested more than {most} deep"
+            if sentence:
+                raise ExpressionError.at(tree, "HS120", f"`{self.text_of(tree)}` {sentence}", _DECIMAL)
         within = _bits_within(tree, parts)
-        most = bounds.MOST_BITS_WITHIN_A_POWER if isinstance(tree, syntax.Power) else bounds.MOST_BITS_WITHIN
+        most = numeric.MOST_BITS_WITHIN_A_POWER if isinstance(tree, Power) else numeric.MOST_BITS_WITHIN
         if within > most:
             message = "the exact numbers in the expression grow too long once its powers are multiplied out"
             raise ExpressionError.at(tree, "HS120", message, _SIMPLIFY)
-        if depth > bounds.MOST_LEVELS:
+        if depth > numeric.MOST_LEVELS:
             raise self.too_deep(tree)
         return Value(expr, number, constant, uses, size, depth, within)
-
-    def refuse_large_constant(self, tree: Tree, size: int, depth: int) -> None:
-        """Raise where SymPy would compute a constant for ever."""
-        sentence = None
-        if size > bounds.MOST_NODES_OF_A_CONSTANT:
-            sentence = f"is a constant of more than {bounds.MOST_NODES_OF_A_CONSTANT} operations"
-        elif depth > bounds.MOST_LEVELS_OF_A_CONSTANT:
-            sentence = f"is a constant whose functions are nested more than {bounds.MOST_LEVELS_OF_A_CONSTANT} deep"
-        if sentence:
-            raise ExpressionError.at(tree, "HS120", f"`{self.text_of(tree)}` {sentence}", _DECIMAL)
 
     def refuse_unless_finite(self, tree: Tree, number: Any) -> None:
         """Raise where a constant has no finite real value."""
@@ -233,7 +246,7 @@ class _Builder:
 
     def too_deep(self, tree: Tree) -> ExpressionError:
         """The error for a nest that SymPy would need too long for."""
-        message = f"functions, powers and sums in products are nested more than {bounds.MOST_LEVELS} deep"
+        message = f"functions, powers and sums in products are nested more than {numeric.MOST_LEVELS} deep"
         return ExpressionError.at(tree, "HS120", message, "this counts what is written under `let`")
 
     def not_finite(self, tree: Tree) -> ExpressionError:
@@ -242,25 +255,25 @@ class _Builder:
 
     def too_long(self, tree: Tree) -> ExpressionError:
         """The error for an exact number that would fill the memory."""
-        message = f"`{self.text_of(tree)}` contains an exact number of more than {bounds.MOST_BITS:,} bits"
+        message = f"`{self.text_of(tree)}` contains an exact number of more than {numeric.MOST_BITS:,} bits"
         return ExpressionError.at(tree, "HS120", message, "write it as a decimal")
 
     def condition(self, tree: Tree) -> Any:
         """The Boolean of a node that must be a condition."""
         match tree:
-            case syntax.Truth():
+            case Truth():
                 return sp.true if tree.value else sp.false
-            case syntax.Not():
+            case Not():
                 return sp.Not(self.condition(tree.operand))
-            case syntax.Logic():
+            case Logic():
                 parts = [self.condition(operand) for operand in tree.operands]
                 return sp.And(*parts) if tree.operator == "and" else sp.Or(*parts)
-            case syntax.Comparison():
+            case Comparison():
                 values = [self.number(operand).expr for operand in tree.operands]
                 pairs = zip(tree.operators, values, values[1:], strict=False)
                 return sp.And(*(_RELATIONS[operator](a, b, evaluate=False) for operator, a, b in pairs))
         hint = f"compare it with something: {self.text_of(tree)} > 0"
-        if isinstance(tree, syntax.Number) and tree.value in (0, 1):
+        if isinstance(tree, Number) and tree.value in (0, 1):
             hint = f"write {'true' if tree.value else 'false'}"
         raise ExpressionError.at(tree, "HS115", f"expected a condition, got the number `{self.text_of(tree)}`", hint)
 
@@ -279,17 +292,17 @@ def _pairwise(function: Any, exprs: list[Any]) -> Any:
 
 def _levels(tree: Tree, expr: Any, parts: list[Value]) -> int:
     """How deep the parentheses are nested when a node is written out."""
-    if isinstance(tree, (syntax.Call, syntax.Power)):
+    if isinstance(tree, (Call, Power)):
         return 1 + max(part.depth for part in parts)
-    if isinstance(tree, syntax.Product) and not expr.is_Add:
+    if isinstance(tree, Product) and not expr.is_Add:
         return max(part.depth + part.expr.is_Add for part in parts)
     return max(part.depth for part in parts)
 
 
 def _bits_within(tree: Tree, parts: list[Value]) -> int:
-    if isinstance(tree, syntax.Call) and tree.function != "sqrt":
+    if isinstance(tree, Call) and tree.function != "sqrt":
         return 0
-    if isinstance(tree, syntax.Power):
+    if isinstance(tree, Power):
         exponent = parts[1].expr
         return parts[0].bits * max(1, abs(int(exponent))) if exponent.is_Rational else 0
     return sum(part.bits for part in parts)
@@ -297,12 +310,9 @@ def _bits_within(tree: Tree, parts: list[Value]) -> int:
 
 def _not_real(expr: Any) -> bool:
     """Whether an expression is infinite for SymPy, or not real."""
-    parts = expr.args if expr.is_Mul or expr.is_Add else (expr,)
-    return any(p in _NOT_REAL or (p.is_Pow and _root_of_negative(*p.args)) for p in (expr, *parts))
-
-
-def _root_of_negative(base: Any, exponent: Any) -> bool:
-    return bool(base.is_Rational and base < 0 and exponent.is_Rational and not exponent.is_Integer)
+    parts = (expr, *(expr.args if expr.is_Mul or expr.is_Add else ()))
+    roots = [(p.base, p.exp) for p in parts if p.is_Pow and p.base.is_Rational and p.exp.is_Rational]
+    return any(p in _NOT_REAL for p in parts) or any(base < 0 and not exp.is_Integer for base, exp in roots)
 
 
 def _with_our_functions(expr: Any) -> Any:

@@ -1,4 +1,4 @@
-"""A bound on the time of symbolic work, which SymPy cannot be made to leave by itself.
+"""Bounds on symbolic work, which SymPy cannot be made to keep by itself: its time, and the depth of the stack.
 
 A second thread watches the processor time of the process and raises :class:`OutOfTime` in the one that works, at its
 next Python instruction. Unlike a signal that does not need the main thread.
@@ -7,6 +7,7 @@ next Python instruction. Unlike a signal that does not need the main thread.
 from __future__ import annotations
 
 import ctypes
+import sys
 import threading
 import time
 from collections.abc import Generator
@@ -101,3 +102,17 @@ def _receive_last(thread: int) -> None:
 def _raise_in(thread: int, exception: type[BaseException]) -> None:
     if _send is not None:
         _send(ctypes.c_ulong(thread), ctypes.py_object(exception))
+
+
+_FRAMES = 20_000
+
+
+@contextmanager
+def deep_stack() -> Generator[None]:
+    """Allow deep recursion: the caps on nesting bound it, but SymPy spends up to ten frames a level."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, _FRAMES))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, ClassVar, cast
 
-from pydantic import BeforeValidator, ConfigDict, Discriminator, Tag, model_validator
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, model_validator
 
 from hsdsl.base.defaults import MOST_WAITING
-from hsdsl.base.names import closest
+from hsdsl.base.names import did_you_mean, shown
 from hsdsl.language.schema.fields import (
     AnyKey,
     ArgumentName,
@@ -34,33 +34,149 @@ from hsdsl.language.schema.fields import (
     Version,
     Whole,
     Word,
+    described,
     items,
     mapping,
     optional,
+    refuse,
     required,
+    shaped_as_list,
 )
-from hsdsl.language.schema.shapes import BoxShape, CircleShape, LineShape, PointShape, Shape, SpringShape
-from hsdsl.language.source import ABSENT, Scalar, absent
+from hsdsl.language.source.nodes import ABSENT, Mapping, Node, Scalar, Sequence, absent
+
+KINDS = ("point", "line", "circle", "spring", "box")
+
+
+def _is_reported(value: Any) -> bool:
+    """Whether a value is in the place of one that was at fault."""
+    return isinstance(value, Scalar) and value.value == ABSENT
+
+
+def _pair(value: Any) -> Any:
+    if _is_reported(value):
+        return [value, value]
+    if not isinstance(value, list) or len(value) != 2:  # pyright: ignore[reportUnknownArgumentType]
+        got = f"a list of {len(value)}" if isinstance(value, list) else described(value)  # pyright: ignore[reportUnknownArgumentType]
+        raise refuse("HS203", f"expected two coordinates, got {got}", "write [x, y]")
+    return value  # pyright: ignore[reportUnknownVariableType]
+
+
+def _points(value: Any, kind: str, most: int | None) -> Any:
+    if _is_reported(value):
+        return [value, value]
+    points = shaped_as_list(value)
+    if len(points) < 2 or (most is not None and len(points) > most):
+        expected = "two points" if most == 2 else "at least two points"
+        raise refuse("HS203", f"expected {expected}, got {len(points)}", f"write {kind}: [[0, 0], [x, y]]")
+    return points
+
+
+Pair = Annotated[list[Expression], BeforeValidator(_pair), Field(min_length=2, max_length=2)]
+Points = Annotated[list[Pair], BeforeValidator(lambda value: _points(value, "line", None)), Field(min_length=2)]
+Ends = Annotated[
+    list[Pair], BeforeValidator(lambda value: _points(value, "spring", 2)), Field(min_length=2, max_length=2)
+]
+
+
+class ShapeDocument(Document):
+    """A shape: its ``kind``, its ``points``, and its ``sizes`` in the order of `hsdsl.language.system.SIZES`."""
+
+    kind: ClassVar[str]
+    sized_by: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def points(self) -> list[list[Scalar]]:
+        """The coordinates of each point."""
+        where = getattr(self, self.kind)
+        return where if self.kind in ("line", "spring") else [where]
+
+    @property
+    def sizes(self) -> list[Scalar | None]:
+        """Further numbers; None for one that is left out, which is zero."""
+        return [getattr(self, name) for name in self.sized_by]
+
+
+class PointShape(ShapeDocument):
+    """A point, drawn as a dot of fixed size."""
+
+    kind = "point"
+    point: Pair = required("Where it is.", ["x", "y"])
+
+
+class LineShape(ShapeDocument):
+    """A line from point to point."""
+
+    kind = "line"
+    line: Points = required("Its points, at least two.", [[0, 0], ["L*sin(phi)", "-L*cos(phi)"]])
+
+
+class CircleShape(ShapeDocument):
+    """A circle."""
+
+    kind = "circle"
+    sized_by = ("radius",)
+    circle: Pair = required("Its centre.", ["x", "y"])
+    radius: Expression = required("Its radius.", "0.1")
+
+
+class SpringShape(ShapeDocument):
+    """A spring between two points, drawn as a zigzag."""
+
+    kind = "spring"
+    spring: Ends = required("Its two ends.", [[0, 0], ["x", 0]])
+
+
+class BoxShape(ShapeDocument):
+    """A rectangle."""
+
+    kind = "box"
+    sized_by = ("width", "height", "angle")
+    box: Pair = required("Its centre.", ["x", "y"])
+    width: Expression = required("Its width.", "0.4")
+    height: Expression = required("Its height.", "0.2")
+    angle: OptionalExpression = optional("By how much it is turned, counterclockwise, in radians.", "theta")
+
+
+def _kind(value: Any) -> str:
+    """The tag of a shape; the kind is checked before."""
+    return next((f"<{kind}>" for kind in KINDS if kind in value), "<point>")
+
+
+def _with_kind(value: Any) -> Any:
+    if not isinstance(value, dict):
+        raise refuse("HS203", f"expected a shape, got {described(value)}", "write {point: [x, y]}")
+    if not any(kind in value for kind in KINDS):
+        near = (did_you_mean(str(key), KINDS) for key in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        keys = ", ".join(f"'{shown(str(key))}'" for key in value) or "nothing"  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        hint = next((hint for hint in near if hint), None)
+        raise refuse("HS203", f"expected a point, a line, a circle, a spring or a box, got {keys}", hint)
+    return value  # pyright: ignore[reportUnknownVariableType]
+
+
+Shape = Annotated[
+    Annotated[PointShape, Tag("<point>")]
+    | Annotated[LineShape, Tag("<line>")]
+    | Annotated[CircleShape, Tag("<circle>")]
+    | Annotated[SpringShape, Tag("<spring>")]
+    | Annotated[BoxShape, Tag("<box>")],
+    Discriminator(_kind),
+    BeforeValidator(_with_kind),
+]
 
 
 def _mapping_or_not(value: Any) -> str:
     return "<mapping>" if isinstance(value, dict) else "<expression>"
 
 
-def _kind_of_samples(value: Any) -> str:
-    return "<list>" if isinstance(value, list) else _mapping_or_not(value)
-
-
-NAMES_OF_FILES = ("csv", "data", "path", "filename", "filepath", "source")  # in other tools
-
-
 def _kind_of_input(value: Any) -> str:
     if not isinstance(value, dict):
         return "<expression>"
-    fields = ("file", "column", "times", "values")
-    keys = list(map(str, cast("dict[Any, Any]", value)))
-    meant = {closest(key, (*fields, *NAMES_OF_FILES)) if key not in fields else key for key in keys}
-    return "<file>" if meant & {"file", "column", *NAMES_OF_FILES} and not meant & {"times", "values"} else "<samples>"
+    keys = set(map(str, cast("dict[Any, Any]", value)))
+    if not keys <= {"file", "column", "times", "values", "hold"}:
+        from hsdsl.language.diagnosis.values import input_keys_meant
+
+        keys = input_keys_meant(keys)
+    return "<file>" if keys & {"file", "column"} and not keys & {"times", "values"} else "<samples>"
 
 
 AsExpression = Annotated[Expression, Tag("<expression>")]
@@ -246,7 +362,7 @@ class MultiplesDocument(Document):
 
 Samples = Annotated[
     AsExpression | Annotated[Items[Expression], Tag("<list>")] | Annotated[MultiplesDocument, Tag("<mapping>")],
-    Discriminator(_kind_of_samples),
+    Discriminator(lambda value: "<list>" if isinstance(value, list) else _mapping_or_not(value)),
 ]
 
 
@@ -422,13 +538,9 @@ class AutomatonFile(Document):
     )
 
 
-def _kind_of_automaton(value: Any) -> str:
-    return "<file>" if isinstance(value, dict) and "file" in value else "<mapping>"
-
-
 Automaton = Annotated[
     Annotated[AutomatonDocument, Tag("<mapping>")] | Annotated[AutomatonFile, Tag("<file>")],
-    Discriminator(_kind_of_automaton),
+    Discriminator(lambda value: "<file>" if isinstance(value, dict) and "file" in value else "<mapping>"),
 ]
 
 
@@ -510,3 +622,10 @@ SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
 def keys_of(*pattern: str) -> list[str]:
     """The keys of a kind of mapping, as they are written in a file."""
     return [field.alias or name for name, field in SHAPES[pattern][0].model_fields.items()]
+
+
+def plain(node: Node) -> Any:
+    """A node as plain mappings and lists, with the nodes of single values in them."""
+    if isinstance(node, Mapping):
+        return {key: plain(value) for key, value in node}
+    return [plain(item) for item in node.items] if isinstance(node, Sequence) else node

@@ -22,8 +22,7 @@ from pydantic_core import PydanticCustomError
 
 from hsdsl.base.names import WORDS, did_you_mean, is_identifier, shown
 from hsdsl.language.expression.scope import RESERVED
-from hsdsl.language.schema.value_suggestions import as_list, as_mapping, as_name, assigned, in_brackets
-from hsdsl.language.source import ABSENT, Key, Scalar, is_empty
+from hsdsl.language.source.nodes import ABSENT, Key, Scalar, is_empty
 
 T = TypeVar("T")
 
@@ -34,7 +33,9 @@ def refuse(code: str, message: str, hint: str | None = None) -> PydanticCustomEr
 
 
 def _unexpected(expected: str, value: Any, hint: str | None = None, code: str = "HS203") -> PydanticCustomError:
-    return refuse(code, f"expected {expected}, got {described(value)}", hint)
+    from hsdsl.language.diagnosis.values import hint_for
+
+    return refuse(code, f"expected {expected}, got {described(value)}", hint or hint_for(expected, value))
 
 
 def described(value: Any) -> str:
@@ -48,34 +49,27 @@ def described(value: Any) -> str:
 
 def _single(value: Any, expected: str) -> Scalar:
     if not isinstance(value, Scalar):
-        raise _unexpected(expected, value, in_brackets(value) if isinstance(value, list) else None)
+        raise _unexpected(expected, value)
     return value
 
 
-def _expression(value: Any, kind: str = "a number or an expression") -> Scalar:
-    if isinstance(value, (dict, list)):
-        raise _unexpected("an expression", value, in_brackets(value) or "write every component as a name of its own")
-    if is_empty(value):
-        raise refuse("HS121", f"{kind} is missing here", kind)
-    return _single(value, "an expression")
+def _expressed(kind: str, listed: str = "an expression") -> Callable[[Any], Scalar]:
+    """A validator for an expression of a kind; ``listed`` is what a list of them should have been."""
+
+    def check(value: Any) -> Scalar:
+        if isinstance(value, (dict, list)):
+            raise _unexpected(listed if isinstance(value, list) else "an expression", value)
+        if is_empty(value):
+            raise refuse("HS121", f"{kind} is missing here", kind)
+        return _single(value, "an expression")
+
+    return check
 
 
-def _condition(value: Any) -> Scalar:
-    if isinstance(value, list):
-        parts = [part.value for part in value if isinstance(part, Scalar)]  # pyright: ignore[reportUnknownVariableType]
-        raise _unexpected("a condition", value, in_brackets(value) or f"join conditions: {shown(' and '.join(parts))}")
-    return _expression(value, "a condition, such as v > 0")
-
-
-def _inequality(value: Any) -> Scalar:
-    if isinstance(value, list):
-        hint = "under `when`, put the rest under `if`; under `domain`, make each an item"
-        raise _unexpected("one inequality", value, in_brackets(value) or hint)
-    return _expression(value, "an inequality, such as x >= 1")
-
-
-def _equation(value: Any) -> Scalar:
-    return _expression(value, "an equation, such as m*a == force")
+_expression = _expressed("a number or an expression")
+_condition = _expressed("a condition, such as v > 0", "a condition")
+_inequality = _expressed("an inequality, such as x >= 1", "one inequality")
+_equation = _expressed("an equation, such as m*a == force")
 
 
 def _text(value: Any) -> Scalar | None:
@@ -93,19 +87,17 @@ def _label(value: Any) -> Scalar:
 def _flag(value: Any) -> bool:
     scalar = _single(value, "true or false")
     if scalar.kind != "boolean":
-        words = {"yes": "true", "on": "true", "y": "true", "no": "false", "off": "false", "n": "false"}
-        meant = words.get(scalar.value.lower())
-        raise _unexpected("true or false", scalar, f"write {meant}" if meant else None, "HS204")
+        raise _unexpected("true or false", scalar, code="HS204")
     return scalar.value.lower() == "true"
 
 
 def _whole(value: Any) -> int:
     scalar = _single(value, "a whole number")
     digits = scalar.value[1:] if scalar.value[:1] in "+-" else scalar.value
-    if scalar.kind == "number" and digits.isdigit() and len(digits) > 9:
-        raise _unexpected("a whole number of at most 9 digits", scalar, code="HS204")
     if not (scalar.kind == "number" and digits.isdigit()):
         raise _unexpected("a whole number", scalar, "such as 1 or -2", "HS204")
+    if len(digits) > 9:
+        raise _unexpected("a whole number of at most 9 digits", scalar, code="HS204")
     return int(scalar.value)
 
 
@@ -145,7 +137,7 @@ def _version(value: Any) -> Scalar:
 
 def _name(key: Any) -> Key:
     if not is_identifier(key):
-        raise refuse("HS205", f"'{shown(key)}' cannot be a name", as_name(key))
+        raise _no_name(key, "cannot be a name")
     if key in RESERVED:
         kind = "a word of the language" if key in WORDS else "a function"
         kind = {"t": "the time", "pi": "a constant"}.get(key, kind)
@@ -173,9 +165,18 @@ def _mode_name(key: Any) -> Key:
 
 
 def _any_key(key: Any) -> Key:
-    if assigned(key):
-        raise refuse("HS205", f"'{shown(key)}' is not a name", as_name(key))
+    if "=" in key or "(" in key:
+        from hsdsl.language.diagnosis.values import assigned
+
+        if assigned(key):
+            raise _no_name(key, "is not a name")
     return key
+
+
+def _no_name(key: str, sentence: str) -> PydanticCustomError:
+    from hsdsl.language.diagnosis.values import as_name
+
+    return refuse("HS205", f"'{shown(key)}' {sentence}", as_name(key))
 
 
 def _is_left_out(value: Any) -> bool:
@@ -185,14 +186,14 @@ def _is_left_out(value: Any) -> bool:
 def shaped_as_mapping(value: Any) -> Any:
     """A mapping, empty where the value is left out."""
     if not (_is_left_out(value) or isinstance(value, dict)):
-        raise _unexpected("a mapping (name: value)", value, as_mapping(value))
+        raise _unexpected("a mapping (name: value)", value)
     return dict[Any, Any]() if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
 
 
 def shaped_as_list(value: Any) -> Any:
     """A list, empty where the value is left out."""
     if not (_is_left_out(value) or isinstance(value, list)):
-        raise _unexpected("a list", value, as_list(value))
+        raise _unexpected("a list", value)
     return [] if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
 
 

@@ -10,14 +10,15 @@ from hsdsl.language.source.nodes import (
     Scalar,
     Sequence,
     SourceRange,
+    Text,
     absent,
     child,
     children,
+    decode,
     descend,
     is_empty,
     keys,
 )
-from hsdsl.language.source.text import Text, decode
 
 __all__ = [
     "ABSENT", "Key", "Mapping", "Node", "NodePath", "Scalar", "Sequence", "SourceRange", "Text", "absent", "child",

@@ -12,11 +12,20 @@ import yaml
 
 from hsdsl.base import limits
 from hsdsl.base.errors import Diagnostic, Findings, ModelError, Span
-from hsdsl.base.names import INVISIBLE, normalised, shown
-from hsdsl.language.source.nodes import Key, Mapping, Node, Scalar, Sequence, SourceRange, absent
-from hsdsl.language.source.split_expressions import rejoined_entries, rejoined_items, spaced_entries
-from hsdsl.language.source.text import Text
-from hsdsl.language.source.yaml_errors import DEEPEST, TOO_DEEP, colon_missing, explain, quote, strange_blank
+from hsdsl.base.names import INVISIBLE, is_identifier, normalised, shown
+from hsdsl.language.source.nodes import (
+    DEEPEST,
+    TOO_DEEP,
+    Key,
+    Mapping,
+    Node,
+    Scalar,
+    Sequence,
+    SourceRange,
+    Text,
+    absent,
+    is_bare,
+)
 
 _Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
@@ -32,11 +41,24 @@ def compose(text: Text, findings: Findings) -> Node:
     try:
         return _Composer(text, parser, findings).document()
     except yaml.MarkedYAMLError as error:
+        from hsdsl.language.diagnosis.yaml_text import explain
+
         findings.add(explain(text, error))
         findings.raise_if_any()
         raise
     finally:
         parser.dispose()
+
+
+def _is_strange(entry: tuple[Node, Node]) -> bool:
+    """Whether an entry in braces has no value, and no name for a key."""
+    key, value = entry
+    return is_bare(value) and not (isinstance(key, Scalar) and is_identifier(key.value))
+
+
+def _is_cut(item: Node) -> bool:
+    """Whether YAML ended an item inside its parentheses."""
+    return isinstance(item, Scalar) and item.plain and item.value.count("(") > item.value.count(")")
 
 
 class _Composer:
@@ -78,7 +100,9 @@ class _Composer:
         if anchor is not None:
             self.anchors[anchor] = (None, 0, 0)
         if event.tag is not None:
-            self._tag(event)
+            message = f"`{shown(event.tag)}` is a tag in YAML, and models have no tags"
+            hint = "quote this expression; a condition is negated with `not`"
+            self.findings.add(self._place(event).diagnostic("HS009", message, hint))
         self._grow(event, 1, 1)
         if isinstance(event, yaml.ScalarEvent):
             measured: tuple[Node, int, int] = (self._scalar(event), 1, 1)
@@ -110,7 +134,9 @@ class _Composer:
             items.append(item)
             nodes, height = nodes + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
-        if event.flow_style:
+        if event.flow_style and any(map(_is_cut, items)):
+            from hsdsl.language.diagnosis.yaml_text import rejoined_items
+
             items = rejoined_items(items, self.findings)
         return Sequence(tuple(items), place), nodes, height + 1
 
@@ -127,8 +153,10 @@ class _Composer:
                 self._stop(key.place.diagnostic("HS016", message, hint))
             nodes, height = nodes + more_keys + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
-        if event.flow_style:
-            entries = rejoined_entries(spaced_entries(entries, self.findings), self.findings)
+        if event.flow_style and any(map(_is_strange, entries)):
+            from hsdsl.language.diagnosis.yaml_text import rejoined_entries
+
+            entries = rejoined_entries(entries, self.findings)
         return Mapping(self._unique(entries), place), nodes, height + 1
 
     def _unique(self, entries: list[tuple[Node, Node]]) -> dict[str, tuple[Key, Node]]:
@@ -137,10 +165,11 @@ class _Composer:
             if not isinstance(node, Scalar) or node.kind == "null":
                 self.findings.add(node.place.diagnostic("HS013", "a key must be a word", "quote it if it is one"))
                 continue
-            if node.plain and node.value[:1].isspace() and (strange := strange_blank(self.text, node.place.span.line)):
-                self._stop(strange)
-            if node.plain and "{" in node.value and (missing := colon_missing(self.text, node.place.span.line)):
-                self._stop(missing)
+            if node.plain and (node.value[:1].isspace() or "{" in node.value):
+                from hsdsl.language.diagnosis.yaml_text import strange_key
+
+                if fault := strange_key(self.text, node):
+                    self._stop(fault)
             key = Key.at(normalised(node.value), node.place)
             if key in unique:
                 line = unique[key][0].place.span.line
@@ -155,6 +184,8 @@ class _Composer:
         place = self._place(event)
         if name not in self.anchors:
             message = f"`*{name}` is an alias in YAML, and no anchor `&{name}` is before it"
+            from hsdsl.language.diagnosis.yaml_text import quote
+
             _, line, column = place.start
             self._stop(place.diagnostic("HS007", message, quote(self.text.lines[line], column)))
         node, nodes, height = self.anchors[name]
@@ -164,11 +195,6 @@ class _Composer:
             raise AssertionError
         self._grow(event, nodes, height)
         return node, nodes, height
-
-    def _tag(self, event: Any) -> None:
-        message = f"`{shown(event.tag)}` is a tag in YAML, and models have no tags"
-        hint = "quote this expression; a condition is negated with `not`"
-        self.findings.add(self._place(event).diagnostic("HS009", message, hint))
 
     def _grow(self, event: Any, nodes: int, height: int) -> None:
         self.count += nodes

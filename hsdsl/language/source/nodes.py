@@ -1,4 +1,7 @@
-"""The nodes of a YAML document: every value and every key knows its place."""
+"""A model's bytes as text, and the nodes of a YAML document in it: every value and every key knows its place.
+
+`Text` is decoded, capped, and free of characters that do not belong in a model.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,122 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
-from hsdsl.base.errors import Diagnostic, Span
-from hsdsl.language.source.offsets import positions
-from hsdsl.language.source.text import Text
+from hsdsl.base import limits
+from hsdsl.base.errors import Diagnostic, ModelError, Span
+from hsdsl.base.names import INVISIBLE
+
+_BREAK = re.compile("\r\n|\r|\n")
+_ARCHIVE = b"PK\x03\x04"
+DEEPEST = 64  # mappings and lists in each other
+TOO_DEEP = f"mappings and lists are nested more than {DEEPEST} deep here"
+_OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
+
+
+@dataclass(frozen=True, eq=False)
+class Text:
+    """A text with its lines, which makes places in it and diagnostics about them."""
+
+    path: str
+    content: str
+    lines: list[str] = field(repr=False)
+
+    @classmethod
+    def of(cls, path: str, content: str) -> Text:
+        """A text split into its lines."""
+        return cls(path, content, _BREAK.split(content))
+
+    def span(self, line: int, column: int, length: int = 1) -> Span:
+        """The place at a 1-based line and column, kept inside the text and on one line."""
+        line = min(max(line, 1), len(self.lines))
+        width = len(self.lines[line - 1])
+        column = min(max(column, 1), width + 1)
+        return Span(self.path, line, column, max(1, min(length, width + 1 - column)))
+
+    def diagnostic(self, code: str, message: str, span: Span, hint: str | None = None) -> Diagnostic:
+        """A diagnostic about a place in this text, with the line it is on."""
+        return Diagnostic(code, message, span, hint, self.lines[span.line - 1])
+
+    def fault(
+        self, code: str, message: str, line: int, column: int, hint: str | None = None, length: int = 1
+    ) -> Diagnostic:
+        """A diagnostic about so many characters at a 1-based line and column."""
+        return self.diagnostic(code, message, self.span(line, column, length), hint)
+
+
+def decode(path: str, data: bytes) -> Text:
+    """The text of a model.
+
+    Raises ModelError: when it is too large, not UTF-8, or has characters that no model may have.
+    """
+    most = limits.current().bytes
+    if len(data) > most:
+        size = f"{most >> 20} MiB" if most % (1 << 20) == 0 else f"{most:,} bytes"
+        hint = f"keep data in CSV files and name them in inputs, or allow more with --limit bytes={most * 10}"
+        raise _refused(path, "HS003", f"the file is larger than {size}", hint)
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if data.startswith(_ARCHIVE):
+        hint = "a saved run (.npz) is read with hsdsl.store.load"
+        raise _refused(path, "HS001", "the file is an archive, not the text of a model", hint)
+    if data.startswith(_OTHER_ENCODINGS):
+        raise _refused(path, "HS001", "the file is UTF-16 text, not UTF-8", "save it as UTF-8")
+    try:
+        content = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = Text.of(path, data[: error.start].decode("utf-8"))
+        span = Span(path, len(before.lines), len(before.lines[-1]) + 1)
+        message = f"the byte 0x{data[error.start]:02x} here is not UTF-8 text"
+        raise ModelError([Diagnostic("HS001", message, span, "save the file as UTF-8", before.lines[-1])]) from None
+    text = Text.of(path, content)
+    first: dict[str, int] = {}
+    for match in INVISIBLE.finditer(content):
+        first.setdefault(match.group(), match.start())
+    wrong: list[Diagnostic] = []
+    for sign, start in first.items():
+        before = _BREAK.split(content[:start])
+        message = f"the invisible character U+{ord(sign):04X} is not allowed in a model"
+        wrong.append(text.fault("HS002", message, len(before), len(before[-1]) + 1, "remove it"))
+    if wrong:
+        raise ModelError(wrong)
+    return text
+
+
+def _refused(path: str, code: str, message: str, hint: str) -> ModelError:
+    return ModelError([Diagnostic(code, message, Span(path, 1, 1), hint)])
+
+
+def positions(raw: str, length: int, value: str) -> list[int]:
+    """The offset in ``raw`` of each character of ``value``, and of the end of the value.
+
+    Exact for scalars on one line. In those that YAML folds, a blank has the place of the character before it.
+    """
+    if raw == value:
+        return list(range(length + 1))
+    offsets: list[int] = []
+    if raw[:1] in ("'", '"'):
+        at = 1
+        while at < len(raw) - 1:
+            offsets.append(at)
+            if raw[0] == '"' and raw[at] == "\\":
+                at += 2 + {"x": 2, "u": 4, "U": 8}.get(raw[at + 1], 0)
+            else:
+                at += 2 if raw[0] == raw[at] == "'" else 1
+        offsets.append(len(raw) - 1)
+    return offsets if len(offsets) == length + 1 else _aligned(raw, value)
+
+
+def _aligned(raw: str, value: str) -> list[int]:
+    """Match the visible characters one after the other: folding changes blanks alone."""
+    at = raw.find("\n") + 1 if raw[:1] in ("|", ">") else 0
+    offsets: list[int] = []
+    last = at
+    for character in value:
+        if not character.isspace():
+            here = raw.find(character, at)
+            if here >= 0:
+                last, at = here, here + 1
+        offsets.append(last)
+    return [*offsets, min(last + 1, len(raw))]
+
 
 Kind = Literal["null", "boolean", "number", "text"]
 
@@ -67,15 +183,10 @@ class Scalar:
         where = positions(self.place.text.content[first:last], len(self.value), self.value)
         begin = first + where[min(start, len(where) - 1)]
         finish = first + where[min(max(end - 1, start), len(where) - 1)] + 1
-        line, column = self._line_and_column(begin)
-        return self.place.text.span(line, column, finish - begin)
-
-    def _line_and_column(self, index: int) -> tuple[int, int]:
         first, line, column = self.place.start
-        before = Text.of("", self.place.text.content[first:index]).lines
-        if len(before) == 1:
-            return line + 1, column + 1 + len(before[0])
-        return line + len(before), 1 + len(before[-1])
+        before = _BREAK.split(self.place.text.content[first:begin])
+        column = len(before[-1]) + (column if len(before) == 1 else 0)
+        return self.place.text.span(line + len(before), column + 1, finish - begin)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +247,11 @@ def absent(place: SourceRange) -> Scalar:
 def is_empty(value: object) -> bool:
     """Whether a value is left out, or null."""
     return isinstance(value, Scalar) and value.kind == "null"
+
+
+def is_bare(value: Node) -> bool:
+    """Whether a value is left out: in braces also that of a key that YAML makes of a part of a value."""
+    return isinstance(value, Scalar) and value.plain and value.value == ""
 
 
 def child(node: Node | None, key: str) -> Node | None:

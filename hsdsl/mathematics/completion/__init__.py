@@ -1,10 +1,8 @@
 """Completions of a system: flows for states that its own flows and resets hold on a guard.
 
 `contact` is motion along the guard of an edge that leads back to its own mode, the limit of ever faster transitions;
-`nearby` has what it depends on, `branches` the reset near rest where it has kinks, `counts` the states that only count.
-`coupled_contacts` is the flow along several guards, and `overlay` has the motions of all edges of a mode in one.
-`sliding` is motion on a surface that two modes press on. `text` writes these into a model file, with expressions by
-`printer` and places by `insertions`.
+`nearby` has what it depends on. `overlay` has the motions of all edges of a mode in one, also along several guards.
+`sliding` is motion on a surface that two modes press on. `text` writes these into a model file.
 """
 
 from __future__ import annotations

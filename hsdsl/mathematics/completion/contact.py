@@ -4,38 +4,45 @@
 Near a point that a reset R keeps, flow for a short time and reset, over and over, is flow projected along the
 directions that R contracts onto the tangents of its fixed points: the constrained flow is the flow plus a multiple of
 the reset's directions that keeps R(x) = x.
+
+A reset with kinks has one branch for slow impacts, where these decide the signs in it: they come from the side on which
+the rate of the guard is positive (M2), which decides that of what is zero at rest, as of v in `abs(v)`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 
 import sympy as sp
 from sympy.core.relational import Relational
 
-from hsdsl.base.functions import sign
+from hsdsl.base.functions import absolute, maximum, minimum, power, rewritten, sign
 from hsdsl.base.names import memory, without_memory
-from hsdsl.language.expression.derivatives import derivative, lie_derivative
+from hsdsl.language.expression.algebra import derivative, lie_derivative
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.system import TIME, Edge, Mode, Surface
-from hsdsl.mathematics.completion.branches import branched
-from hsdsl.mathematics.completion.counts import counts_of
 from hsdsl.mathematics.completion.nearby import (
     NO_SLOPES,
     Nearby,
     Point,
     Slopes,
+    as_float,
     cancelled,
+    counts_of,
+    drawn,
     fixed_point,
     is_zero,
     jacobian,
     mode_of_part,
     product,
     rank,
+    size_at,
+    solved,
     symbols,
     value_at,
 )
-from hsdsl.mathematics.completion.printer import text_of
 
 MOST_DIRECTIONS = 3  # of a reset: their matrix is inverted in symbols
 
@@ -246,3 +253,91 @@ def _ends_of_condition(release: Edge, condition: sp.Basic | None, ending: Sequen
 def zero_surface(residual: sp.Expr) -> Surface:
     """The surface where an expression rises through zero."""
     return Surface(residual, sp.S.Zero, residual, f"{text_of(residual)} >= 0")
+
+
+KINKED = (absolute, maximum, minimum, sign)
+SPEEDS = (1e-6, 1e-9, 1e-12)  # of the rate of the guard: impacts that are looked at
+SEEDS = range(1, 9)  # of points where they are
+
+
+class Undecided(Exception):
+    """The side from which impacts come does not decide a sign."""
+
+
+def branched(near: Nearby) -> Nearby | None:
+    """What a motion depends on, with the branch of the reset that impacts take; None where they take no one branch."""
+    if not near.moved.has(*KINKED) and not any(map(_is_root, near.moved.atoms(sp.Pow))):
+        return near
+    series = (list(takewhile(bool, (_impact(near, speed, seed) for speed in SPEEDS))) for seed in SEEDS)
+    impacts = [points for points in series if len(points) == len(SPEEDS)]  # one is found at each speed
+    if not impacts:
+        return near
+    branch = _Branch(near, impacts)
+    try:
+        reset = tuple(branch.of(r) if i in near.changed else r for i, r in enumerate(near.edge.reset))
+    except Undecided:
+        return None
+    if reset == near.edge.reset:
+        return near
+    return near.by(replace(near.edge, reset=reset), impacts[0][0])
+
+
+def _impact(near: Nearby, speed: float, seed: int) -> Point | None:
+    """A random point of a guard that is reached at a speed; at any where the rate of the guard is a constant."""
+    rate = near.along(near.guard)
+    free = [x for x in near.among(sp.Tuple(near.guard, rate)) if x != TIME]
+    at = drawn((near.guard, rate, *near.moved, *near.flows()), seed, {*near.states, TIME})
+    found = solved([near.guard, rate - as_float(speed * size_at(rate, at))], free, at)
+    return found if found and value_at(rate, found) > 0 else None
+
+
+def _is_root(power: sp.Pow) -> bool:
+    return not power.exp.is_Integer and bool(power.base.free_symbols)
+
+
+@dataclass
+class _Branch:
+    """A branch of expressions, by series of ever slower impacts."""
+
+    near: Nearby
+    impacts: Sequence[Sequence[Point]]
+    done: dict[sp.Basic, sp.Basic] = field(default_factory=dict[sp.Basic, sp.Basic])
+
+    def of(self, expr: sp.Basic) -> sp.Basic:
+        """The branch of an expression."""
+        return rewritten(expr, self._chosen, self.done)
+
+    def _chosen(self, expr: sp.Basic) -> sp.Basic:
+        if isinstance(expr, (sign, absolute)) and (side := self._side(expr.args[0])):
+            return side * (expr.args[0] if isinstance(expr, absolute) else sp.S.One)
+        if isinstance(expr, (maximum, minimum)) and (side := self._side(expr.args[0] - expr.args[1])):
+            return expr.args[0 if (side > 0) == isinstance(expr, maximum) else 1]
+        if expr.is_Pow and _is_root(expr):
+            return self._power(*expr.args)
+        return expr
+
+    def _power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+        """A power; of what is zero at rest it is that to the first order."""
+        if base.is_Pow and base.exp.is_Integer and base.exp % 2 == 0 and (side := self._side(base.base)):
+            base, exponent = side * base.base, base.exp * exponent
+        if exponent == 1 or not self._vanishes(base):
+            return power(base, exponent)
+        if exponent.is_number and exponent > 1:
+            return sp.S.Zero
+        raise Undecided
+
+    def _vanishes(self, value: sp.Expr) -> bool:
+        """Whether a value is zero at rest."""
+        return all(abs(value_at(value, at[-1])) <= abs(value_at(value, at[0])) / 2 for at in self.impacts)
+
+    def _side(self, value: sp.Expr) -> int:
+        """The sign of a value before slow impacts; 0 where it has either, and is not zero at rest."""
+        if not self.near.among(value):
+            return 0
+        found = [[value_at(value, at) for at in points] for points in self.impacts]
+        signs = {(number > 0) - (number < 0) for values in found for number in values}
+        if len(signs) == 1 and signs != {0}:
+            return signs.pop()
+        if any(abs(values[-1]) <= abs(values[0]) / 2 for values in found):
+            raise Undecided
+        return 0

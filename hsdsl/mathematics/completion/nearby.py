@@ -1,5 +1,8 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportReturnType=false, reportCallIssue=false
-"""What a motion along one guard depends on: the guard, its reset, the flows of their states, and a point of rest."""
+"""What a motion along one guard depends on: the guard, its reset, the flows of their states, and a point of rest.
+
+States that impacts only count with are left out: nothing else depends on them, and resets lead them nowhere.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,7 @@ import sympy as sp
 
 from hsdsl.base.functions import below
 from hsdsl.base.numbers.arithmetic import Number, multiprecision
-from hsdsl.language.expression.derivatives import derivative, lie_derivative
+from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.scope import slope_symbol, symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 
@@ -292,3 +295,44 @@ def _without(equation: list[Number], direction: list[Number], share: Number) -> 
     """What is left of an equation beyond another one whose coefficients are ``direction``."""
     part = sum(map(mul, equation, direction), NUMBERS.zero)
     return list(map(sub, equation, (part * d for d in (*direction, share))))
+
+
+def counts_of(near: Nearby) -> tuple[int, ...]:
+    """The numbers of the states that an edge which leads back to its mode counts with, as ``n: n + 1``.
+
+    A sum that converges, as that of what impacts dissipate, is none: its increment vanishes where the state rests. Nor
+    is what repeated resets take to a limit of its own.
+    """
+    if near.changed and (not _last or _last[0][0] is not near.mode):
+        _last[:] = [(near.mode, _unused(near.mode))]
+    few = tuple(i for i in near.changed if i in _last[0][1])
+    if not few or not near.is_small() or (found := fixed_point(near.without(few))) is None:
+        return ()
+    anywhere = {x: NUMBERS.zero + 1 + 1 / (3 + k) for k, x in enumerate(sorted(near.moved.free_symbols, key=str))}
+    at = anywhere | found
+    changes = ((i, change) for i, change in zip(near.changed, near.moved, strict=True) if i in few)
+    return tuple(
+        i
+        for i, change in changes
+        if not is_zero(change, at) and abs(1 + value_at(sp.diff(change, near.states[i]), at)) >= 1
+    )
+
+
+_last: list[tuple[Mode, frozenset[int]]] = []  # of a mode all edges in turn; to hash one takes longer than this does
+
+
+def _unused(mode: Mode) -> frozenset[int]:
+    """The states without a flow that no flow, surface, `if` or other state depends on while the mode lasts."""
+    states = dict(zip(symbols(mode.states), range(len(mode.states)), strict=True))
+    loops = [edge for edge in mode.edges if edge.target == mode.name and edge.target_states == mode.states]
+    conditions = [edge.condition for edge in mode.edges if edge.condition is not None]
+    waiting = [*mode.flow, *conditions, *(s.residual for s in mode.surfaces)]
+    used = {i for i, f in enumerate(mode.flow) if f != 0}
+    waiting += [edge.reset[i] for edge in loops for i in used]
+    while waiting:
+        for x in sp.sympify(waiting.pop()).free_symbols:
+            i = states.get(x)
+            if i is not None and i not in used:
+                used.add(i)
+                waiting += [edge.reset[i] for edge in loops]
+    return frozenset(range(len(mode.states))) - used

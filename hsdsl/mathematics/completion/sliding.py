@@ -16,12 +16,12 @@ from dataclasses import dataclass, replace
 import sympy as sp
 
 from hsdsl.base.functions import atan2, below, floor, sign
-from hsdsl.language.expression.derivatives import lie_derivative
+from hsdsl.language.expression.algebra import lie_derivative
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
 from hsdsl.mathematics.completion.contact import zero_surface
 from hsdsl.mathematics.completion.nearby import cancelled, slopes_of_inputs
-from hsdsl.mathematics.completion.printer import text_of
 
 PART = sp.Rational(1, 1024)  # of the run: a surface's size alone, zero where all states in it are, bounds no rate
 JUMP = sp.Rational(1, 2**26)  # of the size of a surface: the root of the round-off; steps leave it by less
@@ -151,7 +151,9 @@ def _sliding(system: HybridSystem, name: str, a: Mode, out: Edge, b: Mode, back:
     enter = {**stay, "target": name}
     into_a = replace(out, name=f"{a.name}->{name}", priority=out.priority + 1, **enter)
     into_b = replace(back, name=f"{b.name}->{name}", priority=back.priority + 1, **enter)
-    return Sliding(mode, (_where(into_a, sp.Lt(inwards, 0)), _where(into_b, sp.Gt(outwards, 0))))
+    pairs = (into_a, sp.Lt(inwards, 0)), (into_b, sp.Gt(outwards, 0))
+    entries = [replace(edge, condition=where, condition_text=text_of(where)) for edge, where in pairs]
+    return Sliding(mode, (entries[0], entries[1]))
 
 
 def _thrown(system: HybridSystem, r: sp.Expr, leave_a: Edge, leave_b: Edge, least: sp.Expr) -> list[Edge]:
@@ -170,10 +172,6 @@ def _thrown(system: HybridSystem, r: sp.Expr, leave_a: Edge, leave_b: Edge, leas
         stay = {"reset": tuple(map(symbol, states)), "reset_texts": states, "priority": edge.priority + 1}
         found.append(replace(edge, name=name, surface=zero_surface(beyond), **stay))
     return found
-
-
-def _where(edge: Edge, condition: sp.Basic) -> Edge:
-    return replace(edge, condition=condition, condition_text=text_of(condition))
 
 
 def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:

@@ -1,5 +1,8 @@
 # pyright: basic, reportOperatorIssue=false
-"""The text of a model with the modes of its completions: the file as it is, with further modes and transitions."""
+"""The text of a model with the modes of its completions: the file as it is, with further modes and transitions.
+
+These are inserted behind the last one of a mapping or list, in its style.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,13 @@ import sympy as sp
 
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.source import Mapping, Node, Text, child
-from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
+from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
 from hsdsl.mathematics.completion.contact import Contact, contact
-from hsdsl.mathematics.completion.coupled_contacts import MOST_SETS, depends_on, neighbours
-from hsdsl.mathematics.completion.insertions import Insertions, flow_style
 from hsdsl.mathematics.completion.nearby import LONG, Slopes, cancelled, slopes_of_inputs
-from hsdsl.mathematics.completion.printer import inequality, text_of, wall
+from hsdsl.mathematics.completion.overlay import MOST_SETS, depends_on, neighbours
 from hsdsl.mathematics.completion.sliding import Sliding, slidings, with_entries
 
 WIDTH, INDENT = 120, 6  # of a line, and of the transitions in a mode that is written
@@ -51,9 +53,11 @@ def completed_text(text: Text, root: Node, system: HybridSystem) -> str | None:
     for entry in entries:
         if entry.source in written:
             writer.add_transition(entry)
+    fixed = set(system.parameter_symbols)
     for mode in further:
         own = tuple(entry for entry in entries if entry.source == mode.name)
-        writer.add_mode(_without_constant_guards(replace(mode, edges=(*mode.edges, *own)), system))
+        edges = (edge for edge in (*mode.edges, *own) if edge.surface.residual.free_symbols - fixed)
+        writer.add_mode(replace(mode, edges=tuple(edges)))  # what parameters alone decide does not fire, nor later
     return writer.insertions.result()
 
 
@@ -98,12 +102,6 @@ def _leaving_on_surface(found: Sliding) -> Mode:
     onto = tuple(cancelled(x - r * slope / size) for x, slope in zip(states, slopes, strict=True))
     leave = [replace(edge, reset=onto) if edge.reset == states else edge for edge in mode.edges[:2]]
     return replace(mode, edges=(*leave, *mode.edges[2:]))
-
-
-def _without_constant_guards(mode: Mode, system: HybridSystem) -> Mode:
-    """The mode without transitions that parameters alone decide: where it is entered they do not fire, nor later."""
-    fixed = {symbol(parameter.name) for parameter in system.parameters}
-    return replace(mode, edges=tuple(edge for edge in mode.edges if edge.surface.residual.free_symbols - fixed))
 
 
 class _Writer:
@@ -229,6 +227,22 @@ def _onto_guard(mode: Mode, found: Contact, depth: sp.Expr = sp.S.Zero) -> tuple
     return tuple(cancelled(x - off * slope / size) for x, slope in zip(found.landing, slopes, strict=True))
 
 
+def inequality(surface: Surface) -> str:
+    """The text of a guard."""
+    return _between(surface, ">=", "<=")
+
+
+def wall(surface: Surface) -> str:
+    """The text of a wall, whose surface is negative where the inequality holds."""
+    return _between(surface, "<=", ">=")
+
+
+def _between(surface: Surface, of_difference: str, otherwise: str) -> str:
+    """The sides of a surface, with the sign for a residual that is their difference or with the other one."""
+    sign = of_difference if surface.residual == surface.left - surface.right else otherwise
+    return f"{text_of(surface.left)} {sign} {text_of(surface.right)}"
+
+
 def _transition(edge: Edge) -> dict[str, str]:
     """The fields of a transition; one with the name that it would have anyway gets none."""
     fields = {} if "->" in edge.name else {"name": edge.name}
@@ -245,12 +259,9 @@ def _transition(edge: Edge) -> dict[str, str]:
 
 
 def _flow(mode: Mode) -> dict[str, str]:
-    return {name: text_of(_reduced(f)) for name, f in zip(mode.states, mode.flow, strict=True)}
-
-
-def _reduced(value: sp.Expr) -> sp.Expr:
-    """The same expression, with common factors cancelled where that is cheap and makes it shorter."""
-    return value if value.count_ops() > LONG else min((value, sp.cancel(value)), key=sp.count_ops)
+    """The flow as text, with common factors cancelled where that is cheap and makes it shorter."""
+    pairs = [(f, f if f.count_ops() > LONG else sp.cancel(f)) for f in mode.flow]
+    return {name: text_of(min(pair, key=sp.count_ops)) for name, pair in zip(mode.states, pairs, strict=True)}
 
 
 def _rest(mode: Mode, system: HybridSystem) -> Iterator[str]:
@@ -276,3 +287,49 @@ def _transition_lines(fields: dict[str, str], column: int) -> list[str]:
     if column + len(line := f"- {flow_style(fields)}") <= WIDTH:
         return [line]
     return [f"{' ' if i else '-'} {key}: {value}" for i, (key, value) in enumerate(fields.items())]
+
+
+class Insertions:
+    """What is inserted into a text, by its places."""
+
+    def __init__(self, text: Text) -> None:
+        self._text = text
+        self._insertions: dict[int, list[str]] = {}
+
+    def result(self) -> str:
+        """The text with all insertions, which are made from its end to its start."""
+        content = self._text.content
+        for index in sorted(self._insertions, reverse=True):
+            content = content[:index] + "".join(self._insertions[index]) + content[index:]
+        return content
+
+    def append(self, node: Node, inline: str, block: str) -> None:
+        """Add an entry behind the last one of a mapping or a list, in its style."""
+        start, end = node.place.start[0], node.place.end[0]
+        content = self._text.content
+        if content[start] in "[{":
+            before = "" if content[start + 1 : end - 1].strip() == "" else ", "
+            self.insert(end - 1, before + inline)
+            return
+        column = node.place.start[2]
+        lines = content[:end].rstrip().split("\n")
+        while (line := lines[-1].lstrip()) == "" or (line[0] == "#" and len(lines[-1]) - len(line) < column):
+            lines.pop()  # comments that begin further left belong to what follows
+        last = len("\n".join(lines).rstrip())
+        line_end = content.find("\n", last)
+        at = len(content) if line_end < 0 else line_end
+        self.insert(at, "".join(f"\n{' ' * column}{line}" for line in block.splitlines()))
+
+    def insert(self, index: int, text: str) -> None:
+        """Insert at an index of the text."""
+        self._insertions.setdefault(index, []).append(text)
+
+
+def flow_style(fields: dict[str, str]) -> str:
+    """A mapping inside braces."""
+    return "{" + ", ".join(f"{key}: {_quoted(value)}" for key, value in fields.items()) + "}"
+
+
+def _quoted(text: str) -> str:
+    """A value inside brackets: in quotes where a comma or a bracket of its own would end it."""
+    return f"'{text}'" if "," in text and text[0] not in "{[" else text

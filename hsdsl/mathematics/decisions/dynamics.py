@@ -1,13 +1,17 @@
+# pyright: basic
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
 """Surfaces, rates, domains and guards of a model with the values of its parameters, and questions about them.
 
 Sampled inputs are names that take any value between their least and their largest, at any time. Parameters have the
-values of the file; `--set` has no effect.
+values of the file; `--set` has no effect. A `Proof` puts together questions that were answered `never`; points and
+bounds of a search are written as people read them.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
@@ -16,13 +20,24 @@ import sympy as sp
 
 from hsdsl.base.errors import Decided
 from hsdsl.base.functions import absolute, maximum, minimum, replaced
-from hsdsl.language.expression.derivatives import derivative, lie_derivative
+from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, SampledInput, Surface
 from hsdsl.mathematics.decisions.decide import MOST_PARTS, Decider
 from hsdsl.mathematics.decisions.polynomial import linear_in
-from hsdsl.mathematics.decisions.question import UNKNOWN, Answer, Constraint, Ranges, SearchRange, at_most_zero, zero
-from hsdsl.mathematics.decisions.straight_line_program import at_point, enclosure, parts_of, too_large
+from hsdsl.mathematics.decisions.search import (
+    UNKNOWN,
+    Answer,
+    Constraint,
+    Ranges,
+    SearchRange,
+    at_most_zero,
+    at_point,
+    enclosure,
+    parts_of,
+    too_large,
+    zero,
+)
 
 MOST_DERIVED = 4000  # parts of an expression as a tree: derivatives are made of it as one
 MOST_COMPARISONS = 6  # of an `if`: its normal form can double with each
@@ -86,22 +101,7 @@ class Dynamics:
         placed = placed if holds else sp.Not(placed)
         if len(placed.atoms(sp.core.relational.Relational)) > MOST_COMPARISONS:
             return None
-        clauses = [self._clause(c) for c in sp.Or.make_args(sp.to_dnf(placed, simplify=False))]
-        return [clause for clause in clauses if clause is not None]
-
-    def _clause(self, clause: Any) -> Clause | None:
-        found: list[Constraint] = []
-        for literal in sp.And.make_args(clause):
-            if literal == sp.false:
-                return None
-            if literal == sp.true or isinstance(literal, sp.Ne):
-                continue
-            if isinstance(literal, sp.Eq):
-                found.append(zero(literal.lhs - literal.rhs))
-                continue
-            less, more = (literal.lts, literal.gts)
-            found.append(Constraint(less - more, "< 0" if literal.is_Relational and literal.rel_op in "<>" else "<= 0"))
-        return tuple(found)
+        return alternatives(placed)
 
     def guard(self, edge: Edge, pointing_out: bool = True) -> list[Clause] | None:
         """The guard (M2) as alternatives: on the surface, in the domain, `if` holds, the flow does not point back.
@@ -238,6 +238,23 @@ class Dynamics:
         return frozenset(symbol(given.name) for given in self.system.inputs if given.hold == "linear")
 
 
+def alternatives(condition: Any) -> list[Clause]:
+    """A condition as alternatives: each a list of constraints that hold together."""
+    found: list[Clause] = []
+    for clause in sp.Or.make_args(sp.to_dnf(condition, simplify=False)):
+        literals = sp.And.make_args(clause)
+        if sp.false not in literals:
+            known = (literal for literal in literals if literal != sp.true and not isinstance(literal, sp.Ne))
+            found.append(tuple(map(_constraint, known)))
+    return found
+
+
+def _constraint(literal: Any) -> Constraint:
+    if isinstance(literal, sp.Eq):
+        return zero(literal.lhs - literal.rhs)
+    return Constraint(literal.lts - literal.gts, "< 0" if literal.rel_op in "<>" else "<= 0")
+
+
 def bounding(mode: Mode) -> Iterator[tuple[Surface, Edge | None]]:
     """The surfaces that bound a mode, with their edges: those without `if`, and walls."""
     yield from ((edge.surface, edge) for edge in mode.edges if edge.condition is None)
@@ -247,3 +264,86 @@ def bounding(mode: Mode) -> Iterator[tuple[Surface, Edge | None]]:
 def _middle(expr: Any) -> Fraction:
     low, high = enclosure(expr) or (Fraction(0), Fraction(0))
     return min(max((low + high) / 2, -_LARGEST), _LARGEST)
+
+
+@dataclass
+class Proof:
+    """What is known to have no point in a mode, by the answers found; where ``timed``, within the run's time alone."""
+
+    dynamics: Dynamics
+    mode: Mode
+    found: list[Answer] = field(default_factory=list[Answer])
+    timed: bool = False
+
+    def never(self, alternatives: Sequence[Clause], *more: Constraint) -> bool:
+        """Whether there is no point where one of the alternatives and more constraints hold."""
+        answers: list[Answer] = []
+        for clause in alternatives:
+            answers.append(self.dynamics.ask(self.mode, (*clause, *more), prove=True))
+            if not answers[-1].never:
+                return False
+        self.found += answers
+        self.timed |= any(TIME in c.expr.free_symbols for clause in (*alternatives, more) for c in clause)
+        return True
+
+    @property
+    def decided(self) -> Decided:
+        """How it is known."""
+        return "interval" if any(answer.decided == "interval" for answer in self.found) else "symbolic"
+
+    @property
+    def searched(self) -> tuple[tuple[Any, float, float], ...]:
+        """The bounds that all of it holds within: what was looked at in every question."""
+        ends: dict[Any, tuple[float, float]] = {}
+        for answer in self.found:
+            for name, low, high in answer.searched:
+                first, last = ends.get(name, (low, high))
+                ends[name] = max(first, low), min(last, high)
+        if self.timed:
+            ends[TIME] = float("-inf"), float(self.dynamics.until)
+        return tuple((name, *limits) for name, limits in ends.items())
+
+
+def closed(clause: Iterable[Constraint]) -> Clause:
+    """Constraints with their ends: where one is at its end, round-off decides."""
+    return tuple(c._replace(relation="<= 0") if c.relation == "< 0" else c for c in clause)
+
+
+def strict(clause: Iterable[Constraint]) -> Clause:
+    """Inequalities without their ends, where they are more than numbers."""
+    return tuple(c._replace(relation="< 0") if c.relation == "<= 0" and not c.expr.is_number else c for c in clause)
+
+
+MOST_NAMES = 8
+
+
+def at(dynamics: Dynamics, mode: Mode, answer: Answer, about: Iterable[Any]) -> str:
+    """``at x = 14, v = 0``: the states of a point that expressions depend on; time and inputs where they do."""
+    needed = {s for expr in about if expr is not None for s in expr.free_symbols}
+    order = [s for s in dynamics.ranges(mode) if s in needed]
+    parts = [f"{s.name} = {number(answer.point[s])}" for s in order if s in answer.point and s is not TIME]
+    parts = [*parts[:MOST_NAMES], *(["..."] if len(parts) > MOST_NAMES else [])]
+    if TIME in order:
+        parts.append(f"t = {number(answer.point[TIME])}")
+    return f"at {', '.join(parts)}" if parts else "everywhere"
+
+
+def number(value: float) -> str:
+    """Six digits; what is within round-off of a shorter number as that."""
+    if abs(value) < 1e-12:
+        return "0"
+    return f"{value:.6g}"
+
+
+def within(searched: Iterable[tuple[Any, float, float]]) -> str:
+    """Say within which bounds something is known, as `` within |x| <= 10``; empty where it holds without bounds."""
+    limits = ", ".join(_limits(s.name, low, high) for s, low, high in searched)
+    return f" within {limits}" if limits else ""
+
+
+def _limits(name: str, low: float, high: float) -> str:
+    if low == -high:
+        return f"|{name}| <= {number(high)}"
+    if math.isinf(low):
+        return f"{name} <= {number(high)}"
+    return f"{name} >= {number(low)}" if math.isinf(high) else f"{number(low)} <= {name} <= {number(high)}"

@@ -1,5 +1,5 @@
 # pyright: basic
-"""A point of a mode, and what the flow does there next: signs of expressions, derivatives of surfaces, transitions.
+"""A point of a mode, and what a run does there next: signs of expressions, derivatives of surfaces, transitions.
 
 Points come from a search, so a value counts as 0 within :data:`NEAR` of the terms that it is the sum of. Where a kink,
 a jump or a value that may be 0 decides, nothing is known.
@@ -7,7 +7,7 @@ a jump or a value that may be 0 decides, nothing is known.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, perm
 from typing import Any
@@ -19,10 +19,8 @@ from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, Mode
 from hsdsl.mathematics.decisions.decide import MOST_PARTS
 from hsdsl.mathematics.decisions.dynamics import Clause, Dynamics
-from hsdsl.mathematics.decisions.question import Constraint
-from hsdsl.mathematics.decisions.singularities import breaks
-from hsdsl.mathematics.decisions.smooth_pieces import SmoothPiece, pieces
-from hsdsl.mathematics.decisions.straight_line_program import StraightLine, too_large
+from hsdsl.mathematics.decisions.search import Constraint, StraightLine, too_large
+from hsdsl.mathematics.decisions.singularities import SmoothPiece, breaks, pieces
 
 DEEPEST = 6  # derivatives along the flow that are looked at
 NEAR = 1e-8
@@ -189,3 +187,45 @@ class ModePoint:
 def ranked(edges: Iterable[Edge]) -> list[Edge]:
     """Edges of one mode in the order in which they go where they are reached together (M6)."""
     return sorted(edges, key=lambda edge: -edge.priority)
+
+
+MOST = 40
+
+
+def chain(here: ModePoint, edge: Edge) -> Iterator[tuple[Edge, ModePoint]]:
+    """Follow an edge and the transitions that are made at the same instant: each with where it leads to.
+
+    Raises :class:`Unsure` where what comes next is not known, or has no end.
+    """
+    following: Edge | None = edge
+    for _ in range(MOST):
+        here = here.after(following)
+        yield following, here
+        following = here.next()
+        if following is None:
+            return
+    raise Unsure
+
+
+def cycle(here: ModePoint, edge: Edge) -> tuple[Edge, ...] | None:
+    """The transitions that follow an edge at one instant without end; None without a known cycle."""
+    visited: list[ModePoint] = []
+    edges: list[Edge] = []
+    try:
+        for following, reached in chain(here, edge):
+            edges.append(following)
+            for k, before in enumerate(visited):
+                if same(before, reached):
+                    return tuple(edges[k + 1 :])
+            visited.append(reached)
+    except Unsure:
+        return None
+    return None
+
+
+def same(one: ModePoint, other: ModePoint) -> bool:
+    """Whether two points agree within the accuracy of a search."""
+    if one.mode is not other.mode:
+        return False
+    pairs = [(one.point[symbol(s)], other.point[symbol(s)], one.size(symbol(s))) for s in one.mode.states]
+    return all(abs(a - b) <= NEAR * size for a, b, size in pairs)

@@ -1,20 +1,25 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportCallIssue=false
-"""Singular parts of expressions: jumps, kinks, poles, infinite slopes, and arguments without a real value."""
+"""Singular parts of expressions: jumps, kinks, poles, infinite slopes, arguments without a real value; smooth pieces.
+
+Derivatives of kinked expressions are those of one side, or of none. On a piece no abs, sign, min or max is left, and a
+closed piece goes on smoothly beyond its ends. So what holds for the derivatives of every piece holds on both sides of a
+kink.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
 from hsdsl.base import functions
+from hsdsl.base.graphs import closure
 from hsdsl.mathematics.decisions.decide import MOST_PARTS
 from hsdsl.mathematics.decisions.dynamics import Clause, Dynamics
-from hsdsl.mathematics.decisions.question import Constraint, at_most_zero, negative, positive, zero
-from hsdsl.mathematics.decisions.straight_line_program import too_large
+from hsdsl.mathematics.decisions.search import Constraint, at_most_zero, negative, positive, too_large, zero
 
 _SMOOTH = ("sin", "cos", "tan", "atan", "sinh", "cosh", "tanh", "asinh", "exp", "log", "asin", "acos", "acosh", "atanh")
 _CONTINUOUS = (  # but for the poles of `tan`, which `divisors` has
@@ -25,8 +30,7 @@ _JUMPING = (functions.sign, functions.floor, functions.atan2)
 _LEVELS = (1, 0, -1, 2)  # whole numbers that the argument of a floor is looked for at
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """A part of an expression, its name in messages, and the alternatives in which it is singular."""
 
     expr: Any
@@ -154,3 +158,87 @@ def _label(part: Any, power: str) -> str:
     if part.is_Pow:
         return "a square root" if abs(part.exp) == sp.Rational(1, 2) else power
     return "a logarithm" if isinstance(part, sp.log) else f"`{_name(part)}`"
+
+
+MOST = 32
+_SIGNS = (functions.sign, sp.sign)
+_SIZES = (functions.absolute, sp.Abs)
+_LEAST, _LARGEST = (functions.minimum, sp.Min), (functions.maximum, sp.Max)
+KINKED = (*_SIGNS, *_SIZES, *_LEAST, *_LARGEST)
+
+
+@dataclass(frozen=True)
+class SmoothPiece:
+    """A part of the states and times, with the surface function and the flow there.
+
+    There no ``sides`` are negative, and ``zeros`` vanish: with any the piece has no inside. The flow is that of the
+    states that the surface function depends on in the course of time.
+    """
+
+    sides: tuple[Any, ...]
+    zeros: tuple[Any, ...]
+    residual: Any
+    flow: Mapping[Any, Any]
+
+    @property
+    def closed(self) -> tuple[Constraint, ...]:
+        """The piece with its ends."""
+        return (*(at_most_zero(-side) for side in self.sides), *map(zero, self.zeros))
+
+    @property
+    def inside(self) -> tuple[Constraint, ...]:
+        """The piece without its ends."""
+        return (*(negative(-side) for side in self.sides), *map(zero, self.zeros))
+
+    def split(self, kink: Any) -> Iterator[SmoothPiece]:
+        """The pieces on both sides of a kink, and that of a sign's zero."""
+        first = kink.args[0]
+        rest = kink.func(*kink.args[1:]) if len(kink.args) > 2 else kink.args[-1]
+        if isinstance(kink, _SIGNS):
+            yield self._where(first, kink, sp.S.One)
+            yield self._where(-first, kink, sp.S.NegativeOne)
+            yield self._where(None, kink, sp.S.Zero)
+        elif isinstance(kink, _SIZES):
+            yield self._where(first, kink, first)
+            yield self._where(-first, kink, -first)
+        else:
+            larger, smaller = (first, rest) if isinstance(kink, _LARGEST) else (rest, first)
+            yield self._where(first - rest, kink, larger)
+            yield self._where(rest - first, kink, smaller)
+
+    def _where(self, side: Any, kink: Any, value: Any) -> SmoothPiece:
+        def replaced(expr: Any) -> Any:
+            return expr.xreplace({kink: value})
+
+        sides = (*map(replaced, self.sides), *([] if side is None else [side]))
+        zeros = (*map(replaced, self.zeros), *([kink.args[0]] if side is None else []))
+        return SmoothPiece(sides, zeros, replaced(self.residual), {s: replaced(f) for s, f in self.flow.items()})
+
+
+def pieces(residual: Any, flow: Mapping[Any, Any]) -> list[SmoothPiece] | None:
+    """The pieces of a surface function and of the flows that it depends on; None where they are too many."""
+    waiting, done = [SmoothPiece((), (), residual, influencing(residual, flow))], []
+    while waiting:
+        piece = waiting.pop(0)
+        kink = _innermost((piece.residual, *piece.flow.values()))
+        if kink is None:
+            done.append(piece)
+        else:
+            waiting += piece.split(kink)
+        if len(waiting) + len(done) > MOST:
+            return None
+    return done
+
+
+def influencing(expr: Any, flow: Mapping[Any, Any]) -> dict[Any, Any]:
+    """The flows that an expression depends on in the course of time."""
+    reached = closure(expr.free_symbols & flow.keys(), lambda s: flow[s].free_symbols & flow.keys())
+    return {s: f for s, f in flow.items() if s in reached}
+
+
+def _innermost(exprs: tuple[Any, ...]) -> Any | None:
+    for expr in exprs:
+        for part in sp.postorder_traversal(expr) if expr.has(*KINKED) else ():
+            if isinstance(part, KINKED):
+                return part
+    return None

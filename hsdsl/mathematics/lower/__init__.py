@@ -1,58 +1,47 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
 """HybridSystem -> Program: every expression becomes a straight-line routine over numbered states, parameters and time.
 
-The pipeline is in :func:`lower`. `program.ModeProgram` lists the routines. `switches` takes out what jumps with
-time, `names` numbers, `mode` has the routines of a mode, `constants` those of parameters alone, `slopes` those that
-only exports need. `routines` writes each by `printer`, in steps that `straight` and `sharing` make small; `elimination`
-solves linear equations in them.
-
-Besides, a mode has bounds on round-off (`terms`), an order of elimination for implicit steps (`ordering`), and a `tape`
-for Taylor coefficients.
+The pipeline is in :func:`lower`. `program.ModeProgram` lists the routines. `switches` takes out what jumps with time,
+`constants` has numbered names and the routines of parameters alone, `mode` those of a mode with bounds on round-off and
+an order of elimination for implicit steps, `slopes` those that only exports need. `straight` writes each by `printer`,
+in steps that are small, and `tape` the operations for Taylor coefficients.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Protocol, TypeVar
+from typing import Any
 
 import sympy as sp
 
 from hsdsl.base import limits
 from hsdsl.base.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.language.expression.scope import slope_symbol
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.timebox import OutOfTime, timebox
+from hsdsl.language.expression.timebox import OutOfTime, deep_stack, timebox
 from hsdsl.language.system import HybridSystem, SampledInput
 from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.completion import Overlay, overlays
 from hsdsl.mathematics.completion.nearby import slopes_of_inputs
 from hsdsl.mathematics.lower.constants import (
+    Names,
     constants,
     initial_order,
     initial_values,
     lower_constants,
     lower_expressions,
+    number,
 )
-from hsdsl.mathematics.lower.deciding import idle_states
-from hsdsl.mathematics.lower.mode import LoweredMode, lowered_overlay
-from hsdsl.mathematics.lower.names import Names, number
-from hsdsl.mathematics.lower.routines import print_routines
+from hsdsl.mathematics.lower.mode import LoweredMode, idle_states, lowered_overlay
+from hsdsl.mathematics.lower.straight import print_routines
 from hsdsl.mathematics.lower.switches import switch_programs, switch_routines, with_switches
 
 __all__ = ["in_turn", "lower", "lower_constants", "lower_expressions"]
 
-First = TypeVar("First")
-Second = TypeVar("Second")
+Both = Callable[[Callable[[], Any], Callable[[], Any]], tuple[Any, Any]]
 
 
-class Both(Protocol):
-    """What does two things and answers with both results."""
-
-    def __call__(self, first: Callable[[], First], second: Callable[[], Second], /) -> tuple[First, Second]: ...
-
-
-def in_turn(first: Callable[[], First], second: Callable[[], Second]) -> tuple[First, Second]:
+def in_turn(first: Callable[[], Any], second: Callable[[], Any]) -> tuple[Any, Any]:
     """Do one thing, then the other."""
     return first(), second()
 
@@ -118,23 +107,17 @@ def _modes(system: HybridSystem, found: Sequence[Overlay | None], names: Names, 
     last = len(modes)
     for i, motion in enumerate(found):
         if motion:
-            programs[i] = replace(programs[i], held=last, edges=_with_contacts(programs[i].edges, motion))
+            edges = list(programs[i].edges)
+            for k, contact in enumerate(motion.contacts):  # what a run knows of motion along their guards
+                branched = contact.near.impact is not None
+                known = {"contact": k, "push_order": contact.order, "counts": contact.counts, "branched": branched}
+                edges[contact.edge] = replace(edges[contact.edge], **known)
+            programs[i] = replace(programs[i], held=last, edges=tuple(edges))
             pairs = zip(programs[last].edges, motion.releases, strict=True)
             edges = tuple(replace(edge, releases=number) for edge, number in pairs)
             programs[last] = replace(programs[last], edges=edges)
             last += 1
     return tuple(programs[: len(modes)]), tuple(programs[len(modes) :])
-
-
-def _with_contacts(edges: tuple[lowered.EdgeProgram, ...], found: Overlay) -> tuple[lowered.EdgeProgram, ...]:
-    """A mode's edges with what a run knows of motion along their guards."""
-    whole = list(edges)
-    for i, motion in enumerate(found.contacts):
-        whole[motion.edge] = replace(
-            edges[motion.edge], contact=i, push_order=motion.order, counts=motion.counts,
-            branched=motion.near.impact is not None,
-        )  # fmt: skip
-    return tuple(whole)
 
 
 def _sampled(given: SampledInput, sloped: bool) -> lowered.SampledInput:

@@ -1,25 +1,32 @@
-# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false
-"""The routines of one mode over numbered states, parameters and time."""
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false, reportReturnType=false
+"""The routines of one mode over numbered states, parameters and time, and what else a simulator asks of it.
+
+`Terms` bounds the terms that expressions are computed from: so many units of round-off are in their values. This is
+running error analysis (N. J. Higham, Accuracy and Stability of Numerical Algorithms, SIAM 2002, 3.3), to first order.
+It sees what derivatives do not: terms that cancel, as in sin(x)**2 + cos(x)**2. A value that jumps counts with the
+branch that it is on. `ordering` is the order in which a large and sparse implicit step eliminates states, and
+`idle_states` are those that no surface, condition or deciding state depends on, now or in a later mode.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
+from heapq import heapify, heappop, heappush
 from typing import Any
 
 import sympy as sp
 
-from hsdsl.base.functions import absolute, below, maximum, rebuilt, replaced
+from hsdsl.base.functions import absolute, below, floor, maximum, minimum, rebuilt, replaced, sign
+from hsdsl.base.graphs import closure, filled
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.system import TIME, Edge, Mode
+from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.completion import Overlay
-from hsdsl.mathematics.lower.names import Names
-from hsdsl.mathematics.lower.ordering import ordering
-from hsdsl.mathematics.lower.routines import Definition, print_routines
-from hsdsl.mathematics.lower.straight import Gradient
+from hsdsl.mathematics.lower.constants import Names
+from hsdsl.mathematics.lower.straight import Cut, Definition, Gradient, Statement, print_routines, shared
 from hsdsl.mathematics.lower.tape import make_tape
-from hsdsl.mathematics.lower.terms import Terms, may_hide
 
 _NAN = symbol("nan")
 
@@ -64,7 +71,9 @@ class LoweredMode:
             "jacobian": self._jacobian(),
             "tape": make_tape(self.flow, self.residuals, self.states, data),
             "expressions": tuple(texts),
-            "diagnosis": print_routines(self._diagnosis(expressions), data),
+            "diagnosis": print_routines(
+                (self._few(f"expression_{k}", (e,)) for k, e in enumerate(self.place(expressions))), data
+            ),
         }
 
     def program(
@@ -92,7 +101,11 @@ class LoweredMode:
             **others,
         )
         bounded = program.jumps or may_hide(self.flow, self.arguments)
-        return replace(program, terms=self._terms()) if bounded else program
+        if not bounded:
+            return program
+        terms = Terms(self.flow, dict(zip(self.states, self._sizes, strict=True)))
+        definition = Definition("terms", (), terms.bounds, terms.statements, self._given)
+        return replace(program, terms=print_routines((definition,), self.names.data))
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
         """Whether a surface is affine in time and the states, also where the modes of parts choose what it is."""
@@ -122,16 +135,6 @@ class LoweredMode:
             return lowered.Jacobian(routines, places, width, order)
         inside = [k // width * own + k % width for k in places if k // width < own]
         return lowered.Jacobian(routines, places, width, order, own, varied, ordering(inside, own))
-
-    def _terms(self) -> lowered.Routines:
-        """Bounds on the terms that the flow is computed from."""
-        terms = Terms(self.flow, dict(zip(self.states, self._sizes, strict=True)))
-        definition = Definition("terms", (), terms.bounds, terms.statements, self._given)
-        return print_routines((definition,), self.names.data)
-
-    def _diagnosis(self, expressions):
-        for k, result in enumerate(self.place(expressions)):
-            yield Definition(f"expression_{k}", self.arguments, (result,), places=self._places)
 
     def _routines(self):
         mode, arguments = self.mode, self.arguments
@@ -212,3 +215,173 @@ def _every_choice(expr: sp.Basic) -> sp.Basic:
     if isinstance(expr, below):
         return sp.Add(*(sp.Dummy() * _every_choice(choice) for choice in expr.args[2:]))
     return rebuilt(expr, tuple(map(_every_choice, expr.args)))
+
+
+LEAST = 16  # unknowns: of fewer the dense elimination, which exchanges rows, is as fast
+SPARSE = 4  # the dense factors have at least so many times as many entries
+
+
+def ordering(places: Sequence[int], n: int) -> tuple[int, ...]:
+    """An order with few entries of the factors; empty where the dense elimination is used.
+
+    States that do not flow cost the dense elimination as much as others, and the sparse one nothing.
+    """
+    flowing = len({k // n for k in places})
+    if not flowing or (n < LEAST and 2 * flowing > n) or SPARSE * len(places) > n * n:
+        return ()
+    order = _minimum_degree(places, n)
+    position = {k: i for i, k in enumerate(order)}
+    fill = filled([(position[k // n], position[k % n]) for k in places], n)
+    return order if SPARSE * fill <= n * n else ()
+
+
+def _minimum_degree(places: Sequence[int], n: int) -> tuple[int, ...]:
+    """The order that takes an unknown with the fewest neighbours next; all that it leaves are then neighbours.
+
+    Of several it takes the one behind the fewest others in turn, for all of which a processor must wait.
+    See A. George and J. W. H. Liu, The evolution of the minimum degree ordering algorithm, SIAM Review 31, 1989
+    (doi:10.1137/1031001).
+    """
+    near: list[set[int]] = [set() for _ in range(n)]
+    for i, j in (divmod(k, n) for k in places):
+        if i != j:
+            near[i].add(j)
+            near[j].add(i)
+    waiting = [(len(others), 0, i) for i, others in enumerate(near)]
+    heapify(waiting)
+    behind = [0] * n
+    order = dict[int, None]()
+    while waiting:
+        degree, _, i = heappop(waiting)
+        if i in order or degree != len(near[i]):  # it has lost or won neighbours since
+            continue
+        order[i] = None
+        for j in near[i]:
+            near[j] |= near[i]
+            near[j] -= {i, j}
+            behind[j] = max(behind[j], behind[i] + 1)
+            heappush(waiting, (len(near[j]), behind[j], j))
+    return tuple(order)
+
+
+_CONSTANT, _SEEN, _HIDDEN = range(3)
+
+
+def may_hide(expressions: Iterable[sp.Expr], moving: Collection[sp.Symbol]) -> bool:
+    """Whether terms of a sum may cancel, unseen by what the last digits of states and time change in it.
+
+    These change a product of states by as much as its last digits are. They do not change a constant, and hardly the
+    cosine of a small angle. One such term of a sum is no harm: what cancels it is as large, and seen.
+    """
+    kinds: dict[sp.Basic, int] = {}
+
+    def kind(expr: sp.Basic) -> int:
+        if expr not in kinds:
+            parts = [kind(part) for part in expr.args]
+            kinds[expr] = _kind(expr, parts) if any(parts) else _SEEN if expr in moving else _CONSTANT
+        return kinds[expr]
+
+    def _kind(expr: sp.Basic, parts: list[int]) -> int:
+        if expr.is_Add and len(parts) - parts.count(_SEEN) > 1:
+            raise _Hides
+        if expr.is_Mul:
+            return _SEEN if _SEEN in parts else _HIDDEN
+        alone = isinstance(expr, (absolute, sp.sin, sp.sinh)) or (expr.is_Pow and expr.exp.is_Number)
+        return _SEEN if parts[0] == _SEEN and (alone or (expr.is_Add and set(parts) == {_SEEN})) else _HIDDEN
+
+    try:
+        for expr in expressions:
+            kind(expr)
+    except _Hides:
+        return True
+    return False
+
+
+class _Hides(Exception):
+    """A sum has two terms whose last digits are not seen."""
+
+
+class Terms:
+    """The terms of expressions: ``bounds`` has a bound for each, ``statements`` are the names in them, in order.
+
+    ``sizes`` are those of the symbols that have one; of another it is its value.
+    """
+
+    def __init__(self, expressions: Sequence[sp.Expr], sizes: Mapping[sp.Symbol, sp.Expr]) -> None:
+        common, small = shared(expressions, "e_")
+        self._cut, self._sizes = Cut("e"), dict(sizes)
+        self._known: dict[sp.Basic, sp.Expr] = {}
+        for name, expr in common:
+            self._cut.define(name, expr)
+        small = [self._cut.down(expr) for expr in small]
+        for name, expr in tuple(self._cut.statements):
+            self._sizes[name] = self._bound(expr)
+        self.bounds = tuple(map(self._bound, small))
+        self.statements: Sequence[Statement] = self._cut.statements
+
+    def _bound(self, expr: sp.Expr) -> sp.Expr:
+        if expr not in self._known:
+            self._known[expr] = self._cut.name(self._of(expr))
+        return self._known[expr]
+
+    def _of(self, expr: sp.Expr) -> sp.Expr:
+        if expr.is_Symbol or not expr.args:
+            return self._sizes.get(expr, absolute(expr))
+        if isinstance(expr, (sign, floor)):
+            return absolute(expr)
+        if isinstance(expr, below):
+            return below(*expr.args[:2], *map(self._bound, expr.args[2:]))
+        parts = list(map(self._bound, expr.args))
+        if isinstance(expr, (minimum, maximum)):
+            return maximum(*parts)
+        if expr.is_Add or isinstance(expr, absolute):
+            return sp.Add(*parts)
+        return sp.Add(absolute(expr), *(absolute(s) * part for s, part in zip(self._slopes(expr), parts, strict=True)))
+
+    def _slopes(self, expr: sp.Expr) -> list[sp.Expr]:
+        """The derivatives of an operation by its operands."""
+        if expr.is_Mul:
+            return [sp.Mul(*expr.args[:i], *expr.args[i + 1 :]) for i in range(len(expr.args))]
+        operands = [sp.Dummy(real=True) for _ in expr.args]
+        known = dict(zip(operands, expr.args, strict=True))
+        if expr.is_Pow and expr.exp.is_Number:
+            return [expr.exp * rebuilt(expr, (expr.base, expr.exp - 1)), sp.S.Zero]
+        whole = rebuilt(expr, operands)
+        return [whole.diff(operand).xreplace(known) for operand in operands]
+
+
+Node = tuple[str, Any]  # a mode, and the symbol of one of its states
+Found = dict[sp.Basic, frozenset[Any]]
+
+
+def idle_states(system: HybridSystem) -> list[tuple[int, ...]]:
+    """The numbers of the states of each mode that decide nothing, as counters do and what is only shown."""
+    uses: dict[Node, set[Node]] = defaultdict(set)
+    modes, found = {mode.name: mode for mode in system.modes}, Found()
+    roots: list[Node] = []
+    for mode in system.modes:
+        conditions = [edge.condition for edge in mode.edges if edge.condition is not None]
+        sides = [side for surface in mode.surfaces for side in (surface.residual, surface.left, surface.right)]
+        roots += _nodes(mode, [*conditions, *sides], found)
+        for state, flow in zip(mode.states, mode.flow, strict=True):
+            uses[mode.name, symbol(state)] |= _nodes(mode, [flow], found)
+        for edge in mode.edges:
+            for i in changed_by(edge, mode) if modes[edge.target].states else ():
+                uses[edge.target, symbol(edge.target_states[i])] |= _nodes(mode, [edge.reset[i]], found)
+    needed = closure(roots, lambda node: uses.get(node, ()))
+    return [
+        tuple(i for i, state in enumerate(mode.states) if (mode.name, symbol(state)) not in needed)
+        for mode in system.modes
+    ]
+
+
+def _nodes(mode: Mode, expressions: Iterable[Any], found: Found) -> set[Node]:
+    return {(mode.name, name) for e in expressions for name in _symbols(sp.sympify(e), found)}
+
+
+def _symbols(expression: sp.Basic, found: Found) -> frozenset[Any]:
+    """The symbols of an expression whose parts may be the same many times over."""
+    if expression not in found:
+        own = [expression] if expression.is_Symbol else []
+        found[expression] = frozenset(own).union(*(_symbols(part, found) for part in expression.args))
+    return found[expression]

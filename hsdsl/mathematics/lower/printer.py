@@ -32,11 +32,6 @@ _NAMES = {
 _RECIPROCALS = {"cot": "tan", "sec": "cos", "csc": "sin", "coth": "tanh", "sech": "cosh", "csch": "sinh"}
 
 
-def constant_name(value: Fraction) -> str:
-    """Name an exact constant."""
-    return f"q_{'m' if value < 0 else ''}{abs(value.numerator)}_{value.denominator}"
-
-
 class KernelPrinter(PythonCodePrinter):
     """Printer of the operations of a kernel; it refuses all others."""
 
@@ -49,7 +44,7 @@ class KernelPrinter(PythonCodePrinter):
 
     def constant(self, value: Fraction) -> str:
         """Print an exact constant."""
-        return constant_name(value)
+        return f"q_{'m' if value < 0 else ''}{abs(value.numerator)}_{value.denominator}"
 
     def call(self, name: str, arguments: list[str]) -> str:
         """Print a call of a function of kernels."""

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from hsdsl.language.expression.stack import deep_stack
+from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import TIME, HybridSystem
 from hsdsl.mathematics.completion import overlays
+from hsdsl.mathematics.lower.constants import number
 from hsdsl.mathematics.lower.mode import LoweredMode, lowered_overlay
-from hsdsl.mathematics.lower.names import number
-from hsdsl.mathematics.lower.routines import Definition, print_routines
-from hsdsl.mathematics.lower.straight import Gradient
+from hsdsl.mathematics.lower.straight import Definition, Gradient, print_routines
 from hsdsl.mathematics.lower.switches import with_switches
 from hsdsl.mathematics.program import Routines
 

@@ -1,23 +1,200 @@
 # pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOperatorIssue=false, reportAssignmentType=false, reportIncompatibleMethodOverride=false, reportCallIssue=false, reportReturnType=false
-"""Expressions cut into statements that are each small, and derivatives of such statements by the chain rule.
+"""Expressions as straight-line code: small statements in order, their derivatives, and the text of routines.
 
 SymPy's expressions are graphs, but it walks, differentiates and prints them as trees: what is written in a few lines
 (a product of a thousand factors, a name of `let` that uses the one before it twice, twenty times) can have a
-derivative or a text without end. After the cut every one of these costs as much as the graph has nodes.
+derivative or a text without end. `Cut` gives names to parts that are too large, so that each of these costs as much as
+the graph has nodes, and `Gradient` differentiates such statements by the chain rule. `shared` gives names to what comes
+more than once; SymPy's `cse` does as much in a time that grows faster than the expressions do.
+
+Linear equations are solved by statements: the modified Gram-Schmidt process on the matrix with the right side as a
+further column is backward stable in any order of the equations, and the same for any unit of an unknown (A. Bjorck,
+*Solving linear least squares problems by Gram-Schmidt orthogonalization*, BIT 7, 1967, doi:10.1007/BF01934122). Rows
+are divided by their norms before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from itertools import accumulate
+import textwrap
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from heapq import heapify, heappop, heappush
+from itertools import accumulate, combinations
 
 import sympy as sp
 
-from hsdsl.base.functions import rebuilt, solution
-from hsdsl.language.expression.derivatives import derivative, moving
-from hsdsl.mathematics.lower.elimination import solved
-from hsdsl.mathematics.lower.printer import LARGEST_PRODUCT
-from hsdsl.mathematics.lower.sharing import Statement, shared
+from hsdsl.base.functions import below, rebuilt, solution
+from hsdsl.language.expression.algebra import derivative, moving
+from hsdsl.mathematics.lower.printer import LARGEST_PRODUCT, KernelPrinter
+from hsdsl.mathematics.program import Routines
+
+Statement = tuple[sp.Symbol, sp.Basic]
+
+
+def shared(expressions: Sequence[sp.Basic], letter: str) -> tuple[list[Statement], list[sp.Basic]]:
+    """Statements that give names, and the expressions written with them."""
+    found = _Shared(expressions, letter)
+    return found.statements, found.expressions
+
+
+class _Shared:
+    def __init__(self, expressions: Iterable[sp.Basic], letter: str) -> None:
+        self._letter = letter
+        self._uses: Counter[sp.Basic] = Counter()
+        self._operands: dict[sp.Basic, tuple[sp.Basic, ...]] = {}
+        self._written: dict[sp.Basic, sp.Basic] = {}
+        self.statements: list[Statement] = []
+        given = tuple(expressions)
+        for expr in given:
+            self._count(expr)
+        for operation in (sp.Mul, sp.Add):
+            self._pair(operation)
+        self.expressions = [self._new(expr) for expr in given]
+
+    def _count(self, expr: sp.Basic) -> None:
+        """Count the uses of an expression and of its parts, each once; those of the negative of one are its own."""
+        if expr.is_Atom:
+            return
+        expr = self._known(expr)
+        self._uses[expr] += 1
+        if self._uses[expr] == 1:
+            self._operands[expr] = _operands(expr)
+            for part in self._operands[expr]:
+                self._count(part)
+
+    def _known(self, expr: sp.Basic) -> sp.Basic:
+        """The expression or its negative: of products the positive one, of sums the one that came first."""
+        if expr.is_Mul:
+            return -expr if expr.args[0].is_Number and expr.args[0] < 0 else expr
+        if expr.is_Add and expr not in self._operands and (negative := -expr) in self._operands:
+            return negative
+        return expr
+
+    def _pair(self, operation: type) -> None:
+        """Give names to pairs of operands, those first that most have in common."""
+        wholes = [expr for expr in self._operands if isinstance(expr, operation)]
+        for pair, owners in _pairs([self._operands[expr] for expr in wholes], operation):
+            others = [wholes[i] for i in owners if wholes[i] != pair]
+            self._operands[pair] = pair.args
+            self._uses[pair] += len(others)
+            for part in pair.args:
+                self._uses[self._known(part)] -= len(owners) - 1
+            for whole in others:
+                rest = [part for part in self._operands[whole] if part not in pair.args]
+                self._operands[whole] = (*(x for x in rest if x.is_Number), pair, *(x for x in rest if not x.is_Number))
+
+    def _new(self, expr: sp.Basic) -> sp.Basic:
+        if expr.is_Atom:
+            return expr
+        if expr not in self._operands:
+            inner = self._new(self._known(expr))
+            return -inner if inner.is_Mul else sp.Mul._from_args((sp.S.NegativeOne, inner))
+        if expr not in self._written:
+            written = self._rebuilt(expr)
+            if self._uses[expr] > 1:
+                real = {"real": True} if isinstance(expr, sp.Expr) else {}
+                name = sp.Symbol(f"{self._letter}{len(self.statements)}", **real)
+                self.statements.append((name, written))
+                written = name
+            self._written[expr] = written
+        return self._written[expr]
+
+    def _rebuilt(self, expr: sp.Basic) -> sp.Basic:
+        parts = [self._new(part) for part in self._operands[expr]]
+        if _is_quotient(expr):
+            return sp.Pow(parts[0], -1, evaluate=False)
+        if expr.is_Add or expr.is_Mul:
+            return expr.func._from_args(parts)
+        if tuple(parts) == expr.args:
+            return expr
+        return sp.Pow(*parts, evaluate=False) if expr.is_Pow else expr.func(*parts)
+
+
+def _is_quotient(expr: sp.Basic) -> bool:
+    return expr.is_Pow and expr.exp.is_Number and expr.exp < 0
+
+
+def _operands(expr: sp.Basic) -> tuple[sp.Basic, ...]:
+    return (expr.base**-expr.exp,) if _is_quotient(expr) else expr.args
+
+
+def _pairs(lists: Sequence[Sequence[sp.Basic]], operation: type) -> Iterator[tuple[sp.Basic, list[int]]]:
+    """The pairs that most of some lists have in common, until no two have one, and in which lists each is."""
+    numbers: dict[sp.Basic, int] = {}
+    own = [[numbers.setdefault(operand, len(numbers)) for operand in each] for each in lists]
+    operands, where = list(numbers), defaultdict[tuple[int, int], set[int]](set)
+    for i, each in enumerate(own):
+        for pair in combinations(sorted(each), 2):
+            where[pair].add(i)
+    waiting = [(-len(owners), pair) for pair, owners in where.items() if len(owners) > 1]
+    heapify(waiting)
+    while waiting:
+        count, pair = heappop(waiting)
+        owners = sorted(where.pop(pair, ()))
+        if len(owners) < 2:
+            continue
+        if len(owners) < -count:
+            where[pair] = set(owners)
+            heappush(waiting, (-len(owners), pair))
+            continue
+        made = operation._from_args([operands[k] for k in own[owners[0]] if k in pair])
+        yield made, owners
+        for i in owners:
+            own[i] = [k for k in own[i] if k not in pair]
+            for k in own[i]:
+                for old in pair:
+                    where[min(k, old), max(k, old)].discard(i)
+                where[k, len(operands)].add(i)
+        new = [(k, len(operands)) for k in dict.fromkeys(k for i in owners for k in own[i])]
+        for i in owners:
+            own[i].append(len(operands))
+        operands.append(made)
+        for each in new:
+            if len(where[each]) > 1:
+                heappush(waiting, (-len(where[each]), each))
+
+
+# a column counts as one of the space of those before it where no more than this share of it is left: round-off of
+# 64-bit floats, with room for the sums of a few hundred terms
+_LEFT = sp.Rational(1, 2**44)
+Named = Callable[[sp.Basic], sp.Basic]
+
+
+def solved(rows: Sequence[Sequence[sp.Basic]], constants: Sequence[sp.Basic], name: Named) -> list[sp.Basic]:
+    """The unknowns x of A x = b; where A is singular they have no finite value.
+
+    ``name`` gives an expression a name; where it is one, statements stay small.
+    """
+    n = len(rows)
+    sizes = [name(sp.sqrt(_squares(row))) for row in rows]
+    columns = [[name(rows[r][c] / sizes[r]) for r in range(n)] for c in range(n)]
+    right = [name(constants[r] / sizes[r]) for r in range(n)]
+    whole = [name(_squares(column)) for column in columns]
+    pivots: list[sp.Basic] = []
+    factors: list[list[sp.Basic]] = []
+    for k in range(n):
+        left = name(_squares(columns[k]))
+        pivots.append(name(below(name(left - _LEFT**2 * whole[k]), sp.S.Zero, sp.S.Zero, name(sp.sqrt(left)))))
+        direction = [name(entry / pivots[k]) for entry in columns[k]]
+        row: list[sp.Basic] = []
+        for column in (*columns[k + 1 :], right):
+            share = name(sp.Add(*(q * entry for q, entry in zip(direction, column, strict=True))))
+            row.append(share)
+            column[:] = [name(entry - share * q) for q, entry in zip(direction, column, strict=True)]
+        factors.append(row)
+    unknowns: list[sp.Basic] = []
+    for k in reversed(range(n)):
+        *others, value = factors[k]
+        known = sp.Add(*(factor * x for factor, x in zip(others, unknowns, strict=True)))
+        unknowns.insert(0, name((value - known) / pivots[k]))
+    return unknowns
+
+
+def _squares(entries: Sequence[sp.Basic]) -> sp.Basic:
+    return sp.Add(*(entry**2 for entry in entries))
+
 
 LARGEST = 80  # nodes of one statement
 WIDEST = 16  # terms or factors of one statement
@@ -174,3 +351,70 @@ def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Stateme
 
     visit(results)
     return list(ordered.items())
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A routine before printing: its name, arguments and tuple of results.
+
+    ``statements`` are the names that the results use besides the arguments, and their expressions. With ``places``
+    only the arguments that are used have a name in the text: of many small routines with many arguments each, the
+    heads would be all there is. ``places`` has the index of each argument.
+    """
+
+    name: str
+    arguments: tuple[sp.Symbol, ...]
+    results: tuple
+    statements: Sequence[Statement] = ()
+    places: Mapping[sp.Symbol, int] | None = None
+
+
+def text_of(definition: Definition) -> str:
+    """Print one routine as a Python function."""
+    body = _body(definition.results, tuple(definition.statements))
+    if definition.places is None:
+        return f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n{body}"
+    parts = _parts(*map(sp.sympify, definition.results), *(expr for _, expr in definition.statements))
+    places = sorted((definition.places[symbol], symbol.name) for symbol in parts & definition.places.keys())
+    named = "".join(f"    {name} = given[{i}]\n" for i, name in places)
+    return f"def {definition.name}(*given):\n{named}{body}"
+
+
+def _parts(*expressions: sp.Basic) -> set[sp.Basic]:
+    """Expressions and all their parts, each visited once."""
+    found, waiting = set[sp.Basic](), list(expressions)
+    while waiting:
+        if (expr := waiting.pop()) not in found:
+            found.add(expr)
+            waiting += expr.args
+    return found
+
+
+@lru_cache(maxsize=4096)  # the modes of a large model have most of their routines in common
+def _body(results: tuple, statements: tuple[Statement, ...]) -> str:
+    printer = KernelPrinter()
+    statements, results = written_out(results, statements)
+    lines = [f"    {symbol.name} = {printer.doprint(expr)}\n" for symbol, expr in statements]
+    return "".join([*lines, f"    return ({''.join(printer.doprint(expr) + ', ' for expr in results)})\n"])
+
+
+def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[list[Statement], tuple]:
+    """Cut down statements and results, and take out their common parts."""
+    cut = Cut("v", powers=True)
+    given = [(symbol, cut.down(expr)) for symbol, expr in statements]
+    small = [cut.down(expr) for expr in map(sp.sympify, results)]
+    known = [*given, *cut.statements]
+    common, reduced = shared([*(e for _, e in known), *small], "w")
+    last = tuple(reduced)[len(known) :]
+    named = zip((symbol for symbol, _ in known), reduced, strict=False)
+    return in_order([*common, *named], sp.Tuple(*last)), last
+
+
+def print_routines(definitions: Iterable[Definition], data: Sequence[sp.Symbol]) -> Routines:
+    """Put routines into one ``bind`` whose arguments are the data they close over."""
+    definitions = tuple(definitions)
+    names = tuple(d.name for d in definitions)
+    body = "".join(textwrap.indent(text_of(d), "    ") for d in definitions)
+    head = f"def bind({', '.join(s.name for s in data)}):\n"
+    result = f"({', '.join(names)},)" if names else "()"
+    return Routines(names, f"{head}{body}    return {result}\n")

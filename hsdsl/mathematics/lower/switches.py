@@ -16,11 +16,10 @@ from typing import Any
 import sympy as sp
 
 from hsdsl.base.functions import absolute, atan2, floor, maximum, minimum, replaced, rewritten, sign
+from hsdsl.language.expression.algebra import by_constants
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import by_constants
 from hsdsl.language.system import TIME, HybridSystem, Mode
-from hsdsl.mathematics.lower.routines import Definition
-from hsdsl.mathematics.lower.straight import Gradient
+from hsdsl.mathematics.lower.straight import Definition, Gradient
 from hsdsl.mathematics.program import Switch
 
 _HALF = sp.Rational(1, 2)
@@ -50,12 +49,9 @@ class Switches:
         return rewritten(expr, self._changed, self._done)
 
     def _changed(self, expr: sp.Basic) -> sp.Basic:
-        branch = _BRANCHES.get(type(expr))
-        return branch(self, *expr.args) if branch and self._of_time(expr) else expr
-
-    def _of_time(self, expr: sp.Basic) -> bool:
-        names = expr.free_symbols
-        return bool(names & self.moving) and names <= self.moving | self.known | set(self.symbols)
+        branch, names = _BRANCHES.get(type(expr)), expr.free_symbols
+        of_time = names & self.moving and names <= self.moving | self.known | set(self.symbols)
+        return branch(self, *expr.args) if branch and of_time else expr
 
     def number(self, kind: str, argument: sp.Expr, jumps: bool = False) -> sp.Expr:
         """The number of a switch: the floor or the sign of its argument."""
@@ -92,15 +88,12 @@ def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
     inputs = {symbol(i.name): i.hold for i in system.inputs if i.given is None}  # others may be driven from outside
     moving = frozenset({TIME, *(name for name, hold in inputs.items() if hold == "linear")})
     switches = Switches(moving, frozenset({*inputs, *system.parameter_symbols}))
-    modes = tuple(_steady(mode, system).mapped(switches.out_of) for mode in system.modes)
-    return replace(system, modes=modes), switches
-
-
-def _steady(mode: Mode, system: HybridSystem) -> Mode:
-    """A mode whose choices by parameters and states that do not flow are smooth."""
-    still = (symbol(x) for x, f in zip(mode.states, mode.flow, strict=True) if f == 0)
-    constants = frozenset((*system.parameter_symbols, *still))
-    return mode.mapped(lambda expr: by_constants(expr, constants))
+    modes: list[Mode] = []
+    for mode in system.modes:  # choices by parameters and states that do not flow are smooth
+        still = (symbol(x) for x, f in zip(mode.states, mode.flow, strict=True) if f == 0)
+        constants = frozenset((*system.parameter_symbols, *still))
+        modes.append(mode.mapped(lambda expr, c=constants: by_constants(expr, c)).mapped(switches.out_of))
+    return replace(system, modes=tuple(modes)), switches
 
 
 def switch_programs(switches: Switches) -> tuple[Switch, ...]:

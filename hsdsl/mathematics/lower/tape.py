@@ -16,8 +16,7 @@ from math import inf
 import sympy as sp
 
 from hsdsl.language.system import TIME
-from hsdsl.mathematics.lower.routines import Definition, print_routines
-from hsdsl.mathematics.lower.straight import Cut
+from hsdsl.mathematics.lower.straight import Cut, Definition, print_routines
 from hsdsl.mathematics.program import Operation, Tape
 
 _ONE = sp.Integer(1)
@@ -133,7 +132,8 @@ class _Writer:
     def _shortest(self, kind: str, lines: tuple[int, ...], constant: int | None) -> Operation:
         """Choose how an operation is summed: along a polynomial of time where there is one."""
         if kind == "mul":
-            shorter, longer = sorted(lines, key=lambda line: (self._length(line), line))
+            degrees = {line: inf if self._degrees[line] is None else self._degrees[line] for line in lines}
+            shorter, longer = sorted(lines, key=lambda line: (degrees[line], line))
             lines = shorter, longer
             if shorter == longer and self._degrees[shorter] is None:
                 return Operation("square", lines[:1], constant)
@@ -141,10 +141,6 @@ class _Writer:
             return Operation(kind, lines, constant)
         along = self._degrees[lines[1 if kind == "div" else 0]]
         return Operation(kind, lines, constant, None if along is None else max(1, along))
-
-    def _length(self, line: int) -> float:
-        degree = self._degrees[line]
-        return inf if degree is None else degree
 
     def _degree(self, operation: Operation) -> int | None:
         """The degree of a line that is a polynomial of time; None for others."""

@@ -1,4 +1,4 @@
-"""Rules about the experiment: where a run starts and ends, its settings, and times of its references."""
+"""Rules about the experiment: where a run starts and ends, and its relaxation."""
 
 from __future__ import annotations
 
@@ -7,18 +7,14 @@ from itertools import pairwise
 from typing import Any
 
 from hsdsl.analysis.lint.finding import Finding
-from hsdsl.analysis.lint.numbers import BEYOND, ON, Number, evaluate, holds, leaves, side
-from hsdsl.analysis.lint.subject import ModePart, Subject
+from hsdsl.analysis.lint.subject import BEYOND, ON, ModePart, Number, Subject, evaluate, holds, leaves, side
 from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.language.expression import numeric
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.schema import MultiplesDocument, ReferenceDocument
 from hsdsl.language.source import Scalar
 from hsdsl.language.system import TIME, Mode, Surface
 from hsdsl.mathematics.decisions.mode_point import ModePoint, Unsure, ranked
 
-_LOOSEST, _TIGHTEST = 0.01, 1e-15
-_MOST_SAMPLES = 10**6
 _SMALLER = "choose a smaller relaxation"
 _TIE_OF_WRITTEN_TIMES = 1e-9
 
@@ -143,63 +139,10 @@ def _shortest_dwell(subject: Subject) -> Number | None:
     gaps: list[Number] = []
     until = subject.setting("until") or 0
     for reference in subject.document.reference:
-        times = [time for time in map(subject.read, _transition_times(reference)) if numeric.finite(time)]
+        written = (event if isinstance(event, Scalar) else event.time for event in reference.transitions)
+        times = [time for time in map(subject.read, written) if numeric.finite(time)]
         ties = (_TIE_OF_WRITTEN_TIMES * max(until, abs(time)) for time in times[1:])
         gaps += [
             after - before for (before, after), tie in zip(pairwise(times), ties, strict=True) if after - before > tie
         ]
     return min(gaps, default=None)
-
-
-def _transition_times(reference: ReferenceDocument) -> list[Scalar]:
-    return [event if isinstance(event, Scalar) else event.time for event in reference.transitions]
-
-
-def odd_samples(subject: Subject) -> Iterator[Finding]:
-    """Find samples that leave the run, do not increase, or are too many."""
-    samples, until = subject.document.experiment.samples, subject.setting("until")
-    if samples is not None and not isinstance(samples, list):
-        scalar = samples.every if isinstance(samples, MultiplesDocument) else samples
-        given = subject.read(scalar)
-        if (until / given if scalar is not samples else given) > _MOST_SAMPLES:
-            yield Finding(scalar.place.span, "this is more than a million samples", "take fewer")
-        return
-    last = None
-    for scalar in samples or ():
-        time = subject.read(scalar)
-        if time < 0 or time > until:
-            yield Finding(scalar.place.span, "this time is outside the run", "sample between 0 and `until`")
-        elif last is not None and time <= last:
-            yield Finding(scalar.place.span, "this time does not come after the one before", "put the times in order")
-        last = time
-
-
-def odd_step(subject: Subject) -> Iterator[Finding]:
-    """Find steps, tolerances and ends of the run that a run cannot use."""
-    document = subject.document.experiment
-    until, step, tolerance = (subject.setting(key) for key in ("until", "step", "tolerance"))
-    if until == 0:
-        yield Finding(document.until.place.span, "the run ends where it starts", "end later than 0")
-    elif document.step is not None and step is not None and 10 * step > until:
-        yield Finding(document.step.place.span, "the run is shorter than ten steps", "take a shorter step")
-    if document.tolerance is not None and tolerance is not None:
-        if tolerance > _LOOSEST:
-            message = "a tolerance above 0.01 leaves errors of several percent in every step"
-            yield Finding(document.tolerance.place.span, message, "take a smaller one, such as 1e-6")
-        elif tolerance < _TIGHTEST:
-            message = "a tolerance below 1e-15 is below the round-off of float64"
-            yield Finding(document.tolerance.place.span, message, "take a larger one, or --precision")
-
-
-def late_reference(subject: Subject) -> Iterator[Finding]:
-    """Find times of references outside the run that they describe."""
-    for reference in subject.document.reference:
-        settings = reference.settings
-        if any(key in subject.document.parameters for key in settings):
-            continue  # its parameters are others
-        given = next((scalar for key, scalar in settings.items() if key == "experiment.until"), None)
-        until = subject.setting("until") if given is None else subject.read(given)
-        for scalar in (*_transition_times(reference), *(state.time for state in reference.states)):
-            time = subject.read(scalar)
-            if time < 0 or time > until + _TIE_OF_WRITTEN_TIMES * abs(until):
-                yield Finding(scalar.place.span, "the run this is about does not reach this time", "let it run longer")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.subject import Subject
-from hsdsl.analysis.lint.units.unit import Unit, names_like
+from hsdsl.analysis.lint.units import Unit, names_like
 from hsdsl.base.names import closest, shown
 
 CONVERT = "correct it, or give a factor that converts a name and a unit"
@@ -26,13 +26,13 @@ _VALUES = {
 
 def unknown_unit(subject: Subject) -> Iterator[Finding]:
     """Find texts that are no units."""
-    for misread in subject.units.misread:
-        name = misread.names[0] if misread.names else None
-        best = misread.better if name is None else closest(name, names_like(name))
+    for scalar, error in subject.units.misread:
+        name = error.names[0] if error.names else None
+        best = error.better if name is None else closest(name, names_like(name))
         hint = "write units as m, kg*m/s**2, 1/s or rad"
         if best:
-            hint = f"write '{best}'" if misread.better else f"did you mean '{best}'?"
-        yield Finding(misread.scalar.place.span, f"'{shown(name or misread.scalar.value)}' is not a unit", hint)
+            hint = f"write '{best}'" if error.better else f"did you mean '{best}'?"
+        yield Finding(scalar.place.span, f"'{shown(name or scalar.value)}' is not a unit", hint)
 
 
 def misfits(kind: str, hint: str | None = None) -> Callable[[Subject], Iterator[Finding]]:
@@ -40,9 +40,9 @@ def misfits(kind: str, hint: str | None = None) -> Callable[[Subject], Iterator[
 
     def check(subject: Subject) -> Iterator[Finding]:
         for checked in subject.units.checked:
-            for misfit in checked.misfits:
-                if misfit.kind == kind:
-                    yield Finding(checked.written.span(misfit.node), misfit.message, hint)
+            for own, node, message in checked.misfits:
+                if own == kind:
+                    yield Finding(checked.written.span(node), message, hint)
 
     return check
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from itertools import count
 from textwrap import dedent
 
-from hsdsl.base.sparsity import Elimination, Variation
+from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.engine.backends.c.routine import function_body, routine_function
 from hsdsl.engine.backends.c.series import flow_lines, is_large, line_count, piecewise, read_by_surfaces, surface_lines
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program, Queue, Routines, Tape

@@ -1,5 +1,5 @@
 /* Routines along a part of a step: up to third order around its middle, and how far they may be from that. See
-   hsdsl/expansions.py.
+   hsdsl/engine/simulate/verdict/flows.py.
 
    An expansion is a function of u from -1 to 1, no further from value + first u + second u**2 + third u**3 than
    `remainder`;

@@ -46,7 +46,7 @@ typedef struct {
   const int *place;
 } hs_sparse;
 
-/* The pattern of a sparse elimination: see hsdsl/base/sparsity.py. */
+/* The pattern of a sparse elimination: see hsdsl/base/graphs.py. */
 typedef struct {
   int size; /* entries of the factors */
   const int *order;
@@ -57,7 +57,7 @@ typedef struct {
   const int *own;
 } hs_elimination;
 
-/* States that are derivatives of others: see Variation in hsdsl/base/sparsity.py. */
+/* States that are derivatives of others: see Variation in hsdsl/base/graphs.py. */
 typedef struct {
   int own;
   int count; /* of columns */

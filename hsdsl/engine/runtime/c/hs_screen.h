@@ -76,7 +76,7 @@ typedef struct {
   double *registers;
 } hs_moves;
 
-/* Coefficients of corrections: see hsdsl/engine/simulate/verdict/correction.py. */
+/* Coefficients of corrections: see hsdsl/engine/simulate/verdict/shadow.py. */
 typedef struct {
   double node[4], weight[6][4], bulge[4], slope[4], inside, pole;
 } hs_correction;

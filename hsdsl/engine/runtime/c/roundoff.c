@@ -105,7 +105,10 @@ HS_INLINE hs_rounded rounded_choice(double value, hs_rounded meant, double off) 
 static hs_rounded rounded_extreme(hs_rounded a, hs_rounded b, int most) {
   const double p = a.value + a.error, q = b.value + b.error;
   const double value = most ? hs_max(a.value, b.value) : hs_min(a.value, b.value);
-  return rounded_choice(value, (most ? q > p : q < p) ? b : a, hs_max(a.off, b.off));
+  const int second = most ? q > p : q < p;
+  const hs_rounded chosen = second ? b : a;
+  const double reach = (second ? a : b).off - fabs(second ? p - q : q - p); /* of the other one, beyond this */
+  return rounded_choice(value, chosen, reach > chosen.off ? reach : chosen.off);
 }
 
 static hs_rounded rounded_below(hs_rounded a, hs_rounded b, hs_rounded one, hs_rounded other, int traced) {

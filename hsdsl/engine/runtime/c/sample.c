@@ -1,4 +1,4 @@
-/* The value of a run at many times. See hsdsl/engine/execution/sampling.py.
+/* The value of a run at many times. See hsdsl/engine/execution/run.py.
 
    Times in one piece are evaluated together, a block of them at once: one sum waits for its last product, many do not.
    Every value is computed as the Python twin does: x + s (c_1 + s (c_2 + ...)). */

@@ -3,12 +3,6 @@
    Every hypothesis of the theorem is screened in one pass over rows, arcs and transitions. Where it is not
    sure that there is no finding, the hypothesis is undecided and the place is marked. */
 
-#include "screen_view.h"
-
-#include "screen_errors.c"
-#include "screen_shadow.c"
-#include "screen_ties.c"
-#include "screen_places.c"
 #include "screen_steps.c"
 
 /* Whether more than FREE transitions have little flow between them. */
@@ -45,7 +39,10 @@ static void screen_arc(hs_view *v) {
   if (s->landing[v->arc]) s->undecided |= BIT(HS_LANDING);
   if (flown && (s->ending[v->arc] = ends_close(v, 0))) s->undecided |= BIT(HS_ENDING);
   const int leaves = v->arc + 1 == s->run.arcs || s->run.arc[v->arc + 1].jump > jump;
-  if (leaves && jump < s->run.transitions && !s->run.transition[jump].entry) screen_crossing(v, jump, flown);
+  if (!leaves || jump >= s->run.transitions) return;
+  bind(v, v->mode, segment_at(s->timeline, s->run.transition[jump].time));
+  if (reset_bends(v, &s->run.transition[jump], s->run.before + jump * s->model->width)) s->undecided |= BIT(HS_PARTED);
+  if (!s->run.transition[jump].entry) screen_crossing(v, jump, flown);
 }
 
 /* Whether a transition within the error of the end is undecided; the view is at the last arc. */

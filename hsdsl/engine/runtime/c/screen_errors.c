@@ -1,4 +1,5 @@
-/* How wrong a recorded run is, by the finer one. See hsdsl/engine/simulate/verdict/agreement.py and reliability.py. */
+/* How wrong a recorded run is, by the finer one or by its shadow run, which steps by Taylor series or by corrections of
+   the recorded steps. See hsdsl/engine/simulate/verdict: errors, shadow. */
 
 #include "screen_view.h"
 
@@ -151,4 +152,333 @@ static int outgrown(hs_view *v) {
     if (!round_off(v, before)) return 1;
   }
   return !explained(v);
+}
+
+/* Where the shadow run is at the start of a step of the run, and how far it is from there on: coefficients 1 to
+   order + 1 in shares of the step, and by how much it has moved at the end besides. */
+typedef struct {
+  const hs_mode *table;
+  const double *p;
+  double *x, *y, *moved, *roundoff, *lines;
+  double t, h;
+  int64_t row; /* where the run's step begins */
+  int order, begins; /* whether an arc begins there */
+} hs_shadow;
+
+enum { NODES = 4, POWERS = 6, SMALL = 3 /* states, kept in registers */ };
+
+/* How much the polynomial of the run's step fails the flow at the share s, begun at x and moved by `bulge` u, its slope
+   by `rate` u. */
+HS_INLINE int defect_at(hs_view *v, const hs_shadow *c, int n, double s, const double *x, double bulge, double rate,
+                        const double *restrict u, double *restrict g) {
+  const int d = v->s->run.degree, w = v->s->run.width;
+  const double *coefficient = recorded_piece(&v->s->run, c->row) + (d - 1) * w;
+  const double *const roundoff = c->roundoff, h = c->h;
+  double *restrict const at = v->z, *restrict const slope = v->slope;
+  HS_SIMD
+  for (int i = 0; i < n; i++) at[i] = s * coefficient[i], slope[i] = d * coefficient[i];
+  for (int k = d - 1; k > 0; k--) {
+    const double power = k;
+    coefficient -= w;
+    HS_SIMD
+    for (int i = 0; i < n; i++) {
+      at[i] = s * (coefficient[i] + at[i]);
+      slope[i] = power * coefficient[i] + s * slope[i];
+    }
+  }
+  HS_SIMD
+  for (int i = 0; i < n; i++) {
+    at[i] = x[i] + at[i] + bulge * u[i];
+    slope[i] += rate * u[i];
+  }
+  if (c->table->flow(c->p, c->t + s * h, at, g)) return 1;
+  HS_SIMD
+  for (int i = 0; i < n; i++) g[i] = h * g[i] - slope[i] + roundoff[i];
+  return 0;
+}
+
+/* Factor 1 - a h J, J being the derivatives of the flow where the run's step ends. A dense matrix is inverted:
+   products need not wait for each other as the unknowns of a triangle do. */
+HS_INLINE int factor_correction(hs_view *v, const hs_shadow *c, int n) {
+  const double *const x = recorded_row(&v->s->run, c->row + 1), away = -v->s->correction->pole * c->h;
+  const hs_sparse *const rows = &c->table->jacobian;
+  const hs_elimination *const of = n > SMALL ? c->table->elimination : 0;
+  double *const a = v->factors, *const unit = v->z, *const sizes = v->slope;
+  if (rows->values(c->p, c->t + c->h, x, v->derivatives)) return 1;
+  const int size = of ? of->size : n * n;
+  for (int i = 0; i < size; i++) a[i] = 0.0;
+  for (int i = 0; i < rows->count; i++) a[of ? of->place[i] : rows->place[i]] = away * v->derivatives[i];
+  for (int i = 0; i < n; i++) a[of ? of->diagonal[i] : i * n + i] += 1.0;
+  if (of) return sparse_factored(n, of, a, v->z);
+  for (int i = 0; i < n; i++) sizes[i] = fabs(x[i]), unit[i] = 0.0;
+  if (factored(n, a, v->exchanged, sizes, 0)) return 1;
+  for (int i = 0; i < n; i++) {
+    unit[i] = 1.0;
+    solve(n, a, v->exchanged, unit, v->inverse + i * n);
+    unit[i] = 0.0;
+  }
+  return 0;
+}
+
+/* The product of the inverse and a vector. */
+HS_INLINE void solve_correction(hs_view *v, const hs_shadow *c, int n, const double *restrict right,
+                                double *restrict d) {
+  const double *restrict const w = v->inverse;
+  if (n > SMALL && c->table->elimination) {
+    sparse_solve(n, c->table->elimination, v->factors, right, v->z, d);
+    return;
+  }
+  for (int i = 0; i < n; i++) d[i] = w[i] * right[0];
+  for (int j = 1; j < n; j++)
+    for (int i = 0; i < n; i++) d[i] += w[j * n + i] * right[j];
+}
+
+HS_INLINE void weigh(int n, const double *weight, double *const *g, double *restrict sum) {
+  const double *const a = g[0], *const b = g[1], *const c = g[2], *const d = g[3];
+  HS_SIMD
+  for (int i = 0; i < n; i++) sum[i] = weight[0] * a[i] + weight[1] * b[i] + weight[2] * c[i] + weight[3] * d[i];
+}
+
+HS_INLINE int correct_in(hs_view *v, hs_shadow *c, int n, double *restrict apart) {
+  const hs_correction *const known = v->s->correction;
+  const double *const start = recorded_row(&v->s->run, c->row), *const end = recorded_row(&v->s->run, c->row + 1);
+  double *g[NODES], *const u = v->defects + NODES * v->s->run.width, few[2][SMALL];
+  double *restrict const right = n > SMALL ? v->slope : few[0], *restrict const d = n > SMALL ? c->y : few[1];
+  for (int k = 0; k < NODES; k++) g[k] = v->defects + k * v->s->run.width;
+  for (int i = 0; i < n; i++) c->roundoff[i] = copysign(c->roundoff[i], c->x[i] - start[i]), u[i] = 0.0;
+  if (factor_correction(v, c, n) || defect_at(v, c, n, known->inside, start, 0.0, 0.0, u, g[0])) return 0;
+  solve_correction(v, c, n, g[0], u);
+  for (int i = 0; i < n; i++) apart[i] = fabs(c->x[i] - start[i] + known->pole * u[i]);
+  for (int k = 0; k < NODES; k++)
+    if (defect_at(v, c, n, known->node[k], c->x, known->bulge[k], known->slope[k], u, g[k])) return 0;
+  weigh(n, known->weight[POWERS - 1], g, right);
+  for (int m = POWERS - 2; m >= 0; m--) {
+    solve_correction(v, c, n, right, d);
+    weigh(n, known->weight[m], g, right);
+    for (int i = 0; i < n; i++) right[i] += d[i];
+  }
+  solve_correction(v, c, n, right, d);
+  for (int i = 0; i < n; i++) c->y[i] = end[i] + ((c->x[i] - start[i]) + d[i]);
+  return 1;
+}
+
+static int correct_2(hs_view *v, hs_shadow *c, double *apart) {
+  return correct_in(v, c, 2, apart);
+}
+
+static int correct_3(hs_view *v, hs_shadow *c, double *apart) {
+  return correct_in(v, c, 3, apart);
+}
+
+static int correct_n(hs_view *v, hs_shadow *c, double *apart) {
+  return correct_in(v, c, v->n, apart);
+}
+
+/* Find where the shadow run is at the end of the run's step, to y, further away by `roundoff`, which goes on as the
+   flow does; and how far it is from the run inside, to `apart`. */
+static int correct_step(hs_view *v, hs_shadow *c, double *apart) {
+  return (v->n == 2 ? correct_2 : v->n == 3 ? correct_3 : correct_n)(v, c, apart);
+}
+
+#define FEWEST 3     /* the order of the shadow run's first series */
+#define MORE_TERMS 2 /* by how much it grows where that is not enough */
+
+/* Turn the shadow run's coefficients into differences from those of the run's step, and find how far it is away at the
+   end, to y; whether the last ones are so small that all steps together leave out little. */
+static int take_differences(const hs_view *v, const hs_shadow *c) {
+  const hs_record *const run = &v->s->run;
+  const double *const x = recorded_row(run, c->row), *const piece = recorded_piece(run, c->row);
+  const int last = c->order + 1, w = run->width;
+  int settled = 1;
+  for (int i = 0; i < c->table->dimension; i++) {
+    double *const line = c->lines + (i + 1) * (c->order + 2), power = 1.0;
+    double away = c->x[i] - x[i], all = fabs(away);
+    for (int m = 1; m <= last; m++) {
+      power *= c->h;
+      line[m] = line[m] * power - piece[(m - 1) * w + i];
+      away += line[m];
+      all += fabs(line[m]);
+    }
+    c->y[i] = away;
+    settled &= (double)run->rows * (fabs(line[last - 1]) + fabs(line[last])) <= all;
+  }
+  return settled;
+}
+
+/* Expand the shadow run along the run's step. */
+static int expand_shadow(const hs_view *v, hs_shadow *c) {
+  for (;; c->order = c->order + MORE_TERMS < v->s->order ? c->order + MORE_TERMS : v->s->order) {
+    if (!c->table->series || c->table->series(c->p, c->order, c->t, c->x, c->lines)) return 0;
+    if (take_differences(v, c) || c->order == v->s->order) return 1;
+  }
+}
+
+/* What the run's polynomial X leaves out by the end of its step, to `moved`, where `rounded` holds the flow there.
+
+   With d = X' - f(X) at the end and J the derivatives of f, e' = J e - d for what is left out, e: it is close to
+   -h d/order, and what follows from J e is close to h (J e)/(order + 1). */
+static int leave_out(hs_view *v, const hs_shadow *c) {
+  const hs_record *const run = &v->s->run;
+  const double *const x = recorded_row(run, c->row + 1), *const piece = recorded_piece(run, c->row);
+  const int order = run->degree + 1;
+  double *const e = c->moved, *const beyond = v->allowance, *const there = v->mode_error;
+  for (int i = 0; i < v->n; i++) {
+    double slope = 0.0;
+    for (int k = v->degree - 1; k >= 0; k--) slope += (k + 1) * piece[k * run->width + i];
+    there[i] = v->rounded[v->f->flow.result[i]].value;
+    e[i] = (c->h * there[i] - slope) / order;
+    beyond[i] = x[i] + e[i];
+  }
+  if (v->table->flow(v->p, run->times[c->row + 1], beyond, v->slope)) return 0;
+  for (int i = 0; i < v->n; i++) e[i] += c->h * (v->slope[i] - there[i]) / (order + 1);
+  return 1;
+}
+
+/* Find where the shadow run is at the end of the run's step, to y, moved by what the run leaves out, and further away
+   by what round-off of the flow may do, `roundoff`. */
+static int expand_step(hs_view *v, hs_shadow *c) {
+  take_step(v, c->row);
+  const double *const x = recorded_row(&v->s->run, c->row + 1);
+  if (!expand_shadow(v, c) || !leave_out(v, c)) return 0;
+  for (int i = 0; i < v->n; i++) {
+    const double away = c->y[i] + c->moved[i];
+    c->y[i] = x[i] + (away + copysign(c->roundoff[i], away));
+  }
+  return 1;
+}
+
+#define MOST_CHANGES 8     /* of Newton's method */
+#define CLOSED_IN 0x1p-10 /* of the tie tolerance: a crossing's time is found */
+
+/* Bound what round-off of the flow and of states that move may do in the run's step, by the flow where that ends, to
+   `roundoff`; 0 where it has no bound. Where an arc begins, states are rounded too. */
+static int bound_roundoff(hs_view *v, const hs_shadow *c) {
+  const double *const start = recorded_row(&v->s->run, c->row), *const x = recorded_row(&v->s->run, c->row + 1);
+  const hs_formula *const flow = &v->f->flow;
+  rounded_formula(v->f, flow, v->n, v->s->model->data, v->s->run.times[c->row + 1], x, v->rounded, 0);
+  for (int i = 0; i < v->n; i++) {
+    const hs_rounded f = v->rounded[flow->result[i]];
+    const double share = f.value != 0.0 ? ROUNDED : 0.0;
+    c->roundoff[i] = c->h * f.off + share * fabs(x[i]);
+    if (c->begins) c->x[i] += copysign(share * start[i], c->x[i] - start[i]);
+    if (!hs_finite(c->roundoff[i])) return 0;
+  }
+  return 1;
+}
+
+/* Follow the round-off of a formula of the mode at a point of the shadow run. */
+static void trace(hs_view *v, const hs_shadow *c, const hs_formula *formula, const double *x) {
+  const int n = c->table->dimension, data = v->s->model->data;
+  if (v->traced_mode != v->mode) bind_rounded(v->f, n, data, c->p, v->traced, 1), v->traced_mode = v->mode;
+  rounded_formula(v->f, formula, n, data, c->t, x, v->traced, 1);
+}
+
+/* Move it along a straight line to where it crosses surface k but for the surface's round-off, to y. */
+static int shadow_crosses(hs_view *v, hs_shadow *c, int k) {
+  const double tie = tie_of(v->s, c->t);
+  double change = INFINITY, rate, s = 0.0;
+  if (c->table->flow(c->p, c->t, c->x, v->slope)) return 0;
+  trace(v, c, &v->f->surfaces, c->x);
+  const double beyond = beyond_value(v->traced[v->f->surfaces.result[k]]);
+  copy(c->y, c->x, c->table->dimension);
+  for (int i = 0; i < MOST_CHANGES && fabs(change) > CLOSED_IN * tie; i++) {
+    if (c->table->values(c->p, c->t + s, c->y, v->values) || c->table->rates[k](c->p, c->t + s, c->y, &rate)) return 0;
+    if (!(rate > 0)) return 0;
+    change = (v->values[k] + beyond) / rate;
+    s -= change;
+    for (int m = 0; m < c->table->dimension; m++) c->y[m] = c->x[m] + s * v->slope[m];
+  }
+  c->t += s;
+  return fabs(change) <= tie;
+}
+
+/* Move what the reset of an edge makes of y by its round-off, to x; 0 where that is not known. */
+static int trace_reset(hs_view *v, hs_shadow *c, int k) {
+  const hs_formula *const formula = &v->f->reset[k];
+  const hs_edge *const edge = &c->table->edge[k];
+  copy(c->x, c->y, c->table->dimension);
+  trace(v, c, formula, c->y);
+  for (int i = 0; i < edge->changes; i++) {
+    const hs_rounded found = v->traced[formula->result[i]];
+    c->x[edge->change[i]] = moved(found);
+    if (!hs_finite(found.value + found.error + found.off)) return 0;
+  }
+  return 1;
+}
+
+/* Make transition j where the shadow run crosses its surface, close to where it is. */
+static int shadow_jumps(hs_view *v, hs_shadow *c, int64_t j, double *errors) {
+  const hs_screen *const screen = v->s;
+  const hs_transition *const made = &screen->run.transition[j];
+  const double *const before = screen->run.before + j * screen->model->width;
+  if (made->entry || !shadow_crosses(v, c, made->edge)) return 0;
+  for (int i = 0; i < c->table->dimension; i++) grow(&errors[i], fabs(before[i] - c->y[i]));
+  v->time_errors[j] = hs_max(j ? v->time_errors[j - 1] : tie_of(screen, 0.0),
+                      fabs(made->time - c->t));
+  if (!trace_reset(v, c, made->edge)) return 0;
+  return !screen->model->queues || hs_let_wait(screen->model, v->tail, 0, c->table, c->y,
+                                           &screen->model->mode[c->table->edge[made->edge].target], c->x) < 0;
+}
+
+/* Twice as many as wait in a run at a time, and room to move them together. */
+static int64_t waits_of(const hs_screen *s, int number) {
+  double most = 0.0;
+  for (int64_t j = 0; j < s->run.transitions; j++) {
+    const hs_transition *const made = &s->run.transition[j];
+    const hs_mode *const mode = &s->model->mode[made->mode];
+    for (int k = 0; k < mode->queues; k++)
+      if (mode->queue[k].number == number) grow(&most, (s->run.before + j * s->model->width)[mode->queue[k].waiting]);
+  }
+  return 2 * (int64_t)(most + FEWEST_WAITS);
+}
+
+/* Let nothing wait in the shadow run. */
+static void lay_out_waits(hs_view *v) {
+  double *waits = v->waits;
+  for (int q = 0; q < v->s->model->queues; q++) {
+    const hs_tail none = {waits_of(v->s, q), 0, 0, waits};
+    v->tail[q] = none;
+    waits += none.room * v->s->model->queued;
+  }
+}
+
+/* Follow the run: how far each row is from the shadow run, to `shadow_errors`, and each transition, to
+   `time_errors`; 0 where that cannot be followed. */
+static int follow_run(hs_view *v) {
+  const hs_screen *const s = v->s;
+  const hs_record *const run = &s->run;
+  hs_shadow c = {.p = s->data, .x = v->x, .y = v->y, .moved = v->z, .roundoff = v->roundoff};
+  c.lines = v->lines;
+  int64_t followed = 0;
+  lay_out_waits(v);
+  c.t = run->times[0];
+  c.order = FEWEST < s->order ? FEWEST : s->order;
+  copy(c.x, s->start, s->model->mode[run->arc[0].mode].dimension);
+  for (int64_t i = 0; i < run->rows * run->width; i++) s->shadow_errors[i] = 0.0;
+  for (int64_t a = 0; a < run->arcs; a++) {
+    const int64_t last = last_row(run, a), jump = run->arc[a].jump;
+    const int leaves = jump < run->transitions && (a + 1 == run->arcs || run->arc[a + 1].jump > jump);
+    c.table = &s->model->mode[run->arc[a].mode];
+    const double shift = c.t - run->times[run->arc[a].first];
+    if (c.table->final) continue;
+    bind(v, run->arc[a].mode, 0);
+    for (int64_t row = run->arc[a].first; row <= last; row++) {
+      double *const errors = s->shadow_errors + row * run->width;
+      const double *const x = recorded_row(run, row);
+      c.row = row - 1, c.h = row > run->arc[a].first ? run->times[row] - run->times[row - 1] : 0.0;
+      c.begins = row == run->arc[a].first + 1;
+      if (c.h > 0) {
+        if (!bound_roundoff(v, &c) || !(s->correction ? correct_step(v, &c, errors) : expand_step(v, &c))) return 0;
+        copy(c.x, c.y, v->n);
+        c.t = run->times[row] + shift;
+      }
+      for (int i = 0; i < v->n; i++) {
+        const double apart = fabs(x[i] - c.x[i]);
+        if (!hs_finite(apart)) return 0;
+        grow(&errors[i], apart);
+      }
+    }
+    if (leaves && (jump != followed++ || !shadow_jumps(v, &c, jump, s->shadow_errors + last * run->width))) return 0;
+  }
+  return followed == run->transitions;
 }

@@ -3,63 +3,74 @@
 The convergence theorem (Burden et al. 2013, Thm 26, Cor. 28) is about executions that cross finitely many guards, each
 transversally. No other surface is so near that an error could change the sequence, and simultaneous choices lead to the
 same point. A run shows its own neighbourhood of the execution, so every margin is held against the error that the run
-allows itself.
+allows itself: that of a shadow run, and where that does not show that the theorem holds, that of a finer run.
 
-==================  =================================================================================================
-`screen`            what compiled enclosures leave undecided
-`formulas`          routines as operations, as it takes them; `formula_tables`: those of a program in C
-`shadow`            the errors of a run, by a `shadow_run` that takes the same steps, closer to the solution
-`correction`        steps that no series repeats, corrected
-`agreement`         the errors of a run, by the same run made finer
-`recorded_run`      an execution with its modes' routines; `place` is one state of it
-`run_view`          the same with its errors
-`steps`             its steps as polynomials, many at once, with routines over intervals
-`compiled_verdict`  compiled runs of which it leaves nothing undecided
-`findings`          all of the following, of a run that the screen leaves undecided
-`finding`           one reason; `near_surface` holds margins against errors
-`reliability`       from when on a run cannot be relied on
-`crossings`         is each transition transversal, and its condition the same all around it?
-`entries`           do transitions that fire at once on entry do so all around it?
-`input_jumps`       jumps of inputs that transitions near them do not notice
-`exact_states`      states without an error
-`nearby`            where transitions take states that are moved along the guard
-`landings`          does a reset land within the error of a surface, or jump?
-`misses`            surfaces that are almost reached or passed over; `endings`: what happens at the end
-`tangent`           arcs that leave a surface tangentially, as where sliding ends
-`remarked`          what a run reports first, whatever its verdict; `passings`: by its rows
-`transparent`       surfaces that are passed where their condition is false
-`flows`             does the flow vary unseen, jump, or have a slope without bound?
-`expansions`        operations along parts of steps, and what they leave unresolved; `expanded`: functions of these
-`commutation`       do transitions that are reached together commute?
-`accumulation`      Zeno points and rest, which the relaxed scheme goes through without a word
-`effort`            steps that crowd: no hypothesis, but reported
-`strips`            transitions that are lost while another one waits in a strip
-==================  =================================================================================================
+The hypotheses are checked in this order. Where the compiled `screen` leaves none undecided, that is all.
+
+1. There are finitely many transitions, none is lost in a strip, and no arc slides: `crossings`.
+2. Executions that wait go in an order that the error does not change: `commutation.waiting_orders`.
+3. The errors are bounded, and a finer run makes the same transitions: `flows.reliability`.
+4. Each transition is transversal, and its condition the same all around it: `crossings.crossings`.
+5. Simultaneous transitions commute: `commutation.choices`.
+6. Transitions that fire at once on entry do so all around it: `resets.entries`.
+7. Resets are continuous, and land within the error of no surface: `resets.landings`.
+8. No surface is almost reached, passed over or passed unseen, along steps or at the end: `misses`.
+9. The flow is continuous with bounded slopes, and does not vary where no step saw it: `flows.flows`.
+
+What they need: `run_view`, the run with its places; `errors` by a finer run and `shadow` by a shadow run; `steps`,
+which are polynomials, and routines over intervals along them. `remarks` is what a run reports first, whatever its
+verdict.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.engine.execution import INCOMPLETE, LEFT, Stop, Verdict
-from hsdsl.engine.simulate.stops import Diagnostics
-from hsdsl.engine.simulate.verdict.accumulation import accumulations, slidings
-from hsdsl.engine.simulate.verdict.commutation import together
-from hsdsl.engine.simulate.verdict.crossings import summary
-from hsdsl.engine.simulate.verdict.effort import crowded_steps
-from hsdsl.engine.simulate.verdict.finding import Finding
-from hsdsl.engine.simulate.verdict.remarked import WARNINGS, remarked
-from hsdsl.engine.simulate.verdict.run_view import RunView
-from hsdsl.engine.simulate.verdict.screen import Margins
+from hsdsl.engine.execution import INCOMPLETE, LEFT, Execution, Verdict
+from hsdsl.engine.simulate.problem import Problem
+from hsdsl.engine.simulate.stalls import SHORT
+from hsdsl.engine.simulate.stops import Diagnostics, show
+from hsdsl.engine.simulate.verdict.commutation import choices, keep_values, together, waiting_orders
+from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
+from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_the_end, remarked
+from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
+from hsdsl.engine.simulate.verdict.screen import Margins, screens_of
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
-from hsdsl.engine.simulate.verdict.strips import lost_in_strips
-from hsdsl.engine.simulate.verdict.waiting_orders import waiting_orders
 from hsdsl.mathematics.program import Program
 
-__all__ = ["RunView", "assess", "margins_of"]
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.compiled import CompiledRun
+
+__all__ = ["RunView", "assess", "assess_compiled"]
+
+MANY = 10_000  # steps
+
+
+def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
+    """Decide the same as `assess` of a compiled run.
+
+    Where the screen finds it clear by its shadow run, sentences on its margins are written when they are read.
+    """
+    compiled: Any = execution.compiled
+    columns, problem, screens = compiled.columns, under_way.plan.problem, screens_of(under_way.plan, True)
+    crowded = columns.rows > MANY and _crowded_steps(problem, execution)
+    if screens is None or columns.notes or crowded or not execution.stop.complete:
+        return assess(RunView(problem, execution), under_way.diagnostics)
+    screen = screens.take()
+    run = RunView(problem, execution, screen_made=screen)
+    if not screen.decide(columns) or (keep_values(problem.program) and any(waiting_orders(run))):
+        return assess(run, under_way.diagnostics)
+    shown = problem.program, compiled.made, screen.margins, screen.commuting
+    screens.leave(screen)
+    found = list(at_the_end(run))
+    return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=(found, problem.program))
+
+
+_LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: _margins_of(*verdict._shown), **WARNINGS}
 
 
 @np.errstate(all="ignore")  # what overflows is no number, and decides nothing
@@ -75,10 +86,10 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     diagnostics : Diagnostics
         What the loop itself noted.
     """
-    verdict, looked_at = _judged(run, diagnostics)
-    crowded = crowded_steps(run.problem, run.execution)
+    verdict, judged = _judged(run, diagnostics)
+    crowded = _crowded_steps(run.problem, run.execution)
     reasons = _once(verdict.reasons, crowded) if crowded else verdict.reasons
-    told = remarked(looked_at, diagnostics), run.problem.program
+    told = remarked(judged, diagnostics), run.problem.program
     return Verdict.deferred(WARNINGS, theorem=verdict.theorem, reasons=reasons, _told=told)
 
 
@@ -87,7 +98,7 @@ def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
     if run.stop.reason == "interrupted":  # nobody waits for what could not decide it
         if diagnostics.departures:
             return Verdict("left", _once(diagnostics.departures)), run
-        return Verdict("unknown", _once(diagnostics.undecided, [_incomplete(run.stop)])), run
+        return Verdict("unknown", _once(diagnostics.undecided, _unchecked(run))), run
     noted = diagnostics.departures or diagnostics.undecided
     if not (noted or run.against or run.followed) and has_shadow(run.problem, run.execution):
         by_shadow = replace(run, by_shadow=True)
@@ -99,43 +110,59 @@ def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
 
 
 def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
-    left, unknown = list(departures(run, diagnostics)), [*diagnostics.undecided, *waiting_orders(run)]
+    left, unknown = list(_departures(run, diagnostics)), [*diagnostics.undecided, *waiting_orders(run)]
     if left:
         return Verdict("left", _once(left, unknown))
     screen = run.screen
     entered_inside = run.by_shadow or not run.execution.enters_beyond
     if not unknown and screen is not None and not screen.undecided() and entered_inside:
         run.remarks = []
-        return Verdict("holds", margins_of(run.problem.program, run.execution.made, screen.margins, screen.commuting))
-    from hsdsl.engine.simulate.verdict.findings import findings_of  # of a run that the screen leaves undecided
-
-    found, margins = findings_of(run)
+        return Verdict("holds", _margins_of(run.problem.program, run.execution.made, screen.margins, screen.commuting))
+    found, margins = _findings_of(run)
     left += _named(found, "left")
     unknown += _named(found, "unknown")
-    unknown += _unchecked(run, run.stop)
+    unknown += _unchecked(run)
     if left:
         return Verdict("left", _once(left, unknown))
     return Verdict("unknown", _once(unknown, margins)) if unknown else Verdict("holds", _once(margins))
 
 
-def margins_of(program: Program, made: int, margins: Margins, commuting: Sequence[float]) -> tuple[str, ...]:
-    """The sentences on a run that a screen leaves nothing undecided of."""
-    crossed = summary(made, margins.crossed, margins.slowest, margins.least)
-    return _once(crossed, together(commuting), margins.nearest_miss(program.modes))
-
-
-def departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
+def _departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
     """How the run left what the theorem is about, as far as the run itself shows."""
     yield from diagnostics.departures
     yield from lost_in_strips(run)
     if not diagnostics.departures and run.stop.reason not in LEFT and run.screen is not None:
         return  # it neither slid nor made crowded transitions
-    if not run.followed:
-        yield from slidings(run)
+    if not run.followed:  # the theorem knows no motion on a surface that two modes press on
+        for modes, start, end in sliding_spans(run):
+            yield f"sliding between {' and '.join(modes)} from t = {show(start)} to t = {show(end)}"
     if not diagnostics.departures:
         yield from accumulations(run)
     if run.stop.reason in LEFT:
         yield run.stop.message
+
+
+def _findings_of(run: RunView) -> tuple[list[Finding], list[str]]:
+    """What is found of a run that the screen leaves undecided, and the margins of what holds."""
+    from hsdsl.engine.simulate.verdict.flows import flows, reliability
+    from hsdsl.engine.simulate.verdict.misses import misses
+    from hsdsl.engine.simulate.verdict.resets import (
+        entries,  # of few runs
+        landings,
+    )
+
+    found, margins = list(reliability(run)), list[str]()
+    for hypothesis in (crossings, choices, entries, landings, misses, flows):
+        findings, reasons = hypothesis(run)
+        found += findings
+        margins += reasons
+    return found, margins
+
+
+def _margins_of(program: Program, made: int, margins: Margins, commuting: Sequence[float]) -> tuple[str, ...]:
+    """The sentences on a run that a screen leaves nothing undecided of."""
+    crossed = summary(made, margins.crossed, margins.slowest, margins.least)
+    return _once(crossed, together(commuting), margins.nearest_miss(program.modes))
 
 
 def _once(*sentences: Sequence[str]) -> tuple[str, ...]:
@@ -149,14 +176,31 @@ def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
         yield from dict.fromkeys(f.sentence for f in of if f.kind == kind)
 
 
-def _incomplete(stop: Stop) -> str:
-    return f"the run did not get to its end: {stop.message}"
+def _unchecked(run: RunView) -> list[str]:
+    """Why hypotheses could not be checked for all of a run."""
+    if run.stop.reason in INCOMPLETE:
+        return [f"the run did not get to its end: {run.stop.message}"]
+    if run.errors is not None:
+        return []
+    if run.problem.settings.tolerance is not None:
+        return ["the finer run was interrupted, so no margin can be held against the error"]
+    return ["a fixed step does not say how wrong it is, so no margin can be held against the error (a tolerance does)"]
 
 
-def _unchecked(run: RunView, stop: Stop) -> Iterator[str]:
-    if stop.reason in INCOMPLETE:
-        yield _incomplete(stop)
-    elif run.errors is None and run.problem.settings.tolerance is not None:
-        yield "the finer run was interrupted, so no margin can be held against the error"
-    elif run.errors is None:
-        yield "a fixed step does not say how wrong it is, so no margin can be held against the error (a tolerance does)"
+def _crowded_steps(problem: Problem, execution: Execution) -> list[str]:
+    """The sentence on the steps that are closest to each other, where thousands are within a millionth of the run."""
+    times = execution.times
+    if problem.settings.tolerance is None or len(times) <= MANY:
+        return []
+    rows = np.flatnonzero(times[1:] > times[:-1])
+    late = times[rows[MANY:] + 1] - times[rows[:-MANY]] if len(rows) > MANY else np.array([np.inf])
+    first = int(np.argmin(late))
+    if not late[first] < SHORT * problem.settings.until:
+        return []
+    start, end = int(rows[first]), int(rows[first + MANY])
+    arc = execution.arcs[int(np.searchsorted(execution.arc_table.first, start, "right")) - 1]
+    values = execution.values[start : min(end, arc.last) + 1, : len(arc.states)].astype(float)
+    sizes = np.abs(values).max(axis=0, initial=0.0)
+    moved = np.abs(np.diff(values, axis=0)).sum(axis=0) / np.where(sizes > 0, sizes, 1.0)
+    most = f", where {arc.states[int(np.argmax(moved))]} of {arc.mode} moves most" if len(arc.states) else ""
+    return [f"{MANY} steps from t = {show(times[start])} on are within a millionth of the run{most}"]

@@ -1,25 +1,27 @@
-"""Do transitions that are reached together commute?
+"""Does the order of simultaneous transitions matter, or of executions that wait?
 
-Each of them is taken first in turn, then all that fire at the same instant; where all orders lead to the same point
-the choice does not matter.
+Do simultaneous transitions commute? That question is defined in `hsdsl.mathematics.decisions.commutation`.
+
+Executions that wait are made in the order of times that an error may change. A delay that is the same for all keeps the
+order in which they began, whatever the error is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
 from hsdsl.engine.simulate.transitions import Tails
-from hsdsl.engine.simulate.verdict.finding import Finding
-from hsdsl.engine.simulate.verdict.place import Place
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
+from hsdsl.mathematics.program import ModeProgram, Program, Queue
 
 SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
+TIES = 4  # how much delays that are the same may differ by
 
 Landed = tuple[str, State]
 
@@ -34,22 +36,17 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
         if not made.alternatives:
             continue
         place, k = run.before(made)
+        error = tuple(abs(x) for x in place.x) if run.errors is None else run.error_before(made)
         rivals = {name: run.edge_at(place, name) for name in made.alternatives}
-        rivals = {name: other for name, other in rivals.items() if not outranked(run, place, k, other, made)}
+        rivals = {name: other for name, other in rivals.items() if not place.outranks(k, other, error)}
         if not rivals:
             continue
         if commute(run, place, [k, *rivals.values()], run.tails_before(made)):
             commuting.append(made.time)
             continue
         others = " or ".join(rivals)
-        found.append(
-            Finding(
-                "choice",
-                "left",
-                f"at t = {show(made.time)} the choice of {made.edge} rather than {others} matters: "
-                "they lead to different points",
-            )
-        )
+        choice = f"at t = {show(made.time)} the choice of {made.edge} rather than {others} matters"
+        found.append(Finding("choice", "left", f"{choice}: they lead to different points"))
     return found, together(commuting)
 
 
@@ -62,12 +59,6 @@ def together(commuting: Sequence[Number]) -> list[str]:
     return [f"surfaces are reached together at t = {listed}; every order leads to the same point"]
 
 
-def outranked(run: RunView, place: Place, k: int, other: int, made: Transition) -> bool:
-    """Whether an edge has the surface of the one that was taken, and a lower priority: no error changes their order."""
-    error = tuple(abs(x) for x in place.x) if run.errors is None else run.safe_error(place, run.row_before(made))
-    return place.outranks(k, other, error)
-
-
 def commute(run: RunView, place: Place, tied: Sequence[int], tails: Tails, since: Number = 0) -> bool:
     """Whether each of the tied edges of a place, taken first, leads to the same point.
 
@@ -75,13 +66,13 @@ def commute(run: RunView, place: Place, tied: Sequence[int], tails: Tails, since
     """
     since = max(since, 2 * run.tie(place.t))  # what is tied may be that far apart, and off a surface by the rest
     try:
-        landed = [settle(run, place, k, since, tails.copy()) for k in tied]
+        landed = [land_after(run, place, k, since, tails.copy()) for k in tied]
     except DOMAIN_ERRORS:
         return False
-    return None not in landed and all(_same(run, landed[0], other) for other in landed[1:])
+    return None not in landed and all(_same_point(run, landed[0], other) for other in landed[1:])
 
 
-def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
+def _same_point(run: RunView, one: Landed | None, other: Landed | None) -> bool:
     if one is None or other is None or one[0] != other[0] or len(one[1]) != len(other[1]):
         return False
     names = run.problem.program.modes[run.index(one[0])].states
@@ -90,7 +81,7 @@ def _same(run: RunView, one: Landed | None, other: Landed | None) -> bool:
     return all(abs(a - b) <= SAME * max(abs(a), abs(b), size) for a, b, size in pairs)
 
 
-def settle(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> Landed | None:
+def land_after(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> Landed | None:
     """Take edge k, then what fires at the same instant; None where that has no end."""
     for _ in range(LONGEST):
         target, x = place.mode.edges[k].target, place.kernel.resets[k](place.t, *place.x)
@@ -98,17 +89,48 @@ def settle(run: RunView, place: Place, k: int, since: Number, tails: Tails) -> L
         place = run.place(target, place.t, x)
         if place.mode.final:
             return place.mode.name, place.x
-        following = _next(place, since)
+        following = _goes_at_once(place, since)
         if following is None:
             return place.mode.name, place.x
         k = following
     return None
 
 
-def _next(place: Place, since: Number) -> int | None:
+def _goes_at_once(place: Place, since: Number) -> int | None:
     """The edge that goes at once from a state."""
     surfaces, edges = place.surfaces, place.mode.edges
     beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), Arrival(since))
     ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]
     ready = ready or surfaces.standing(place.t, place.x, since)
     return min(ready, key=lambda k: (-edges[k].priority, k), default=None)
+
+
+def keep_values(program: Program) -> bool:
+    """Whether executions that wait have values of their own."""
+    return any(len(queue.values) > 1 for mode in program.modes for queue in mode.queues)
+
+
+def waiting_orders(run: RunView) -> Iterator[str]:
+    """Say which executions of an event, of different values, may have another order."""
+    for mode in run.problem.program.modes:
+        for queue in mode.queues:
+            if len(queue.values) > 1:
+                yield from _of_queue(run, mode, queue)
+
+
+def _of_queue(run: RunView, mode: ModeProgram, queue: Queue) -> Iterator[str]:
+    values = [mode.states[i] for i in queue.values[1:]]
+    changing = {edge.name: edge.changes for edge in mode.edges if queue.waiting in edge.changes}
+    begins = {name for name, changes in changing.items() if queue.values[0] in changes}
+    own = [made for made in run.transitions if made.source == mode.name and made.edge in changing]
+    began = [made.time for made in own if made.edge in begins]
+    ends = [made for made in own if made.edge not in begins]
+    delays = [end.time - begin for end, begin in zip(ends, began, strict=False)]
+    for k, (one, other) in enumerate(pairwise(ends)):
+        tie, apart = run.tie(other.time), other.time - one.time
+        if not apart > tie or all(one.before[name] == other.before[name] for name in values):
+            continue
+        alike = k + 1 < len(delays) and abs(delays[k] - delays[k + 1]) <= TIES * tie
+        if not alike and run.errors is not None and apart <= run.late(other.time):
+            yield f"the order of executions of {one.edge} that wait until t = {show(one.time)} is within the error"
+            return

@@ -1,19 +1,24 @@
-"""Is each transition transversal, and could an error have made its condition another?
+"""Are there finitely many transitions, each made by the flow across its surface, whatever the error is?
 
 Where a surface rises at the rate a and bends by b, an error that moves it by d leaves it crossed while d is below
 a**2 / (2 abs(b)): that depth is the margin. Where it turns back at a kink of an input, its height there is one as well.
+
+The relaxed scheme goes on behind a Zeno point and creeps along a guard where the execution rests or slides. Either way
+many transitions follow each other with hardly any flow between them. Where a transition waits in a strip, time goes on:
+another one that was reached together with it and whose `if` holds is behind its surface afterwards, and so is one that
+the reset makes due at once. Such a surface moves past the state and is never crossed by it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import accumulate, pairwise
+
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Arc, Transition
-from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.verdict.agreement import SAFE
-from hsdsl.engine.simulate.verdict.finding import Finding, times
-from hsdsl.engine.simulate.verdict.near_surface import has_condition
-from hsdsl.engine.simulate.verdict.place import Place
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.stops import FREE, show
+from hsdsl.engine.simulate.verdict.errors import SAFE, times
+from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
 from hsdsl.engine.simulate.verdict.screen import CROSSING_UNDECIDED
 
 BEYOND = 4  # errors behind a surface, so that no error takes a state back to it
@@ -36,9 +41,8 @@ def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
             margin = _margin(run, place, k, ends.get(transition.index), transition)
             found += _findings(run, place, k, rate, margin, transition)
         except DOMAIN_ERRORS:
-            found.append(
-                Finding("no value", "unknown", f"{transition.edge} has no rate at t = {show(transition.time)}")
-            )
+            where = f"at t = {show(transition.time)}"
+            found.append(Finding("no value", "unknown", f"{transition.edge} has no rate {where}"))
             continue
         if margin is not None:
             least = margin if least is None else min(least, margin)
@@ -77,9 +81,7 @@ def _height(run: RunView, place: Place, k: int, enough: Number) -> Number:
         height = height + rate * late
         if height >= enough:
             break
-        slope = place.kernel.flow(place.t, *place.x)
-        x = tuple(a + late * f for a, f in zip(place.x, slope, strict=True))
-        place = run.place(place.mode.name, segment.end, x)
+        place = _ahead(run, place, late, segment.end)
         rate = place.rate(k)
         if not rate > 0:
             return height
@@ -89,28 +91,19 @@ def _height(run: RunView, place: Place, k: int, enough: Number) -> Number:
 def _findings(
     run: RunView, place: Place, k: int, rate: Number, margin: Number | None, made: Transition
 ) -> list[Finding]:
-    found: list[Finding] = []
     where = f"{made.edge} at t = {show(made.time)}"
     if not any(place.kernel.gradients[k](place.t, *place.x)):
         return [Finding("flat", "unknown", f"the surface of {where} has no slope there")]
     if not rate > place.rate_roundoff(k):
         return [Finding("tangency", "left", f"the flow is tangent to the surface of {where}")]
+    found: list[Finding] = []
     if margin is not None and margin < SAFE:
-        found.append(
-            Finding(
-                "tangency",
-                "unknown",
-                f"the crossing of {where}, at a rate of {float(rate):.3g}, would be undone by {times(margin)} "
-                "the error",
-            )
-        )
-    if run.errors is None:
-        return found
+        undone = f"at a rate of {float(rate):.3g}, would be undone by {times(margin)} the error"
+        found.append(Finding("tangency", "unknown", f"the crossing of {where}, {undone}"))
     row = run.row_before(made)
-    holds = {True}
-    if has_condition(place, k):
-        holds = place.conditions(k, run.safe_error(place, row), run.safe_time_error(place, k, row))
-    if holds != {True} and not _turns_true(run, place, k, row):
+    if run.errors is None or not place.has_condition(k):
+        return found
+    if run.conditions(place, k, row) != {True} and not _turns_true(run, place, k, row):
         found.append(Finding("condition", "unknown", f"whether the condition of {where} holds is within the error"))
     return found
 
@@ -129,8 +122,68 @@ def _turns_true(run: RunView, place: Place, k: int, row: int) -> bool:
         if not rate.low > 0:
             return False
         ahead = max(ahead, BEYOND * shift / float(rate.low))
+    return _ahead(run, place, ahead, place.t + ahead).conditions(k, error, late) == {True}
+
+
+def _ahead(run: RunView, place: Place, late: Number, t: Number) -> Place:
+    """The place so much later, at t, along a straight line."""
     flow = place.kernel.flow(place.t, *place.x)
-    behind = run.place(
-        place.mode.name, place.t + ahead, tuple(x + ahead * f for x, f in zip(place.x, flow, strict=True))
-    )
-    return behind.conditions(k, error, late) == {True}
+    return run.place(place.mode.name, t, tuple(x + late * f for x, f in zip(place.x, flow, strict=True)))
+
+
+def sliding_spans(run: RunView) -> Iterator[tuple[tuple[str, ...], Number, Number]]:
+    """Give the modes between which the run slid, and from when to when."""
+    modes = {mode.name: mode.slides for mode in run.problem.program.modes if mode.slides}
+    spans: list[tuple[str, Number, Number]] = []
+    for arc in run.flows if modes else ():
+        if arc.mode in modes:
+            start, end = run.times[arc.first], run.times[arc.last]
+            if spans and spans[-1][::2] == (arc.mode, start):  # a jump or a kink of an input ended the arc before
+                start = spans.pop()[1]
+            spans.append((arc.mode, start, end))
+    yield from ((modes[mode], start, end) for mode, start, end in spans)
+
+
+def accumulations(run: RunView) -> Iterator[str]:
+    """Say where transitions first crowd together, and where they are last seen to."""
+    relaxation, made = run.problem.settings.relaxation, run.transitions
+    if len(made) <= FREE:
+        return
+    flights = [b.time - (a.resumed if a.resumed is not None else a.time) for a, b in pairwise(made)]
+    flown = [run.arithmetic.zero, *accumulate(flights)]
+    crowded = [k for k in range(FREE, len(made)) if flown[k] - flown[k - FREE] <= relaxation]
+    if crowded:
+        first = made[crowded[0] - FREE]
+        yield (
+            f"more than {FREE} transitions within the relaxation of flow from t = {show(first.time)} on "
+            f"({first.edge}): a Zeno point, rest or sliding, which the theorem is not about"
+        )
+
+
+def lost_in_strips(run: RunView) -> Iterator[str]:
+    """Say which transition was first lost while another one waited in a strip."""
+    conditional = {mode.name for mode in run.problem.program.modes if any(edge.conditional for edge in mode.edges)}
+    for made in run.transitions if conditional else ():
+        if made.resumed is not None and made.resumed > made.time and made.target in conditional:
+            for name in _lost(run, made):
+                lost = f"{name} was lost at t = {show(made.time)}: its surface has an `if` and moved on"
+                yield f"{lost} while {made.edge} waited in a strip"
+                return
+
+
+def _lost(run: RunView, made: Transition) -> list[str]:
+    """Edges whose surfaces moved past the state in the strip of a transition, with their `if` true behind it."""
+    if made.after is None:
+        return []
+    x = tuple(made.after.values())
+    before, place = run.place(made.target, made.time, x), run.place(made.target, made.resumed, x)
+    found: list[str] = []
+    try:
+        then, now = before.kernel.surfaces(before.t, *x), place.kernel.surfaces(place.t, *x)
+        for k, edge in enumerate(place.mode.edges):
+            passed = edge.conditional and now[k] > place.roundoff_bound(k) >= then[k]
+            if passed and place.kernel.conditions[k](place.t, *x)[0]:
+                found.append(edge.name)
+    except DOMAIN_ERRORS:
+        pass
+    return found

@@ -8,21 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.base.numbers.bernstein import Array, around_middle, from_powers, halving
+from hsdsl.base.numbers.bernstein import Array, from_powers, halving
 from hsdsl.base.numbers.enclosures import Range, as_range
-from hsdsl.engine.execution import Execution
 from hsdsl.engine.kernel import ModeKernel
-from hsdsl.engine.simulate.verdict.expansions import Expansion, line, polynomial
-from hsdsl.engine.simulate.verdict.recorded_run import RecordedRun
-from hsdsl.engine.simulate.verdict.run_view import RunView
+from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, RunView
 
-MOST_PARTS = 1 << 15  # enclosed together
 COLUMNS = ("row", "start", "width", "time", "length", "bernstein", "error")  # one entry for each part
 CUTTING = 2.0**-48  # of the largest coefficient: what cutting and changing the basis may add
 
@@ -96,16 +91,6 @@ class Parts:
         """States and all that are no further away than the error."""
         return [Range(x.low - e, x.high + e) for x, e in zip(states, self.error.T, strict=True)]
 
-    def expanded(self) -> tuple[list[Expansion], list[Expansion]]:
-        """Time and states along each part, and the derivatives of these."""
-        degree = self.bernstein.shape[2] - 1
-        powers: Array = self.bernstein @ around_middle(degree)
-        half = self.width * self.length / 2
-        slopes = powers[..., 1:] * np.arange(1.0, degree + 1) / half[:, None, None]
-        times = line(self.time + (self.start + self.width / 2) * self.length, half)
-        states = [polynomial(powers[:, i], error) for i, error in enumerate(self.error.T)]
-        return [times, *states], [polynomial(slope, np.zeros(len(self))) for slope in slopes.swapaxes(0, 1)]
-
     @property
     def bound_data(self) -> list[Range]:
         """The data as a kernel over intervals takes them."""
@@ -125,7 +110,7 @@ def steps_of(run: RunView, places: int | None = None, marked: str = "") -> Itera
     if marks is not None and not marks.any():
         return
     times = np.asarray(run.execution.times, dtype=float)
-    for mode, states, rows in rows_by_mode(run):
+    for mode, states, rows in run.rows_by_mode():
         rows = rows[times[rows] <= run.reliable_until]
         rows = rows if marks is None else rows[marks[rows] != 0]
         rows = rows[:: max(1, len(rows) // places)] if places else rows
@@ -133,47 +118,17 @@ def steps_of(run: RunView, places: int | None = None, marked: str = "") -> Itera
             yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
 
 
-def rows_by_mode(run: RecordedRun) -> Iterator[tuple[int, tuple[str, ...], NDArray[np.int64]]]:
-    """Give modes and states of all arcs of flow, with the rows at which their steps begin."""
-    times = np.asarray(run.execution.times, dtype=float)
-    ordered = sorted(run.flows, key=lambda arc: (run.index(arc.mode), arc.states, arc.first))
-    for (mode, states), arcs in groupby(ordered, key=lambda arc: (run.index(arc.mode), arc.states)):
-        if states == run.problem.program.modes[mode].states:  # a final mode flows as the one before it
-            rows = np.concatenate([np.arange(arc.first, arc.last) for arc in arcs])
-            yield mode, states, rows[times[rows + 1] > times[rows]]
-
-
 def _steps(run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int64]) -> Parts:
-    execution, n, errors = run.execution, len(states), run.errors
-    times = np.asarray(execution.times, dtype=float)
-    values, powers = pieces_at(execution, rows, n)
+    n, errors, times = len(states), run.errors, np.asarray(run.execution.times, dtype=float)
+    values, powers = run.pieces_at(rows, n)
     whole = np.concatenate([values[:, None, :], powers], axis=1).transpose(0, 2, 1)
     error = np.zeros((len(rows), n))
     if errors is not None:
         error = errors.by_row[rows + 1][:, [errors.columns[name] for name in states]]
     one = np.ones(len(rows))
-    data = data_at(run, times[rows])
+    data = run.data_at(times[rows])
     length = times[rows + 1] - times[rows]
     return Parts(mode, rows, 0 * one, one, times[rows], length, whole @ from_powers(whole.shape[2] - 1), error, data)
-
-
-def pieces_at(execution: Execution, rows: NDArray[np.int64], n: int) -> tuple[Array, Array]:
-    """The states at rows, and the coefficients of the pieces that leave them, straight ones where there are none."""
-    values = np.asarray(execution.values[rows, :n], dtype=float)
-    powers = np.asarray(execution.coefficients[rows, :, :n], dtype=float)
-    if powers.shape[1] == 0:
-        powers = (np.asarray(execution.values[rows + 1, :n], dtype=float) - values)[:, None, :]
-    return values, np.nan_to_num(powers)
-
-
-def data_at(run: RecordedRun, times: Array) -> Array:
-    """Parameters and input segments at times, one row where they are the same for all."""
-    segments = run.problem.timeline.segments
-    if len(segments) == 1:
-        return np.array([segments[0].data], dtype=float)
-    starts = np.array([float(s.start) for s in segments])
-    which = np.maximum(np.searchsorted(starts, times, "right") - 1, 0)
-    return np.array([s.data for s in segments], dtype=float)[which]
 
 
 def joined(parts: Sequence[Parts]) -> Parts:

@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 
-from hsdsl.interface.chart.result import Refused, Result
-from hsdsl.interface.chart.scene import Scene
+from hsdsl.interface.chart.scene import Refused, Result, Scene
 
 PEERS = {
     "scipy": "scipy_ivp",

@@ -12,8 +12,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from hsdsl.interface.chart.result import Array, Refused, Result
-from hsdsl.interface.chart.scene import Scene
+from hsdsl.interface.chart.scene import Array, Refused, Result, Scene
 from hsdsl.interface.chart.translation import PlainModel, as_function, translate
 
 FUNCTIONS = {

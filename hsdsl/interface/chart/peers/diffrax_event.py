@@ -12,10 +12,8 @@ import jax.numpy as jnp
 import numpy as np
 import optimistix as optx
 
-from hsdsl.interface.chart.by_arcs import ToolArc, by_arcs
-from hsdsl.interface.chart.result import Array, Refused, Result
-from hsdsl.interface.chart.scene import Scene
-from hsdsl.interface.chart.translation import PlainMode, as_function, translate
+from hsdsl.interface.chart.scene import Array, Refused, Result, Scene
+from hsdsl.interface.chart.translation import PlainMode, ToolArc, as_function, by_arcs, translate
 
 MOST_STEPS = 1 << 14
 FUNCTIONS = {

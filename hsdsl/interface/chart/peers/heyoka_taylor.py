@@ -13,10 +13,8 @@ from typing import Any, NamedTuple
 import heyoka as hy
 import numpy as np
 
-from hsdsl.interface.chart.by_arcs import ToolArc, by_arcs
-from hsdsl.interface.chart.result import Array, NotFinite, Result
-from hsdsl.interface.chart.scene import Scene
-from hsdsl.interface.chart.translation import PlainEdge, PlainMode, as_function, translate
+from hsdsl.interface.chart.scene import Array, NotFinite, Result, Scene
+from hsdsl.interface.chart.translation import PlainEdge, PlainMode, ToolArc, as_function, by_arcs, translate
 
 NOTHING = np.empty((0, 0))
 

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from hsdsl.interface.chart.by_arcs import ToolArc, by_arcs
-from hsdsl.interface.chart.result import Array, Refused, Result
-from hsdsl.interface.chart.scene import Scene
-from hsdsl.interface.chart.translation import as_function, translate
+from hsdsl.interface.chart.scene import Array, Refused, Result, Scene
+from hsdsl.interface.chart.translation import ToolArc, as_function, by_arcs, translate
 
 
 def prepare(scene: Scene) -> Callable[[float], Result]:

@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 import sksundae as sun
 
-from hsdsl.interface.chart.by_arcs import ToolArc, by_arcs
-from hsdsl.interface.chart.result import Array, Refused, Result
-from hsdsl.interface.chart.scene import Scene
-from hsdsl.interface.chart.translation import PlainModel, as_function, translate
+from hsdsl.interface.chart.scene import Array, Refused, Result, Scene
+from hsdsl.interface.chart.translation import PlainModel, ToolArc, as_function, by_arcs, translate
 
 LEAST = 1e-14
 EVENT = 2

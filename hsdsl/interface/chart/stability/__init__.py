@@ -1,33 +1,35 @@
 """Maps of outcomes over a plane of settings and numbers: where methods converge, and how they fail where they do not.
 
-=============  =====================================================================
-`axes`         what varies, read from text
-`cells`        the outcome of one run, against a reference at the same numbers
-`limits`       known limits of linear stability
-`table`        a map as CSV, as plain values and as text
-`picture`      a map as a picture
-=============  =====================================================================
+Here is the map: its two axes, read from text, its runs, and itself as CSV, as plain values and as text. `cells` has the
+outcome of one run and known limits of linear stability; `picture` draws a map.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
 from typing import Any
 
+import numpy as np
+
+from hsdsl.analysis.report.words import condensed, form
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
-from hsdsl.base.names import did_you_mean
+from hsdsl.base.names import did_you_mean, shown
+from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.processes import Lost, in_processes
 from hsdsl.engine.integrators import METHODS
+from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.simulate import SCHEMES
 from hsdsl.interface.chart.peers import PEERS
-from hsdsl.interface.chart.result import Tool
-from hsdsl.interface.chart.stability.axes import SIZES, Axis, read_axes
-from hsdsl.interface.chart.stability.cells import STUCK, WORDS, Bench, Cell
-from hsdsl.interface.chart.stability.limits import eigenvalues, largest_step
+from hsdsl.interface.chart.rows import csv_text
+from hsdsl.interface.chart.scene import Tool
+from hsdsl.interface.chart.stability.cells import REFUSED, STUCK, UNKNOWN, WORDS, Bench, Cell, eigenvalues, largest_step
 from hsdsl.interface.model import Model
+from hsdsl.interface.model.differentiate import start_by
 
 __all__ = ["WORDS", "Axis", "Cell", "Panel", "StabilityMap", "stability_map"]
 Progress = Callable[[int, int], None]
@@ -76,7 +78,7 @@ def stability_map(
     Parameters
     ----------
     map : str
-        Two axes as ``"h=1e-4:1e-1:20,relaxation"``, see :func:`hsdsl.interface.chart.stability.axes.read_axes`.
+        Two axes as ``"h=1e-4:1e-1:20,relaxation"``, see :func:`hsdsl.interface.chart.stability.read_axes`.
     schemes, methods : str or sequence of str
         Ours, a panel for each pair; left out, ``relaxed`` on maps of relaxation, the file's scheme on others, and rk4
         on maps of h, auto on others.
@@ -180,3 +182,179 @@ def _limit(model: Model, base: Mapping[str, Any], tool: Tool, x: Axis, y: Axis) 
         values = eigenvalues(model, {group: given[group] for group in ("parameters", "initial")})
         found.append(None if values is None else largest_step(tool.method, values, x.values[0] / 10, x.values[-1] * 10))
     return tuple(found) if any(found) else None
+
+
+SIZES = {"h": "step", "step": "step", "tolerance": "tolerance", "relaxation": "relaxation"}
+COUNT, MOST, MOST_CELLS = 12, 400, 40_000
+DEFAULTS = {"step": (1e-5, 1e-1), "tolerance": (1e-12, 1e-2), "relaxation": (1e-10, 1e-2)}
+IN_TIME = ("step", "relaxation")  # their default ranges are shares of a run
+EXAMPLE = "for example --map h=1e-4:1e-1:20,relaxation=1e-8:1e-2:20"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """What varies: ``kind`` is a setting (step, tolerance, relaxation), ``parameter`` or ``initial``."""
+
+    name: str
+    kind: str
+    values: tuple[float, ...]
+    logarithmic: bool
+    unit: str = ""
+
+    @property
+    def label(self) -> str:
+        """Its name with its unit."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def onto(self, arguments: Mapping[str, Any], value: float) -> dict[str, Any]:
+        """The arguments of a run with a value of this axis among them."""
+        if self.kind in DEFAULTS:
+            return {**arguments, self.kind: value}
+        group = "parameters" if self.kind == "parameter" else "initial"
+        return {**arguments, group: {**arguments.get(group, {}), self.name.removeprefix("initial."): value}}
+
+
+def read_axes(model: Model, text: str, until: float, base: Mapping[str, Any]) -> tuple[Axis, Axis]:
+    """Read ``NAME[=FROM:TO[:COUNT[:lin]]],NAME[=...]``; values are spaced logarithmically, or evenly with ``lin``.
+
+    ``base`` has the parameters and initial values of all runs, about which a number varies that has no range.
+
+    Raises UsageError: not two different names, a name that cannot vary, or a range that is empty or no range.
+    """
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    if len(parts) != 2:
+        raise UsageError(f"--map: expected two names with a comma between them, got '{shown(text)}'", EXAMPLE)
+    x, y = (_axis(model, part, until, base) for part in parts)
+    setting = x.kind in DEFAULTS and x.kind == y.kind
+    if x.name == y.name:
+        raise UsageError(f"--map: expected two names, got {x.name} twice", EXAMPLE)
+    if setting or {x.kind, y.kind} == {"step", "tolerance"}:
+        raise UsageError(f"--map: {x.name} and {y.name} exclude each other", EXAMPLE)
+    if len(x.values) * len(y.values) > MOST_CELLS:
+        raise UsageError(f"--map: expected at most {MOST_CELLS:,} runs, got {len(x.values) * len(y.values):,}")
+    units = model.program.units
+    names = ("t" if axis.kind == "step" else axis.name.removeprefix("initial.") for axis in (x, y))
+    return replace(x, unit=units.get(next(names), "")), replace(y, unit=units.get(next(names), ""))
+
+
+def _axis(model: Model, part: str, until: float, base: Mapping[str, Any]) -> Axis:
+    name, equals, range_ = (piece.strip() for piece in part.partition("="))
+    kind = SIZES.get(name) or _kind(model, name)
+    if equals:
+        values, logarithmic = _range(name, range_)
+        if kind in DEFAULTS and values[0] <= 0:
+            raise UsageError(f"--map {name}: expected positive ends, got '{shown(range_)}'", EXAMPLE)
+        return Axis(name, kind, values, logarithmic)
+    if kind in DEFAULTS:
+        low, high = (end * (until if kind in IN_TIME else 1.0) for end in DEFAULTS[kind])
+        return Axis(name, kind, _spaced(low, high, COUNT), True)
+    values = with_parameters(model.pipeline.values(FLOAT64), base.get("parameters", {}))
+    value = start_by([name], base, values)[1][name]
+    if not value > 0:
+        raise UsageError(f"--map {name}: its value is {value:g}, so give a range", f"for example {name}=-1:1:20:lin")
+    return Axis(name, kind, _spaced(value / 10, value * 10, COUNT), True)
+
+
+def _kind(model: Model, name: str) -> str:
+    """Which group a name belongs to.
+
+    Raises UsageError: the model does not let it vary.
+    """
+    parameters, states = list(model.program.parameters), list(model.program.all_states)
+    if name in parameters:
+        return "parameter"
+    group, dot, state = name.partition(".")
+    if dot and group == "initial" and state in states:
+        return "initial"
+    if name in model.columns or name == "t":
+        kind = "time" if name == "t" else "a state" if name in states else "an output"
+        hint = f"map initial.{name}" if name in states else None
+        raise UsageError(f"--map {name}: it is {kind}, which a run computes, so it cannot be varied", hint)
+    known = [*SIZES, *parameters, *(f"initial.{state}" for state in states)]
+    raise UsageError(
+        f"--map: there is no setting, parameter or initial value '{shown(name)}'", did_you_mean(name, known)
+    )
+
+
+def _range(name: str, text: str) -> tuple[tuple[float, ...], bool]:
+    pieces = text.split(":")
+    even = pieces[-1] == "lin"
+    pieces = pieces[:-1] if even else pieces
+    try:
+        low, high = float(pieces[0]), float(pieces[1])
+        count = int(pieces[2]) if len(pieces) > 2 else COUNT
+    except (ValueError, IndexError):
+        count = low = high = 0
+    if len(pieces) not in (2, 3) or not (isfinite(low) and isfinite(high)) or count == 0 == low == high:
+        raise UsageError(f"--map {name}: expected FROM:TO:COUNT, got '{shown(text)}'", EXAMPLE)
+    if not (low < high and 2 <= count <= MOST):
+        raise UsageError(f"--map {name}: expected FROM below TO and 2 to {MOST} values, got '{shown(text)}'", EXAMPLE)
+    if even:
+        return tuple(np.linspace(low, high, count).tolist()), False
+    if low <= 0:
+        raise UsageError(
+            f"--map {name}: expected positive ends, got '{shown(text)}'", f"evenly: {name}={shown(text)}:lin"
+        )
+    return _spaced(low, high, count), True
+
+
+def _spaced(low: float, high: float, count: int) -> tuple[float, ...]:
+    return tuple(np.geomspace(low, high, count).tolist())
+
+
+COLUMNS = ("tool", "scheme", "method", "outcome", "rho", "error", "transitions", "why")
+
+
+def records(found: StabilityMap) -> Iterator[dict[str, Any]]:
+    """A mapping for each run."""
+    for panel in found.panels:
+        for j, row in enumerate(panel.cells):
+            for i, cell in enumerate(row):
+                place = {found.x.name: found.x.values[i], found.y.name: found.y.values[j]}
+                yield place | _plain(panel, cell)
+
+
+def _plain(panel: Panel, cell: Cell) -> dict[str, Any]:
+    numbers = {name: value if isfinite(value) else None for name, value in (("rho", cell.rho), ("error", cell.error))}
+    tool = {"tool": panel.tool.name or "hsdsl", "scheme": panel.tool.scheme, "method": panel.tool.method}
+    return tool | {"outcome": cell.word} | numbers | {"transitions": cell.transitions, "why": cell.why}
+
+
+def as_csv(found: StabilityMap) -> str:
+    """The map as CSV, a line for each run."""
+    return csv_text((found.x.name, found.y.name, *COLUMNS), records(found))
+
+
+def as_plain(found: StabilityMap) -> dict[str, Any]:
+    """What ``--json`` prints."""
+    limits = {panel.tool.label: panel.limit for panel in found.panels if panel.limit}
+    axes = {"x": found.x.name, "y": found.y.name}
+    return {"model": found.name, **axes, "limits": limits, "runs": list(records(found))}
+
+
+def as_text(found: StabilityMap) -> str:
+    """How many runs of each tool came to what, and why there was nothing to run or to compare with."""
+    width = max(len(panel.tool.label) for panel in found.panels)
+    lines: list[str] = []
+    for panel in found.panels:
+        count = Counter(cell.word for row in panel.cells for cell in row)
+        words = ", ".join(f"{count[word]} {word}" for word in WORDS if count[word])
+        limits = [limit for limit in panel.limit or () if limit]
+        known = f"; linearly stable up to h = {min(limits):.3g}" if limits else ""
+        known += f" to {max(limits):.3g}" if limits and max(limits) > 1.001 * min(limits) else ""
+        lines.append(f"{panel.tool.label:{width}}  {words}{known}")
+    return "\n".join([*lines, *_reasons(found)])
+
+
+def _reasons(found: StabilityMap) -> Iterator[str]:
+    """Why runs have no reference or are refused: each reason once, with its first place."""
+    groups: dict[tuple[str, str], dict[tuple[float, float], str]] = {}
+    for panel in found.panels:
+        for y, row in zip(found.y.values, panel.cells, strict=True):
+            for x, cell in zip(found.x.values, row, strict=True):
+                if cell.word in (UNKNOWN, REFUSED):
+                    groups.setdefault((cell.word, form(cell.why)), {})[x, y] = cell.why
+    for (word, _), places in groups.items():
+        x, y = next(iter(places))
+        first = f"first at {found.x.name} = {x:.4g}, {found.y.name} = {y:.4g}"
+        yield f"{word}, {first}: {condensed([*places.values()])[0]}"

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hsdsl.analysis.plot.analyses import edges
 from hsdsl.analysis.plot.style import to_file
-from hsdsl.analysis.plot.sweep import edges
 from hsdsl.interface.chart.stability import Axis, Panel, StabilityMap
 from hsdsl.interface.chart.stability.cells import CONVERGED, UNKNOWN, Cell
 

@@ -1,13 +1,7 @@
 """Models of SBML, Levels 2 and 3, as models of this language; what the language has no words for is refused.
 
-=============  =====================================================================
-`document`     the lists of a file, with the defaults of their level
-`mathml`       its formulas as trees
-`formulas`     formulas as text of the language
-`facts`        what is a state, a parameter, or given by a rule
-`convert`      the document of a model
-`writing`      its text, and units
-=============  =====================================================================
+`document` has the lists of a file with the defaults of their level, and its formulas as trees; `formulas` formulas as
+text of the language, and what each quantity is; `convert` the document of a model and its text.
 """
 
 from __future__ import annotations
@@ -15,15 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from hsdsl.base.errors import ModelError, UsageError
-from hsdsl.base.names import shown
-from hsdsl.interface.imports.sbml.convert import Converter
-from hsdsl.interface.imports.sbml.document import is_sbml, model_of
-from hsdsl.interface.imports.sbml.mathml import NotExpressible
-from hsdsl.interface.imports.sbml.writing import written
-from hsdsl.language.expression.plain import value
-from hsdsl.language.expression.stack import deep_stack
-from hsdsl.language.expression.syntax import ExpressionError
+from hsdsl.base.errors import ModelError
+from hsdsl.interface.imports import end_of_run
+from hsdsl.interface.imports.sbml.convert import Converter, written
+from hsdsl.interface.imports.sbml.document import NotExpressible, is_sbml, model_of
+from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.source.xml import Element, read_xml
 
 __all__ = ["DEEPEST", "FEATURE", "converted", "imported", "is_sbml"]
@@ -48,15 +38,9 @@ def imported(root: Element, until: str | None = None) -> str:
     Raises ModelError: what a model cannot keep, with its place.
     Raises UsageError: no end of the run.
     """
-    if not until:
-        raise UsageError("the end of the run is not given", "SBML does not say it: give --until")
-    try:
-        if not bool(value(until) >= 0):
-            raise UsageError(f"the end of the run must not be negative, got {shown(until, 40)}")
-    except (ExpressionError, TypeError) as error:
-        raise UsageError(f"the end of the run: expected a number, got '{shown(until, 40)}'") from error
+    end = end_of_run(until, "SBML does not say it: give --until")
     converter = _converter(root)
-    return written(converter, _document(converter, {}, until), root.file.path)
+    return written(converter, _document(converter, {}, end), root.file.path)
 
 
 def converted(path: str, data: bytes, outputs: Mapping[str, str], until: str) -> dict[str, Any]:

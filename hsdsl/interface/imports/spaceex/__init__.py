@@ -8,20 +8,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from hsdsl.base.errors import Findings, ModelError, UsageError
+from hsdsl.base.errors import Findings, ModelError
 from hsdsl.base.names import did_you_mean, shown
-from hsdsl.interface.imports.spaceex.configuration import Configuration, configuration
-from hsdsl.interface.imports.spaceex.document import Component, components
-from hsdsl.interface.imports.spaceex.drafts import ModeDraft, TransitionDraft
-from hsdsl.interface.imports.spaceex.modes import mode_drafts
-from hsdsl.interface.imports.spaceex.network import flattened
-from hsdsl.interface.imports.spaceex.product import Automaton, Key, automaton
+from hsdsl.interface.imports import end_of_run
+from hsdsl.interface.imports.spaceex.document import Component, Configuration, components, configuration
+from hsdsl.interface.imports.spaceex.modes import Judge, ModeDraft, TransitionDraft, mode_drafts
+from hsdsl.interface.imports.spaceex.network import Automaton, Key, automaton, flattened
 from hsdsl.interface.imports.spaceex.start import first_locations, refuse_outside, start
-from hsdsl.interface.imports.spaceex.urgency import Judge
 from hsdsl.interface.imports.spaceex.writing import written
-from hsdsl.language.expression.plain import value
-from hsdsl.language.expression.syntax import ExpressionError
-from hsdsl.language.files.model import read_bytes
+from hsdsl.language.files import read_bytes
 
 __all__ = ["imported"]
 
@@ -55,9 +50,13 @@ def imported(path: Path, cfg: Path | None = None, until: str | None = None, urge
     drafts = mode_drafts(network, found, constants)
     refuse_outside(drafts[first], begin, configured, system.element)
     transitions = _transitions(str(path), found, drafts, urgent)
-    end = _until(until, configured)
+    given = until or (configured.horizon and configured.horizon.text.strip())
+    end = end_of_run(given, "give --until, or time-horizon in the configuration")
     names = ", ".join(filter(None, (path.name, f"component {system.name}", cfg and f"with {cfg.name}")))
-    notes = [*_note(system), *(f"{key} = {text}" for key, text in configured.others.items() if key == "forbidden")]
+    notes = [
+        *filter(None, [system.note]),
+        *(f"{key} = {text}" for key, text in configured.others.items() if key == "forbidden"),
+    ]
     return written(f"SpaceEx model {names}", system.name, notes, drafts, transitions, begin, first, end)
 
 
@@ -92,19 +91,3 @@ def _system(known: Mapping[str, Component], configured: Configuration) -> Compon
     element = next(iter(known.values())).element
     hint = "name it in the configuration: system = " + (outer[0].name if outer else element.attributes["id"])
     raise ModelError([element.fault("HS333", "which component is the system is not given", hint)])
-
-
-def _note(system: Component) -> list[str]:
-    return [system.note] if system.note else []
-
-
-def _until(given: str | None, configured: Configuration) -> str:
-    text = given or (configured.horizon and configured.horizon.text.strip())
-    if not text:
-        raise UsageError("the end of the run is not given", "give --until, or time-horizon in the configuration")
-    try:
-        if not bool(value(text) >= 0):
-            raise UsageError(f"the end of the run must not be negative, got {shown(text, 40)}")
-    except (ExpressionError, TypeError) as error:
-        raise UsageError(f"the end of the run: expected a number, got '{shown(text, 40)}'") from error
-    return text

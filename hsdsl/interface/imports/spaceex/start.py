@@ -10,11 +10,9 @@ from typing import Any
 from hsdsl.base.errors import ModelError
 from hsdsl.base.functions import replaced
 from hsdsl.base.names import closest, did_you_mean, shown
-from hsdsl.interface.imports.spaceex.configuration import DOT, Configuration
-from hsdsl.interface.imports.spaceex.drafts import ModeDraft
-from hsdsl.interface.imports.spaceex.formula import Relation, renamed, within
-from hsdsl.interface.imports.spaceex.network import Network
-from hsdsl.interface.imports.spaceex.product import Key
+from hsdsl.interface.imports.spaceex.document import DOT, Configuration, Relation, renamed, within
+from hsdsl.interface.imports.spaceex.modes import ModeDraft
+from hsdsl.interface.imports.spaceex.network import Key, Network
 from hsdsl.language.expression.plain import names_in, value
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.source.xml import Element
@@ -55,12 +53,12 @@ def first_locations(network: Network, configured: Configuration, system: str) ->
         if path not in chosen and len(locations) > 1:
             message = f"in which location '{shown(path)}' starts is not given"
             hint = f"write loc({path})=={next(iter(locations.values())).name} under `initially` in the configuration"
-            raise ModelError([_place(configured, instance.component.element, message, hint)])
+            raise ModelError([_place_of(configured, instance.component.element, message, hint)])
         chosen.setdefault(path, next(iter(locations)))
     return tuple(chosen[instance.path] for instance in network.instances)
 
 
-def _place(configured: Configuration, element: Element, message: str, hint: str) -> Any:
+def _place_of(configured: Configuration, element: Element, message: str, hint: str) -> Any:
     if configured.initially is not None:
         return configured.initially.fault("HS333", message, hint)
     return element.fault("HS333", message, hint)
@@ -71,7 +69,7 @@ def start(network: Network, configured: Configuration, system: str) -> Start:
 
     Raises ModelError: a name that does not exist, a set of more than one point, or a constant without a value.
     """
-    waiting = [_named(relation, network, system) for relation in configured.values]
+    waiting = [_named_place(relation, network, system) for relation in configured.values]
     found = {name: text for name, text in network.constants.items() if text is not None}
     texts = dict(found)
     numbers = {symbol(name): value(text) for name, text in found.items()}
@@ -91,7 +89,7 @@ def start(network: Network, configured: Configuration, system: str) -> Start:
     return Start(constants, {n: t for n, t in texts.items() if n in network.variables}, numbers)
 
 
-def _named(relation: Relation, network: Network, system: str) -> Relation:
+def _named_place(relation: Relation, network: Network, system: str) -> Relation:
     """A relation of `initially` with the names of the whole."""
     names: dict[str, str] = {}
     for name in relation.names:
@@ -142,11 +140,11 @@ def refuse_outside(draft: ModeDraft, begin: Start, configured: Configuration, el
     for name in draft.states:
         if name not in begin.variables:
             message, hint = f"where '{name}' starts is not given", f"write {name} == and a number under `initially`"
-            raise ModelError([_place(configured, element, message, hint)])
+            raise ModelError([_place_of(configured, element, message, hint)])
     for facet in draft.facets:
         if bool(replaced(draft.placed(facet.excess), begin.numbers, {}) > 0):
             raise ModelError([facet.relation.fault("the run starts where this invariant does not hold")])
     for equality in draft.equalities:
         if replaced(equality, begin.numbers, {}) != 0:
             message = "the run starts where an equation of the invariant does not hold"
-            raise ModelError([_place(configured, element, message, "change `initially`")])
+            raise ModelError([_place_of(configured, element, message, "change `initially`")])

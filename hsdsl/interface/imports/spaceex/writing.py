@@ -9,11 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from hsdsl import __version__
 from hsdsl.base.names import counted, visible
-from hsdsl.interface.imports.spaceex.drafts import ModeDraft, TransitionDraft
-from hsdsl.interface.imports.spaceex.formula import renamed, within
-from hsdsl.interface.imports.spaceex.product import Key
+from hsdsl.interface.imports.spaceex.document import renamed, within
+from hsdsl.interface.imports.spaceex.modes import INWARD, LATER, ModeDraft, TransitionDraft
+from hsdsl.interface.imports.spaceex.network import Key
 from hsdsl.interface.imports.spaceex.start import Start
-from hsdsl.interface.imports.spaceex.urgency import INWARD, LATER
 
 _WIDTH = 116
 

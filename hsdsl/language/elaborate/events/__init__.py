@@ -18,8 +18,8 @@ from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.events.event import Event, chosen
 from hsdsl.language.elaborate.events.firing import edges_of
 from hsdsl.language.elaborate.events.remembering import Memory, all_states, entered, new_values, remembered
+from hsdsl.language.expression.conditions import comparisons
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.trigger import comparisons
 from hsdsl.language.system import ONE, TIME, ZERO, Edge, HybridSystem, Initial, Mode, started
 
 

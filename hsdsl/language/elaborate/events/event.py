@@ -10,9 +10,9 @@ from typing import Any
 
 from hsdsl.base.functions import below, replaced
 from hsdsl.base.names import memory
+from hsdsl.language.expression.algebra import either, is_mode, select, total, whole
+from hsdsl.language.expression.conditions import Reached, comparisons, number, reached
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import either, is_mode, select, total, whole
-from hsdsl.language.expression.trigger import Reached, comparisons, number, reached
 from hsdsl.language.system import HALF, ONE, TIME, ZERO, Edge, Mode, Queue, Surface
 
 Values = dict[str, Any]

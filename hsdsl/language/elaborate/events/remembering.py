@@ -13,9 +13,9 @@ from hsdsl.base.names import SINCE
 from hsdsl.language.elaborate.events.event import Event, Values, chosen, number_left
 from hsdsl.language.elaborate.events.firing import Draft
 from hsdsl.language.elaborate.events.waiting import dropped
+from hsdsl.language.expression.algebra import select
+from hsdsl.language.expression.conditions import Reached
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.expression.selection import select
-from hsdsl.language.expression.trigger import Reached
 from hsdsl.language.system import ONE, ZERO, Edge
 
 

@@ -1,9 +1,8 @@
 # pyright: basic
 """Systems of parts: instances of automata and their connections, to one hybrid system.
 
-`files` puts automata of other files in place, `instances` lists the parts, `names` and `starts` are what their names
-and initial values mean. `transitions` reads those of each part, `broadcast` joins those that fire together, and
-`composition` makes the one mode of all.
+`instances` lists the parts, with automata of other files in place, and `names` has what their names and initial values
+mean. `composition` reads the transitions of each part, joins those that fire together, and makes the one mode of all.
 """
 
 from __future__ import annotations
@@ -15,19 +14,17 @@ from typing import Any
 
 from hsdsl.base.names import SINCE
 from hsdsl.base.parts import Part, numbered
-from hsdsl.language.elaborate.definitions import define_parameter, units_of
-from hsdsl.language.elaborate.parts.composition import FINAL, MODE, Composition
+from hsdsl.language.elaborate.definitions import define_parameter, placeholders, solutions, units_of, with_solutions
+from hsdsl.language.elaborate.modes import elaborate_scene
+from hsdsl.language.elaborate.parts.composition import FINAL, MODE, composed
 from hsdsl.language.elaborate.parts.instances import Instance, roster_of
-from hsdsl.language.elaborate.parts.names import Board, Names, unknowns_of
-from hsdsl.language.elaborate.parts.starts import Starts
-from hsdsl.language.elaborate.scene import elaborate_scene
-from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
+from hsdsl.language.elaborate.parts.names import Board, Names, Starts, unknowns_of
 from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, definition_order
+from hsdsl.language.expression.algebra import NO_VALUE, ZERO, whole
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state
-from hsdsl.language.expression.selection import NO_VALUE, ZERO, whole
-from hsdsl.language.schema import PartModeDocument, SystemDocument
+from hsdsl.language.schema.documents import PartModeDocument, SystemDocument
 from hsdsl.language.source import Key
-from hsdsl.language.system import Initial, Mode, Parameter, Shape, started
+from hsdsl.language.system import Initial, Mode, Parameter, started
 
 __all__ = ["FINAL", "MODE", "Parts"]
 
@@ -48,7 +45,11 @@ class Parts:
 
     def __init__(self, symbols: SymbolTable, document: SystemDocument) -> None:
         self.symbols = symbols
-        self._refuse_modes(document)
+        for key in ("modes", "initial"):
+            if key in document.model_fields_set and getattr(document, key):
+                place = next(iter(document.modes)).place if key == "modes" else document.initial.mode.place
+                message = f"a model has either `modes` or a `system`; here is `{key}` besides `system`"
+                symbols.report(place, "HS353", message, "give the parts their modes and initial values")
         self.roster = roster_of(symbols, document)
         self.board = Board(symbols, self.roster, {str(key): scalar for key, scalar in document.let.items()})
         instances = self.roster.instances.values()
@@ -64,14 +65,17 @@ class Parts:
         self._solve(document)
         self.outputs, values = self._outputs(document)
         symbols.all_outputs = self.outputs
-        self.scene: tuple[Shape, ...]
-        self.scene, scene = self._scene()
+        self.scene, numbers = elaborate_scene(symbols, Names(self.board, lenient=True).scope)
+        scene = tuple(0 if scalar is None else value and value.expr for scalar, value in numbers)
         self._check_lets(document)
-        self.modes: tuple[Mode, ...] = Composition(self.board).modes(values, scene)
-        self.parts = tuple(map(self._with_timer, self.parts))
+        self.modes: tuple[Mode, ...] = composed(self.board, values, scene)
+        for k, part in enumerate(self.parts):
+            if part.name in self.board.timed:  # all of its modes have the state `since`
+                timed = replace(part, states=tuple((*states, f"{part.name}.{SINCE}") for states in part.states))
+                self.parts = (*self.parts[:k], timed, *self.parts[k + 1 :])
         self.initial = self._initial()
         self.units = dict(self._units())
-        if not symbols.resolver.findings.diagnostics:  # else what reads them may not have been looked at
+        if not symbols.findings.diagnostics:  # else what reads them may not have been looked at
             self.board.check_ends()
 
     def _units(self) -> Iterator[tuple[str, str]]:
@@ -98,14 +102,6 @@ class Parts:
         self.board.forget()
         unknowns = dict.fromkeys(map(str, solve.unknowns))
         values |= unknowns if found is None else with_solutions(placeholders(solve), found)
-
-    def _refuse_modes(self, document: SystemDocument) -> None:
-        """Report `modes` or `initial` next to a system."""
-        for key in ("modes", "initial"):
-            if key in document.model_fields_set and getattr(document, key):
-                place = next(iter(document.modes)).place if key == "modes" else document.initial.mode.place
-                message = f"a model has either `modes` or a `system`; here is `{key}` besides `system`"
-                self.symbols.report(place, "HS353", message, "give the parts their modes and initial values")
 
     def _parameters_of(self, one: Instance) -> list[Parameter]:
         """The parameters of an instance: those that are given to it, else those of its automaton."""
@@ -151,12 +147,6 @@ class Parts:
             values.append(value)
         return self.board.picked(one, values)
 
-    def _scene(self):
-        """The shapes of the file, and their numbers."""
-        scope = Names(self.board, lenient=True).scope
-        shapes, numbers = elaborate_scene(self.symbols, scope)
-        return shapes, tuple(0 if scalar is None else value and value.expr for scalar, value in numbers)
-
     def _check_lets(self, document: SystemDocument) -> None:
         """Work out every `let`, also those that nothing uses."""
         for name in document.let:
@@ -181,11 +171,6 @@ class Parts:
             if str(name) in taken:
                 message = f"'{name}' is an unknown of `solve` in the mode '{mode}', and also {taken[str(name)]}"
                 self.board.report_once(name, "HS301", message, "give one of them another name")
-
-    def _with_timer(self, part: Part) -> Part:
-        """A part with the state `since` in all of its modes, where it uses that."""
-        timer = (f"{part.name}.{SINCE}",) if part.name in self.board.timed else ()
-        return replace(part, states=tuple((*states, *timer) for states in part.states))
 
     def _initial(self) -> Initial:
         """The initial state of the whole; states that the initial mode of a part lacks are 0."""

@@ -1,17 +1,21 @@
 # pyright: basic
-"""Instances: the parts of a system by name, each with its automaton, and what is wrong with how they are given."""
+"""Instances: the parts of a system by name, each with its automaton, and what is wrong with how they are given.
+
+An automaton may be in a file of its own. Every node knows its own text, so faults there have that file's path and line.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from hsdsl.base.errors import Findings
 from hsdsl.base.names import closest, did_you_mean, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.symbols import KINDS, SymbolTable
-from hsdsl.language.schema import AutomatonDocument, InstanceDocument, PartModeDocument, SystemDocument
-from hsdsl.language.source import ABSENT, Key
+from hsdsl.language.files import DataRefused, ModelFiles
+from hsdsl.language.schema.documents import AutomatonDocument, InstanceDocument, PartModeDocument, SystemDocument
+from hsdsl.language.source import ABSENT, Key, Mapping, Node, Scalar, child, compose, decode
 
 MOST = 10_000  # of one name
 ANY = "*"  # among names that are at fault: an instance of which automaton is not known
@@ -60,6 +64,12 @@ class Instance:
         return f"{self.name}.{name}"
 
     @cached_property
+    def starts(self) -> dict[str, Scalar]:
+        """The initial values that it is given."""
+        extra = self.given.initial.__pydantic_extra__ if self.given.initial else {}
+        return {str(key): scalar for key, scalar in extra.items()}
+
+    @cached_property
     def start(self) -> int | None:
         """The index of the mode it starts in; None where that is not known."""
         mode, names = self.given.initial.mode if self.given.initial else None, [*map(str, self.kind.modes)]
@@ -78,7 +88,6 @@ class Roster:
     instances: dict[str, Instance] = field(default_factory=dict)
     counted: dict[str, list[Instance]] = field(default_factory=dict)
     automata: dict[str, list[Instance]] = field(default_factory=dict)
-
     broken: set[str] = field(default_factory=set)
 
     @property
@@ -94,10 +103,6 @@ class Roster:
         """The instances that a name stands for in a sum."""
         alone = self.instances.get(name)
         return self.automata.get(name) or self.counted.get(name) or ([alone] if alone else None)
-
-    def first_of_each(self) -> Iterable[Instance]:
-        """One instance of each automaton."""
-        return (group[0] for group in self.automata.values() if group)
 
 
 def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
@@ -123,15 +128,20 @@ def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
         if not kind.modes:
             roster.broken |= {str(key), ANY}
             continue
-        made = _made(symbols, key, label, kind, given)
+        count, made = given.count, [Instance(str(key), key, None, label, kind, given)]
+        if count is not None:
+            numbers = range(1, count + 1) if count <= MOST else ()
+            made = [Instance(f"{key}[{k}]", key, k, label, kind, given) for k in numbers]
+        if not made:
+            symbols.report(key.place, "HS321", f"`count`: expected a number from 1 to {MOST:,}, got {count}")
         roster.instances |= {one.name: one for one in made}
         roster.automata[label] += made
         if not made:
             roster.broken |= {str(key), ANY}
-        elif given.count is not None:
+            continue
+        if count is not None:
             roster.counted[str(key)] = made
-        if made:
-            _check(symbols, made[0])
+        _check(symbols, made[0])
     return roster
 
 
@@ -141,12 +151,8 @@ def _check_names(symbols: SymbolTable, automaton: Key, kind: AutomatonDocument) 
         symbols.report(automaton.place, "HS202", f"the automaton '{automaton}' has no modes", "give it a mode")
     states = dict.fromkeys(key for mode in kind.modes.values() for key in mode.flow or ())
     taken: dict[str, str] = {}
-    for what, names in (
-        ("parameters", kind.parameters),
-        ("inputs", kind.inputs),
-        ("states", states),
-        ("let", kind.let),
-    ):
+    tables = {"parameters": kind.parameters, "inputs": kind.inputs, "states": states, "let": kind.let}
+    for what, names in tables.items():
         for key in names:
             if str(key) in taken:
                 message = f"'{key}' is {KINDS[what]} of '{automaton}' here, and also {taken[str(key)]}"
@@ -159,24 +165,14 @@ def _check_names(symbols: SymbolTable, automaton: Key, kind: AutomatonDocument) 
                 symbols.report(key.place, "HS301", message, "give one of them another name")
 
 
-def _made(
-    symbols: SymbolTable, key: Key, label: str, kind: AutomatonDocument, given: InstanceDocument
-) -> list[Instance]:
-    if given.count is None:
-        return [Instance(str(key), key, None, label, kind, given)]
-    if not 1 <= given.count <= MOST:
-        symbols.report(key.place, "HS321", f"`count`: expected a number from 1 to {MOST:,}, got {given.count}")
-        return []
-    return [Instance(f"{key}[{k}]", key, k, label, kind, given) for k in range(1, given.count + 1)]
-
-
 def _check(symbols: SymbolTable, one: Instance) -> None:
     """Report what an instance lacks, and what its automaton does not have."""
     given, kind = one.given, one.kind
     lacking = [str(name) for name in kind.inputs if name not in given.inputs]
     if lacking:
         names = ", ".join(f"'{name}'" for name in lacking)
-        message = f"the input{'s' if len(lacking) > 1 else ''} {names} of '{one.key}' {_are(lacking)} not connected"
+        noun, verb = ("inputs", "are") if len(lacking) > 1 else ("input", "is")
+        message = f"the {noun} {names} of '{one.key}' {verb} not connected"
         hint = f"write inputs: {{{', '.join(f'{name}: ...' for name in lacking)}}}"
         symbols.report(one.key.place, "HS351", message, hint)
     for table, known, what in ((given.inputs, kind.inputs, "input"), (given.parameters, kind.parameters, "parameter")):
@@ -187,10 +183,6 @@ def _check(symbols: SymbolTable, one: Instance) -> None:
     if given.at_ends and given.count is None:
         symbols.report(next(iter(given.at_ends)).place, "HS351", "`at_ends` needs a `count`", "write count: 2")
     _check_start(symbols, one)
-
-
-def _are(names: list[str]) -> str:
-    return "are" if len(names) > 1 else "is"
 
 
 def _check_start(symbols: SymbolTable, one: Instance) -> None:
@@ -214,9 +206,31 @@ def _check_start(symbols: SymbolTable, one: Instance) -> None:
     lacking = [state for state in states if state not in given]
     if lacking:
         names = ", ".join(f"'{state}'" for state in lacking)
-        message = f"the state{'s' if len(lacking) > 1 else ''} {names} of '{one.key}' {_have(lacking)} no initial value"
+        noun, verb = ("states", "have") if len(lacking) > 1 else ("state", "has")
+        message = f"the {noun} {names} of '{one.key}' {verb} no initial value"
         symbols.report(one.key.place, "HS308", message, "add " + ", ".join(f"{state}: ..." for state in lacking))
 
 
-def _have(names: list[str]) -> str:
-    return "have" if len(names) > 1 else "has"
+_ABOUT = ("hsdsl", "title", "source")  # keys that a file may have and that say nothing about the automaton
+
+
+def read_automata(root: Node, files: ModelFiles, findings: Findings) -> dict[str, bytes]:
+    """Put automata of files in their places; the content of the files, by name."""
+    automata = child(root, "automata")
+    found: dict[str, bytes] = {}
+    for key, entry in list(automata) if isinstance(automata, Mapping) else ():
+        name = child(entry, "file")
+        if not isinstance(name, Scalar) or not isinstance(entry, Mapping) or len(entry.entries) > 1:
+            continue
+        try:
+            content = found.setdefault(name.value, files.content(name.value))
+        except DataRefused as refusal:
+            findings.add(name.place.diagnostic(refusal.code, refusal.message, refusal.hint))
+            continue
+        inner = compose(decode(str(files.folder / name.value), content), findings)
+        if isinstance(inner, Mapping):
+            for about in _ABOUT:
+                inner.entries.pop(about, None)
+        assert isinstance(automata, Mapping)
+        automata.entries[str(key)] = (key, inner)
+    return found

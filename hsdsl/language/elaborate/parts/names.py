@@ -2,7 +2,7 @@
 """What names mean in a system of parts: those of an instance, then the file's, then `instance.name`.
 
 A name is worked out when it is first used, so definitions may use each other in any order; one that comes to itself is
-refused with the way it took.
+refused with the way it took. In initial values, names of states are those of other initial values.
 """
 
 from __future__ import annotations
@@ -14,15 +14,14 @@ from fractions import Fraction
 from typing import Any
 
 from hsdsl.base.names import SINCE, counted, did_you_mean, shown
+from hsdsl.language.elaborate.definitions import placeholders, solutions, with_solutions
 from hsdsl.language.elaborate.parts.instances import Instance, Roster
-from hsdsl.language.elaborate.resolver import resolved_expression
-from hsdsl.language.elaborate.solve import placeholders, solutions, with_solutions
-from hsdsl.language.elaborate.symbols import Meanings, SymbolTable
-from hsdsl.language.expression import ExpressionError, parse, selection, syntax
+from hsdsl.language.elaborate.symbols import Meanings, SymbolTable, resolved_expression
+from hsdsl.language.expression import ExpressionError, algebra, parse
+from hsdsl.language.expression.parse import Call, Name, Number, Sum, Tree, mapped, walk
 from hsdsl.language.expression.plain import RANGES
-from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
-from hsdsl.language.expression.syntax import Call, Name, Number, Sum, Tree, mapped, walk
-from hsdsl.language.schema import PartModeDocument
+from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, state, symbol
+from hsdsl.language.schema.documents import PartModeDocument
 from hsdsl.language.source import Key, Scalar
 
 MEMBER = re.compile(r"([^\W\d]\w*)(?:\[(.*?)\])?\.(.+)")
@@ -74,8 +73,12 @@ class Board:
             return None
         self._active.append((str(key), label))
         try:
-            lacks = partial and self.lacks(scalar, names)
-            value = _lacking(label, names) if lacks else self.value(scalar, names)
+            if partial and self.lacks(scalar, names):
+                message = f"'{label.rpartition('.')[2]}' has no value in the mode '{names.mode}': "
+                message += "it uses a name that others define"
+                value: Meaning = Refusal("HS354", message, "define that name in this mode, too, under `let`")
+            else:
+                value = self.value(scalar, names)
         finally:
             self._active.pop()
         return self._known.setdefault(key, value)
@@ -107,7 +110,7 @@ class Board:
         """The value of an expression; what another instance of the same automaton reports already is not repeated."""
         if self.is_broken(scalar, names):
             return None
-        value = self.symbols.resolver.number(scalar, names.scope)
+        value = self.symbols.number(scalar, names.scope)
         self.note(scalar, names, value)
         return value
 
@@ -136,9 +139,7 @@ class Board:
         one = self.instance(base, index, names)
         if one is None or isinstance(one, Refusal):
             return one
-        if isinstance(one, int):
-            return self._beyond(base, one, attribute)
-        return self.of(one, attribute, names.lenient)
+        return names.beyond(base, one, attribute) if isinstance(one, int) else names.of(one, attribute)
 
     def instance(self, base: str, index: str | None, names: Names) -> Instance | int | Refusal | None:
         """The instance of a name; its number where that is beyond the ends. KeyError where there is none.
@@ -195,13 +196,6 @@ class Board:
                     hint = did_you_mean(key, read, f"remove it, or read {base}[index - 1].{shown(key)}")
                     self.symbols.report(key.place, "HS351", message, hint)
 
-    def _beyond(self, base: str, number: int, attribute: str) -> Meaning:
-        given = self.at_end(base, number, attribute)
-        if isinstance(given, Refusal):
-            return given
-        key = ("at_ends", base, number, attribute)
-        return self.evaluated(key, given, Names(self, index=number), f"{base}[{number}].{attribute}")
-
     def of(self, one: Instance, attribute: str, lenient: bool = False) -> Meaning:
         """What a name of an instance is to the others: a choice among what it is in each mode."""
         if attribute in one.kind.parameters:
@@ -233,7 +227,7 @@ class Board:
             if lacks and not lenient:
                 message = f"'{attribute}' has no value in the mode '{mode}' of '{one.automaton}'"
                 return Refusal("HS354", message, f"define it there, too, under `let`: {{{attribute}: ...}}")
-            values.append(Value(selection.NO_VALUE) if lacks else value)  # pyright: ignore[reportArgumentType]
+            values.append(Value(algebra.NO_VALUE) if lacks else value)  # pyright: ignore[reportArgumentType]
         return self.picked(one, values)
 
     def lacks(self, scalar: Scalar, names: Names) -> bool:
@@ -255,7 +249,7 @@ class Board:
         """One value of several, by the mode of an instance; in modes without one it is that of another."""
         known = [value for value in given if value is not None] or [whole_value(0)]
         values = [value or known[0] for value in given]
-        expr = selection.pick(symbol(one.name), [value.expr for value in values], self.constants)
+        expr = algebra.pick(symbol(one.name), [value.expr for value in values], self.constants)
         size, depth = sum(value.size for value in values), max(value.depth for value in values)
         return Value(expr, size=size, depth=depth, bits=max(value.bits for value in values))
 
@@ -263,11 +257,6 @@ class Board:
 def unknowns_of(mode: PartModeDocument) -> list[str]:
     """The names that the equations of a mode solve for."""
     return [] if mode.solve is None else list(map(str, mode.solve.unknowns))
-
-
-def _lacking(label: str, names: Names) -> Refusal:
-    message = f"'{label.rpartition('.')[2]}' has no value in the mode '{names.mode}': it uses a name that others define"
-    return Refusal("HS354", message, "define that name in this mode, too, under `let`")
 
 
 def whole_value(number: int) -> Value:
@@ -306,6 +295,18 @@ class Names(Mapping[str, Meaning]):
         place = "here" if self.mode is None else f"the mode '{self.mode}'"
         return Scope(self, self.states, place, expanded=self.expanded)
 
+    def of(self, one: Instance, attribute: str) -> Meaning:
+        """What a name of an instance is here."""
+        return self.board.of(one, attribute, self.lenient)
+
+    def beyond(self, base: str, number: int, attribute: str) -> Meaning:
+        """What a name is beyond the first and the last of several instances."""
+        given, board = self.board.at_end(base, number, attribute), self.board
+        if isinstance(given, Refusal):
+            return given
+        key = ("at_ends", base, number, attribute)
+        return board.evaluated(key, given, Names(board, index=number), f"{base}[{number}].{attribute}")
+
     def __getitem__(self, name: str) -> Meaning:
         if "." in name:
             return self.board.member(name, self)
@@ -319,12 +320,9 @@ class Names(Mapping[str, Meaning]):
         if name == SINCE and self.board.symbols.timed:
             return Refusal("HS117", f"'{SINCE}' is the time since a part entered its mode", "use it in an automaton")
         if name in self.board.lets:
-            return self.board.evaluated(("let", name, self.lenient), self.board.lets[name], self._outside, name)
+            outside = Names(self.board, lenient=self.lenient)
+            return self.board.evaluated(("let", name, self.lenient), self.board.lets[name], outside, name)
         return self.board.symbols.values[name]
-
-    @property
-    def _outside(self) -> Names:
-        return Names(self.board, lenient=self.lenient)
 
     def _own(self, one: Instance, mode: str, name: str) -> Meaning | type[KeyError]:
         """What a name means to an instance itself; the type KeyError where it means nothing."""
@@ -362,7 +360,8 @@ class Names(Mapping[str, Meaning]):
         if one is not None:
             yield from (*one.states, *map(str, (*one.kind.let, *one.kind.inputs, *one.kind.parameters)))
         yield from (*self.board.symbols.names, *self.board.symbols.values)
-        yield from (other.full(name) for other in self.board.roster.first_of_each() for name in other.states)
+        groups = self.board.roster.automata.values()
+        yield from (group[0].full(name) for group in groups if group for name in group[0].states)
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -424,7 +423,7 @@ class Names(Mapping[str, Meaning]):
         if mode not in several[0].part.modes:
             message = f"the automaton '{several[0].automaton}' has no mode '{mode}'"
             raise ExpressionError.at(inner, "HS303", message, did_you_mean(mode, several[0].part.modes))
-        terms = [syntax.Name(f"{one.name}.{IN_MODE}{mode}", inner.start, inner.end) for one in several]
+        terms = [Name(f"{one.name}.{IN_MODE}{mode}", inner.start, inner.end) for one in several]
         return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
 
 
@@ -432,3 +431,101 @@ def _of_instance(tree: Tree, base: str, name: str) -> Tree:
     if isinstance(tree, Name) and tree.name.partition(".")[0] == base:
         return replace(tree, name=f"{name}.{tree.name.partition('.')[2]}")
     return mapped(tree, lambda inner: _of_instance(inner, base, name))
+
+
+_SENTENCE = "an initial value is an expression of parameters and of other initial values"
+
+
+@dataclass
+class Starts:
+    """The initial values of all instances; ``written`` has each behind those whose states it uses."""
+
+    board: Board
+    written: dict[str, Any] = field(default_factory=dict)
+    _known: dict[str, Value | None] = field(default_factory=dict)
+    _active: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.outer: Mapping[str, Meaning] = self.board.symbols.parameter_scope(_SENTENCE).values
+        for one in self.board.roster.instances.values():
+            for name in one.starts:
+                if name in one.states:
+                    self.of(one, name, False)
+
+    def of(self, one: Instance, name: str, symbolic: bool) -> Meaning:
+        """The initial value of a state of an instance, or with ``symbolic`` its symbol."""
+        full, given = one.full(name), one.starts
+        if name not in given:
+            mode = one.part.modes[one.start or 0]
+            message = f"'{name}' has no initial value where '{one.automaton}' starts in '{mode}'"
+            return Refusal("HS308", message, None)
+        if full not in self._known:
+            if full in self._active:
+                path = " -> ".join((*self._active[self._active.index(full) :], full))
+                message = f"the initial value of '{full}' is defined by itself: {path}"
+                self.board.symbols.report(given[name].place, "HS302", message, "give one of them by parameters")
+                return None
+            self._active.append(full)
+            try:
+                value = StartNames(self.board, one, index=one.index, starts=self).number(given[name])
+                names = StartNames(self.board, one, index=one.index, starts=self, symbolic=True)
+                expr = names.number(given[name]) if value is not None else None
+            finally:
+                self._active.pop()
+            self._known.setdefault(full, value)
+            if expr is not None:
+                self.written[full] = expr.expr
+        found = self._known[full]
+        return state(full) if symbolic and found is not None else found
+
+
+@dataclass(frozen=True)
+class StartNames(Names):
+    """The names in the initial values of an instance, or beyond the ends of several: of states their initial values."""
+
+    starts: Starts | None = None
+    symbolic: bool = False
+
+    def number(self, scalar: Scalar) -> Value | None:
+        """The value of an expression of these names."""
+        scope = Scope(self, expanded=self.expanded)
+        return self.board.symbols.number(scalar, scope, finite_now=not self.symbolic)
+
+    def of(self, one: Instance, attribute: str) -> Meaning:
+        """What a name of an instance is in an initial value."""
+        assert self.starts is not None
+        if attribute in one.kind.parameters:
+            return self.board.parameters.get(one.full(attribute))
+        if attribute.startswith(IN_MODE):
+            return whole_value(int(one.part.modes[one.start or 0] == attribute.removeprefix(IN_MODE)))
+        if attribute in one.states:
+            return self.starts.of(one, attribute, self.symbolic)
+        known = [*one.states, *map(str, one.kind.parameters)]
+        message = f"'{attribute}' is no state or parameter of '{one.automaton}'"
+        return Refusal("HS111", message, did_you_mean(attribute, known, _SENTENCE))
+
+    def beyond(self, base: str, number: int, attribute: str) -> Meaning:
+        """What a name is beyond the first and the last of several instances, in an initial value."""
+        given = self.board.at_end(base, number, attribute)
+        return given if isinstance(given, Refusal) else replace(self, instance=None, index=number).number(given)
+
+    def __getitem__(self, name: str) -> Meaning:
+        one, starts = self.instance, self.starts
+        assert starts is not None
+        if "." in name:
+            return self.board.member(name, self)
+        if name == "index" and self.index is not None and (one is None or name not in one.kind.parameters):
+            return whole_value(self.index)
+        if one is not None and (name in one.kind.parameters or name in one.states):
+            return self.of(one, name)
+        return starts.outer[name]
+
+    def __iter__(self) -> Iterator[str]:
+        if self.instance is not None:
+            yield from (*self.instance.states, *map(str, self.instance.kind.parameters))
+        yield from self.starts.outer if self.starts is not None else ()
+
+    def items(self) -> Any:
+        """The names with their meanings, for hints: states without working their values out."""
+        own: Meanings = {} if self.instance is None else {name: state(name) for name in self.instance.states}
+        return [*own.items(), *(self.starts.outer.items() if self.starts is not None else ())]

@@ -1,0 +1,183 @@
+"""What a run reports first, for any verdict: remarks of the loop, of `misses` along its steps, and of its end.
+
+Surfaces passed while an `if` was false and walls that do not hold are remarked by `misses` where that takes place. For
+other runs, as those that are outside the theorem, they are searched at the rows of the run, and in eighths of steps on
+which a surface rises at first and falls at last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
+from hsdsl.base.numbers.enclosures import Array, Range, as_range
+from hsdsl.engine.kernel import ModeKernel
+from hsdsl.engine.simulate.stops import Diagnostics, Remark, loop_remarks, may_be_passed, of_edge, wall_of, warnings_of
+from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
+from hsdsl.engine.simulate.verdict.crossings import sliding_spans
+from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, ROUNDS, RunView
+from hsdsl.mathematics.program import ModeProgram
+
+BEYOND = 4  # times its round-off: a wall that does not hold
+END = 1.0
+POINTS = (*(i / 8 for i in range(8)), END)  # of a step that turns back
+
+# The warnings of a `Verdict.deferred` that has its remarks and its program as `_told`.
+WARNINGS: dict[str, Callable[[Any], Any]] = {"warnings": lambda verdict: warnings_of(*verdict._told)}
+
+
+def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
+    """The remarks about a run."""
+    program = run.problem.program
+    found = [*loop_remarks(program, diagnostics, run.stop)]
+    found += (Remark("sliding", " and ".join(modes), start, end) for modes, start, end in sliding_spans(run))
+    known, walls = run.remarks is not None, any(mode.walls for mode in program.modes)
+    found += run.remarks or ()
+    if (walls and (not known or run.problem.settings.scheme == "relaxed")) or (
+        not known and any(may_be_passed(program, edge) for edge in program.edges)
+    ):
+        beyond = {remark.of for remark in found if remark.kind == "beyond"}
+        found += (one for one in _passings(run, walls_alone=known) if one.kind != "beyond" or one.of not in beyond)
+    return [*found, *at_the_end(run)]
+
+
+def at_the_end(run: RunView) -> Iterator[Remark]:
+    """Walls of the final mode that a run ended in: nothing flows there, so nothing has checked them."""
+    modes = run.problem.program.modes
+    if run.stop.reason != "final" or not any(mode.final and mode.walls for mode in modes):
+        return
+    final = run.execution.final
+    mode = modes[run.index(final.mode)]
+    if tuple(final.state) != mode.states:
+        return  # it has no flow, and the states of the mode before
+    place = run.place(final.mode, final.time, tuple(final.state.values()))
+    for k in range(len(mode.edges), len(mode.surfaces)):
+        with suppress(*DOMAIN_ERRORS):
+            if place.value(k) > BEYOND * place.roundoff_bound(k):
+                yield Remark("beyond", wall_of(mode, k), final.time)
+
+
+def _passings(run: RunView, *, walls_alone: bool) -> Iterator[Remark]:
+    """Remarks about surfaces that are passed and walls that do not hold, or about walls alone."""
+    broken: dict[str, Number] = {}
+    for index, _, rows in run.rows_by_mode():
+        for first in range(0, len(rows), MOST_PARTS):
+            steps = _Steps(run, index, rows[first : first + MOST_PARTS])
+            edges = steps.mode.edges
+            for k in steps.mode.surfaces:
+                if k >= len(edges):
+                    wall = wall_of(steps.mode, k)
+                    for time in (time for each in _spans(steps, k) for time in _beyond(*each, k)):
+                        broken[wall] = min(time, broken.get(wall, time))
+                elif not walls_alone and may_be_passed(run.problem.program, edges[k]):
+                    times = (time for each in _spans(steps, k) for time in _passed(*each, k))
+                    yield from (of_edge("passed", edges[k].name, time) for time in times)
+    yield from (Remark("beyond", wall, time) for wall, time in broken.items())
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """Steps of a run in one mode, that begin at ``rows``."""
+
+    run: RunView
+    index: int
+    rows: NDArray[np.int64]
+
+    @property
+    def mode(self) -> ModeProgram:
+        """The mode."""
+        return self.run.problem.program.modes[self.index]
+
+    def at(self, share: Array | float) -> tuple[ModeKernel, list[Range]]:
+        """The mode's routines over ranges, and time and states at a share of each step; its end is the row there."""
+        execution, rows, n = self.run.execution, self.rows, len(self.mode.states)
+        times = np.asarray(execution.times, dtype=float)
+        data = [Range(column, column) for column in self.run.data_at(times[rows]).T]
+        if np.ndim(share) == 0 and share in (0.0, END):
+            states = np.asarray(execution.values[rows + int(share), :n], dtype=float)
+        else:
+            states, powers = self.run.pieces_at(rows, n)
+            moved = np.zeros_like(states)
+            for m in reversed(range(powers.shape[1])):
+                moved = (moved + powers[:, m]) * np.reshape(share, (-1, 1))
+            states = states + moved
+        columns = [times[rows] + share * (times[rows + 1] - times[rows]), *states.T]
+        return self.run.problem.kernel.enclosing.bind(self.index, data), [Range(column, column) for column in columns]
+
+    def values(self, share: Array | float, k: int) -> Array:
+        """Surface k there, between the ends of what round-off makes of it."""
+        kernel, point = self.at(share)
+        return self._middle(kernel.surfaces(*point)[k])
+
+    def rates(self, share: float, k: int) -> Array:
+        """How fast surface k rises there."""
+        kernel, point = self.at(share)
+        return self._middle(kernel.rates[k](*point)[0])
+
+    def _middle(self, value: Any) -> Array:
+        found = as_range(value)
+        return np.broadcast_to((found.low + found.high) / 2, len(self.rows))
+
+    def noise(self, share: Array | float, k: int) -> Array:
+        """Below this surface k is no more than round-off makes it there, by the largest sizes that states have had."""
+        kernel, point = self.at(share)
+        sizes = [np.abs(point[0].high), *(self.run.sizes[name] for name in self.mode.states)]
+        total = as_range(kernel.magnitudes(*point)[k]).high
+        for slope, size in zip(map(as_range, kernel.gradients[k](*point)), sizes, strict=True):
+            total = total + np.maximum(np.abs(slope.low), np.abs(slope.high)) * size
+        return BEYOND * ROUNDOFF_UNITS * max(float(self.run.arithmetic.unit), FLOAT64.unit) * total
+
+    def take(self, which: NDArray[np.bool_]) -> _Steps:
+        """Some of the steps."""
+        return replace(self, rows=self.rows[which])
+
+
+def _spans(steps: _Steps, k: int) -> Iterator[tuple[_Steps, float, float]]:
+    """Steps with the shares between which they are compared: whole, or in eighths where surface k turns back."""
+    turns = (steps.rates(0.0, k) > 0) & (steps.rates(END, k) < 0)
+    yield steps.take(~turns), 0.0, END
+    if turns.any():
+        turning = steps.take(turns)
+        yield from ((turning, a, b) for a, b in pairwise(POINTS))
+
+
+def _passed(steps: _Steps, start: float, end: float, k: int) -> Iterator[Number]:
+    """When surface k is passed while its `if` is false; not where a step ends by its own transition."""
+    run = steps.run
+    steps = steps.take(steps.values(end, k) > 0)
+    if not len(steps.rows):
+        return
+    noise = steps.noise(start, k)
+    rising = (steps.values(start, k) <= noise) & (steps.values(end, k) > steps.noise(end, k))
+    if end == END:
+        rising &= np.array([run.crossed.get(row + 1) != k for row in steps.rows.tolist()])
+    steps, noise = steps.take(rising), noise[rising]
+    if not len(steps.rows):
+        return
+    on = steps.values(start, k) >= -noise  # as where the mode was entered
+    low, high = np.full(len(steps.rows), start), np.where(on, start, end)
+    for _ in range(ROUNDS):
+        middle = (low + high) / 2
+        below = steps.values(middle, k) <= 0
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    _, point = steps.at(high)
+    for t, *x in zip(*(column.low.tolist() for column in point), strict=True):
+        with suppress(*DOMAIN_ERRORS):
+            if not run.place(steps.index, t, tuple(x)).kernel.conditions[k](t, *x)[0]:
+                yield t
+
+
+def _beyond(steps: _Steps, start: float, end: float, k: int) -> Iterator[Number]:
+    """The first time at which wall k does not hold at the beginning or the end of a span."""
+    for share in (start, end):
+        beyond = steps.take(steps.values(share, k) > 0)
+        if len(beyond.rows):
+            beyond = beyond.take(beyond.values(share, k) > beyond.noise(share, k))
+            yield from beyond.at(share)[1][0].low.tolist()[:1]

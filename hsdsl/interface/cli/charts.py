@@ -1,0 +1,212 @@
+"""``hsdsl chart`` and ``stability``: speed against accuracy, ours and others', and maps of how methods fail."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from typer import Argument, Option
+
+from hsdsl.base.errors import UsageError
+from hsdsl.base.progress import Show, Text, running
+from hsdsl.interface.cli.console import progress, say, write_table
+from hsdsl.interface.cli.options import (
+    Answer,
+    Model,
+    check_target,
+    known_names,
+    model_files,
+    names_of,
+    option,
+    overriding,
+    values_of,
+)
+
+if TYPE_CHECKING:
+    from hsdsl.interface.chart import Row
+
+
+MODELS = "Model files; FILE:1 is the second start of its reference."
+PEERS_HELP = "Peers to run: scipy, heyoka, diffrax, sksundae, casadi; or all."
+
+
+def chart(
+    models: Annotated[list[str], Argument(metavar="MODEL...", help=MODELS, autocompletion=model_files)],
+    *,
+    schemes: Annotated[str | None, option("A,B", "Our schemes; all unless given.")] = None,
+    methods: Annotated[str | None, option("A,B", "Our methods; all unless given.")] = None,
+    engines: Annotated[str | None, option("A,B", "Our engines; all unless given.")] = None,
+    tolerances: Annotated[str | None, option("A,B", "For adaptive methods and peers.")] = None,
+    steps: Annotated[str | None, option("A,B", "For fixed-step methods.")] = None,
+    against: Annotated[str | None, option("A,B", PEERS_HELP)] = None,
+    states: Annotated[str | None, option("A,B", "Take the error of these states only.")] = None,
+    until: Annotated[str | None, option("T", "End of runs; an earlier one has a reference of its own.")] = None,
+    samples: Annotated[int, option("N", "At how many samples the error is taken.")] = 2000,
+    clearance: Annotated[
+        float | None,
+        option("DT", "Samples nearer than this to an exact jump do not count; else 1e-4, or 1e-4 of a run below 1."),
+    ] = None,
+    digits: Annotated[int, option("N", "Digits of the reference where no exact execution is known.")] = 8,
+    rounds: Annotated[int, option("N", "Timed turns, after one that warms up.")] = 5,
+    patience: Annotated[
+        float,
+        option(
+            "S", "Seconds of a run or of a search for rho; a longer run is ended, its tool gets no tighter setting."
+        ),
+    ] = 10.0,
+    rho: Annotated[bool, Option(help="Also compute rho of our runs.")] = True,
+    out: Annotated[Path | None, option("FILE", "Write the table: .csv.")] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw the chart: .png or .svg.")] = None,
+    answer: Answer,
+) -> None:
+    """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
+    with answer.reporting():
+        from hsdsl.engine.integrators import METHODS
+        from hsdsl.interface.chart import ENGINES, PEERS, SCHEMES, TOLERANCES
+
+        check_target(out, "--out", (".csv",))
+        check_target(plot, "--plot")
+        options: dict[str, Any] = {
+            "schemes": known_names(schemes, SCHEMES, "--schemes") or SCHEMES,
+            "methods": known_names(methods, tuple(METHODS), "--methods"),
+            "engines": known_names(engines, ENGINES, "--engines") or ENGINES,
+            "tolerances": _numbers(tolerances, "--tolerances") or TOLERANCES,
+            "steps": _numbers(steps, "--steps"),
+            "against": known_names(",".join(PEERS) if against == "all" else against, tuple(PEERS), "--against"),
+            "rounds": rounds,
+            "patience": patience,
+            "with_rho": rho,
+        }
+        sampling = {
+            **{"states": names_of(states), "samples": samples, "clearance": clearance},
+            **{"digits": digits, "until": until},
+        }
+        _report(_charted(models, sampling, options, answer), out, plot, answer)
+
+
+def _charted(
+    models: list[str], sampling: dict[str, Any], options: dict[str, Any], answer: Answer
+) -> list[tuple[str, list[Row]]]:
+    """The rows of each model by its name, with what is left out on standard error."""
+    from hsdsl.interface.chart import work_precision
+
+    charted: list[tuple[str, list[Row]]] = []
+    with progress(answer.hidden) as show:
+
+        def watch(text: str) -> None:
+            if show:
+                show(lambda: text)
+
+        for scene in [_scene(text, sampling, show) for text in models]:
+            name = scene.name
+            rows, remarks = work_precision(scene, **options, watch=lambda what, name=name: watch(f"{name}: {what}"))
+            charted.append((name, rows))
+            for remark in remarks if not answer.quiet else ():
+                say(f"left out: {remark}")
+    return charted
+
+
+def _scene(text: str, sampling: dict[str, Any], show: Show | None) -> Any:
+    from hsdsl.interface.chart import Scene
+    from hsdsl.interface.model import load
+
+    path, colon, block = text.rpartition(":")
+    if not (colon and block.isdecimal()):
+        path, block = text, "0"
+
+    def named(far: Text) -> None:
+        if show:
+            show(lambda: f"{text}: exact execution in many digits {far()}")
+
+    return Scene.of(load(path), block=int(block), **sampling, watch=partial(running, named))
+
+
+def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, answer: Answer) -> None:
+    from hsdsl.interface.chart.rows import as_csv, as_text, record
+
+    rows = [row for _, group in charted for row in group]
+    write_table(out, lambda: as_csv(rows))
+    if plot is not None:
+        from hsdsl.interface.chart.picture import plot_work_precision
+
+        plot_work_precision(plot, charted)
+        say(f"wrote {plot}")
+    answer.give(
+        lambda: {"rows": [record(row) for row in rows]},
+        lambda: "\n\n".join(f"{name}\n{as_text(group)}" for name, group in charted),
+    )
+
+
+def _numbers(text: str | None, name: str) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in names_of(text))
+    except ValueError:
+        raise UsageError(f"{name}: expected numbers with commas between them, got '{text}'") from None
+    if not all(0 < number < 1e300 for number in numbers):
+        raise UsageError(f"{name}: expected positive numbers, got '{text}'")
+    return numbers
+
+
+MAP = (
+    "Two of h, tolerance, relaxation, parameters and initial.NAME, each with its range if not the default:"
+    " h=1e-4:1e-1:20,relaxation. Values are spaced logarithmically, with :lin evenly. Left out, h,relaxation."
+)
+SET_OF_MAPS = "Override a parameter, an initial value or a setting for every run. May be repeated."
+AGAINST = "Peers, on maps of tolerance: scipy, heyoka, diffrax, sksundae, casadi; or all."
+
+
+def stability(
+    model: Model,
+    *,
+    map: Annotated[str | None, option("X,Y", MAP, "--map")] = None,
+    scheme: Annotated[str | None, option("A,B", "Our schemes; else relaxed on maps of it, and the file's.")] = None,
+    method: Annotated[str | None, option("A,B", "Our methods; else rk4 on maps of h, and auto.")] = None,
+    against: Annotated[str | None, option("A,B", AGAINST)] = None,
+    overrides: Annotated[list[str] | None, overriding(SET_OF_MAPS)] = None,
+    patience: Annotated[float, option("S", "Processor seconds of a run; a longer one is stuck.")] = 10.0,
+    processes: Annotated[int | None, option("N", "How many at a time; else as many as there are cores.")] = None,
+    rho: Annotated[bool, Option(help="Compute rho of runs that get to the end.")] = True,
+    out: Annotated[Path | None, option("FILE", "Write a line for each run: .csv.")] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw the map: .png or .svg.")] = None,
+    answer: Answer,
+) -> None:
+    """Map where methods converge, miss transitions, blow up or get stuck, against an exact or precise run."""
+    with answer.reporting():
+        from hsdsl.interface.chart import PEERS
+        from hsdsl.interface.chart.stability import stability_map
+        from hsdsl.interface.model import load
+
+        check_target(out, "--out", (".csv",))
+        check_target(plot, "--plot")
+        if not 0 < patience < 1e6 or (processes is not None and processes < 1):
+            raise UsageError("--patience and --processes: expected positive numbers")
+        options = values_of(overrides)
+        by_set: dict[str, str] = options["settings"]
+        options |= {
+            "schemes": (by_set.pop("scheme", None) if scheme is None else scheme) or (),
+            "methods": (by_set.pop("method", None) if method is None else method) or (),
+            "against": ",".join(PEERS) if against == "all" else against or (),
+        }
+        with progress(answer.hidden) as show:
+
+            def watch(done: int, count: int) -> None:
+                if show:
+                    show(lambda: f"{done} of {count} runs")
+
+            given: dict[str, Any] = {"with_rho": rho, "processes": processes, "patience": patience, "watch": watch}
+            given |= {} if map is None else {"map": map}
+            found = stability_map(load(model), **options, **given)
+        _report_map(found, out, plot, answer)
+
+
+def _report_map(found: Any, out: Path | None, plot: Path | None, answer: Answer) -> None:
+    from hsdsl.interface.chart.stability import as_csv, as_plain, as_text
+
+    write_table(out, lambda: as_csv(found))
+    if plot is not None:
+        from hsdsl.interface.chart.stability.picture import plot_stability
+
+        plot_stability(plot, found)
+        say(f"wrote {plot}")
+    answer.give(lambda: as_plain(found), lambda: as_text(found))

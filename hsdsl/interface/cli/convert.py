@@ -1,0 +1,183 @@
+"""``hsdsl export``, ``import``, ``complete`` and ``schema``: models written for other tools, or read from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+from typer import Argument, Option
+
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import counted
+from hsdsl.export import TARGETS, Modes, check_folder, check_scheme, files_of, source_of, write
+from hsdsl.export import check_target as check_known
+from hsdsl.interface.cli.console import print_json, say
+from hsdsl.interface.cli.options import (
+    Answer,
+    Experiment,
+    Json,
+    Limit,
+    Model,
+    Quiet,
+    Until,
+    answering,
+    check_target,
+    names_of,
+    option,
+)
+
+TO = f"The target: {', '.join(TARGETS)}."
+FOLDER = "The folder for the files; left out, a target with one file of text prints it."
+MODE = "What the number of the mode is in a functional mock-up unit: local, the default, an output, or left out (none)."
+KEEP = "Only these states and outputs, with what they depend on."
+
+
+def export(
+    model: Model,
+    *,
+    to: Annotated[str, option("TARGET", TO, "--to", complete=lambda: list(TARGETS.items()))],
+    out: Annotated[Path | None, option("DIR", FOLDER)] = None,
+    force: Annotated[bool, Option("--force", help="Write into a folder that is not empty.")] = False,
+    experiment: Experiment,
+    outputs: Annotated[str | None, option("A,B", KEEP)] = None,
+    mode: Annotated[Modes | None, Option(metavar="|".join(Modes.__args__), help=MODE)] = None,
+    answer: Answer,
+) -> None:
+    """Export a model with its settings: code for other tools, or a document."""
+    with answer.reporting():
+        from hsdsl.interface.model import load
+
+        check_known(to)
+        if out is not None:
+            check_folder(out, force)
+        settings = experiment.settings()
+        loaded = load(model)
+        check_scheme(loaded, to, settings)
+        source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
+        files = files_of(source, to, mode)
+        if out is None:
+            name, text = only_text(files, to)
+            if answer.json:
+                print_json({"target": to, "name": name, "text": text})
+            else:
+                print(text, end="")
+            return
+        written = write(files, out, force)
+        if answer.json:
+            print_json({"target": to, "files": [str(path) for path in written]})
+        elif not answer.quiet:
+            say(f"wrote {written[0] if len(written) == 1 else f'{len(written)} files below {out}'}")
+
+
+def only_text(files: Mapping[str, bytes], to: str) -> tuple[str, str]:
+    """The name and the text of the only file of a target.
+
+    Raises UsageError: it has several, or one that is no text.
+    """
+    if len(files) > 1:
+        raise UsageError(f"{to} has {len(files)} files: expected --out DIR")
+    ((name, content),) = files.items()
+    try:
+        return name, content.decode()
+    except UnicodeDecodeError:
+        raise UsageError(f"{name} is no text: expected --out DIR") from None
+
+
+FILE = "A model of SpaceEx or SBML (.xml)."
+CFG = "The configuration of a SpaceEx model; left out, the file of the same name that ends in .cfg."
+WRITTEN_TO = "The model's file (.yaml); left out, the model is printed."
+URGENT = "SpaceEx: make a transition as soon as its guard holds, where SpaceEx may wait."
+
+
+def import_(
+    file: Annotated[Path, Argument(metavar="FILE", help=FILE)],
+    cfg: Annotated[Path | None, option("FILE", CFG)] = None,
+    out: Annotated[Path | None, option("FILE", WRITTEN_TO)] = None,
+    force: Annotated[bool, Option("--force", help="Replace a file that is there.")] = False,
+    urgent: Annotated[bool, Option("--urgent", help=URGENT)] = False,
+    until: Until = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    limit: Limit = None,
+) -> None:
+    """Import a model of SpaceEx or SBML: write it as a model that runs, or say what cannot be kept."""
+    with answering(json, None, limit):
+        check_target(out, "--out", (".yaml", ".yml"))
+        if out is not None and out.exists() and not force:
+            raise UsageError(f"--out {out}: the file is there already", "--force replaces it")
+        from hsdsl.base.atomic import replacing
+        from hsdsl.interface.model import loads
+
+        text = _imported(file, cfg, until, urgent)
+        system = loads(text).system
+        if out is None:
+            print(text, end="")
+            return
+        with replacing(out) as target:
+            target.write(text.encode())
+        edges = sum(len(mode.edges) for mode in system.modes)
+        if json:
+            print_json({"file": str(out), "modes": len(system.modes), "transitions": edges})
+        elif not quiet:
+            say(f"wrote {out}: {counted(len(system.modes), 'mode')}, {counted(edges, 'transition')}")
+
+
+def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool) -> str:
+    """The text of the model in a file of one of the formats."""
+    from hsdsl.interface.imports import sbml, spaceex
+    from hsdsl.language.files import read_bytes
+    from hsdsl.language.source.xml import read_xml
+
+    root = read_xml(str(file), read_bytes(file), sbml.DEEPEST)
+    if not sbml.is_sbml(root):
+        return spaceex.imported(file, cfg, until, urgent)
+    if cfg is not None or urgent:
+        raise UsageError(f"{'--cfg' if cfg else '--urgent'} is for models of SpaceEx, and {file} is one of SBML")
+    return sbml.imported(root, until)
+
+
+NOTHING = (
+    "nothing to complete: no reset of a transition to the same mode keeps a state on its guard, and no two modes press "
+    "on one surface"
+)
+
+
+def complete(
+    model: Model,
+    *,
+    out: Annotated[Path | None, option("FILE", "Write it there (.yaml) rather than to standard output.")] = None,
+    answer: Answer,
+) -> None:
+    """Write a model with a mode for each motion along a guard, and for each surface that two modes press on.
+
+    A model that has neither is refused (exit code 2).
+    """
+    with answer.reporting():
+        from hsdsl.base.atomic import replacing
+        from hsdsl.interface.model import load
+
+        check_target(out, "--out", (".yaml", ".yml"))
+        if out is not None and out.exists() and model.exists() and out.samefile(model):
+            raise UsageError(f"--out {out}: this is the model itself", "choose another name")
+        text = load(model).completed()
+        if text is None:
+            raise UsageError(NOTHING)
+        if out is not None:
+            with replacing(out) as file:
+                file.write(text.encode())
+        if answer.json:
+            print_json({"model": str(model)} | ({"text": text} if out is None else {"files": [str(out)]}))
+        elif out is None:
+            print(text, end="")
+        elif not answer.quiet:
+            say(f"wrote {out}")
+
+
+def schema(json: Json = False) -> None:
+    """Print the JSON Schema of the language (draft 7), which is one JSON object as it is."""
+    from json import dumps
+
+    from hsdsl.language.schema.jsonschema import json_schema
+
+    print(dumps(json_schema(), indent=2))

@@ -1,0 +1,168 @@
+"""``hsdsl sensitivity``, ``orbit`` and ``fit``: what derivatives of runs answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from typer import Argument, Exit, Option
+
+from hsdsl.base.errors import UsageError
+from hsdsl.base.numbers.decimals import number_of
+from hsdsl.base.progress import counted_runs
+from hsdsl.interface.cli.console import draw, progress
+from hsdsl.interface.cli.options import AS_RUN, WRT, Answer, Located, Model, Until, check_target, option, overriding
+
+if TYPE_CHECKING:
+    from hsdsl.analysis.orbits.sampling import OrbitalStability
+
+
+AT = "Only the derivatives of the end, of transition times, or of states and outputs at the run's samples."
+STABILITY = "Run from nearby as well, and tell whether the execution is orbitally stable, as far as was sampled."
+At = Literal["final", "transitions", "outputs"]
+
+
+def sensitivity(
+    model: Model,
+    *,
+    wrt: Annotated[str, option("A,B", WRT)],
+    part: Annotated[At | None, option("final|transitions|outputs", AT, "--at")] = None,
+    overrides: Annotated[list[str] | None, overriding(AS_RUN)] = None,
+    until: Until = None,
+    located: Located,
+    precision: Annotated[int | None, option("DIGITS", "Compute with this many decimal digits (mpmath).")] = None,
+    stability: Annotated[bool, Option("--stability", help=STABILITY)] = False,
+    plot: Annotated[Path | None, option("FILE", "Draw the distances of --stability: .png or .svg.")] = None,
+    answer: Answer,
+) -> None:
+    """Differentiate a run by parameters and initial states, through its jumps."""
+    with answer.reporting():
+        check_target(plot, "--plot")
+        if plot is not None and not stability:
+            raise UsageError("--plot draws the distances of runs from nearby", "add --stability")
+        from hsdsl.analysis.sensitivity.result import ALWAYS, as_json, summary
+        from hsdsl.interface.model import load
+
+        call = located.settings(overrides, until=until, precision=precision)
+        loaded = load(model)
+        found = loaded.sensitivity(wrt, **call)
+        parts = (part,) if part else ALWAYS
+        nearby = _nearby(loaded, wrt, call, answer.hidden) if stability else None
+        if nearby is not None:
+            draw(nearby, plot)
+        answer.give(
+            lambda: as_json(found, parts) | ({"orbital_stability": nearby.as_json()} if nearby else {}),
+            lambda: summary(found, parts) + (f"\n\n{nearby.sentence}" if nearby else ""),
+        )
+
+
+def _nearby(model: Any, wrt: str, call: dict[str, Any], hidden: bool) -> OrbitalStability:
+    del call["precision"]
+    with progress(hidden) as show:
+
+        def tell(done: int, total: int) -> None:
+            if show:
+                show(lambda: f"{done} of {total} runs from nearby")
+
+        return model.orbital_stability(wrt, progress=tell, **call)
+
+
+SECTION = "The transition that the orbit is cut at, by its name."
+LAPS = "How many transitions of the section close the orbit."
+FOLLOW = "Follow the orbit in a parameter from A to B, and mark folds, flips and grazing."
+PERIOD = "The period of the forcing, an expression of parameters; left out, that of sines and cosines of t."
+
+
+def orbit(
+    model: Model,
+    *,
+    section: Annotated[str, option("EDGE", SECTION)],
+    laps: Annotated[int, option("N", LAPS)] = 1,
+    period: Annotated[str | None, option("T", PERIOD)] = None,
+    follow: Annotated[str | None, option("PARAM=A:B", FOLLOW, "--continue")] = None,
+    overrides: Annotated[list[str] | None, overriding(AS_RUN)] = None,
+    until: Annotated[str | None, option("T", "End of the run that the first guess is from.")] = None,
+    located: Located,
+    plot: Annotated[Path | None, option("FILE", "Draw it: .png or .svg.")] = None,
+    answer: Answer,
+) -> None:
+    """Find a periodic orbit near the model's run, with its Floquet multipliers."""
+    with answer.reporting():
+        check_target(plot, "--plot")
+        from hsdsl.interface.model import load
+
+        call = located.settings(overrides, until=until, laps=laps, period=period)
+        loaded = load(model)
+        with progress(answer.hidden) as show:
+            if follow is None:
+                found = loaded.orbit(section, progress=counted_runs(show), **call)
+            else:
+                name, *ends = _range(follow)
+                found = loaded.continuation(section, name, *ends, progress=counted_runs(show, name), **call)
+        draw(found, plot)
+        answer.give(found.as_json, lambda: found.summary)
+
+
+def _range(text: str) -> tuple[str, str, str]:
+    """Read PARAM=A:B."""
+    name, equals, rest = text.partition("=")
+    start, colon, end = rest.partition(":")
+    if not (name.strip() and equals and start.strip() and colon and end.strip()):
+        raise UsageError(f"--continue: expected PARAM=A:B, got '{text}'", "for example --continue c=0.5:0.9")
+    return name.strip(), start.strip(), end.strip()
+
+
+SET_OF_FITS = (
+    "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first value."
+)
+SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
+WEIGHT = "The weight of a column; left out, one over its largest size. May be repeated."
+Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file: t or time, and states and outputs.")]
+
+
+def fit(
+    model: Model,
+    data: Data,
+    *,
+    wrt: Annotated[str, option("A,B", WRT)],
+    sigma: Annotated[list[str] | None, option("NAME=S", SIGMA, "--sigma")] = None,
+    weight: Annotated[list[str] | None, option("NAME=W", WEIGHT, "--weight")] = None,
+    overrides: Annotated[list[str] | None, overriding(SET_OF_FITS)] = None,
+    located: Located,
+    plot: Annotated[Path | None, option("FILE", "Draw measurements and run: .png or .svg.")] = None,
+    answer: Answer,
+) -> None:
+    """Fit parameters and initial states to measurements."""
+    with answer.reporting():
+        check_target(plot, "--plot")
+        from hsdsl.interface.model import load
+
+        with progress(answer.hidden) as show:
+            watch = show and partial(_show_fit, show)
+            columns = {"sigma": _by_column("--sigma", sigma), "weights": _by_column("--weight", weight)}
+            found = load(model).fit(data, wrt, progress=watch, **columns, **located.settings(overrides))
+        draw(found, plot)
+        answer.give(found.as_json, lambda: found.summary)
+    if not found.success:
+        raise Exit(3)
+
+
+def _show_fit(show: Any, runs: int, values: Mapping[str, float], total: float) -> None:
+    listed = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
+    show(lambda: f"{runs} runs, sum of squares {total:.4g}, {listed}")
+
+
+def _by_column(name: str, pairs: list[str] | None) -> dict[str, float] | float | None:
+    """Read NAME=NUMBER, or the number of the only column."""
+    found: dict[str, float] = {}
+    for pair in pairs or ():
+        if len(pairs or ()) == 1 and (alone := number_of(pair)) is not None:
+            return alone
+        column, equals, value = (part.strip() for part in pair.partition("="))
+        number = number_of(value)
+        if not equals or not column or number is None:
+            raise UsageError(f"{name}: expected NAME=NUMBER, got '{pair}'", f"for example {name} x=0.1")
+        found[column] = number
+    return found or None
