@@ -159,8 +159,8 @@ def feed_expression(text: str, rng: Random, share: float) -> str:
                 if expected == "number":
                     found = [symbolic.number(tree, SCOPE, text).expr]
                 elif expected == "inequality":
-                    both = inequality(tree, SCOPE, text, "when")
-                    found = [both.left.expr, both.right.expr]
+                    left, _, right = inequality(tree, SCOPE, text, "when")
+                    found = [left.expr, right.expr]
                 else:
                     symbolic.condition(tree, SCOPE, text)
                     continue

@@ -10,6 +10,7 @@ from hsdsl.analysis.lint.finding import Alike, Finding, Severity
 from hsdsl.analysis.lint.source_expressions import SourceExpression
 from hsdsl.analysis.lint.subject import EdgePart, ModePart, Subject
 from hsdsl.base.names import shown
+from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.source import Scalar
 from hsdsl.language.system import Mode, Surface
@@ -25,7 +26,6 @@ from hsdsl.mathematics.decisions.singularities import (
     pieces,
     without_value,
 )
-from hsdsl.mathematics.lower.straight import text_of
 
 _END = "end the domain before, with a guard or a wall"
 _NAMES = {"flow": "the flow of '{}'", "reset": "the reset of '{}'", "when": "this surface", "domain": "this wall"}
