@@ -96,7 +96,7 @@ def calls(path: Path) -> set[str]:
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_no_text_is_evaluated(path):
     # Generated text is executed in these places, over numbered names only.
-    places = ("backends/text.py", "backends/taylor.py", "integrators/stepper.py")
+    places = ("backends/python.py", "backends/taylor.py", "integrators/stepper.py")
     allowed = {"exec"} if any(map(path.match, places)) else set()
     assert calls(path) & {"eval", "exec", "parse_expr", "safe_load", "unsafe_load"} <= allowed
 
