@@ -116,7 +116,7 @@ typedef struct {
   hs_real *real, *re, *im;          /* factors of the real matrix and of the complex one */
   int *order, *turned;             /* the order of their rows */
   hs_real *scratch[2];             /* of sparse systems */
-  hs_real *linked, *spread[4];     /* of variations: see blocks.c */
+  hs_real *linked, *spread[4];     /* of variations: see linear.c */
   hs_real *lasting;                /* of variations: which share of an error of a derivative lasts */
   hs_real *z[3], *last[3];          /* increments: as they are now, and of the last step */
   hs_real *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
@@ -207,7 +207,7 @@ typedef struct {
   /* scale: the sizes of the numbers that the state was computed from on entry, negative where the terms of a reset gave
      them: the next reset reads no more than the value of such a state, and no size multiplies */
   hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
-  hs_real *resolved, *least, *unmoved, *near, *nearby; /* see scales.c */
+  hs_real *resolved, *least, *unmoved, *near, *nearby; /* see stepper.c */
   int *lifted;
   hs_real *flow_sizes, *jacobian; /* see contact.c; jacobian: model->derivatives */
   hs_real *held_p; /* in contact: what routines are bound to, model->data and then model->contacts numbers */
@@ -262,7 +262,7 @@ typedef struct {
   int64_t contracted; /* behind how many transitions contraction() was last asked; what it found */
   hs_real flight, flight_ratio;
   int contracts;
-  hs_time pause; /* see pause.c: when to pause, and whether to do so behind a transition */
+  hs_time pause; /* see hs.c: when to pause, and whether to do so behind a transition */
   int after_jump;
   int64_t jumps_before;
 } hs_run;
