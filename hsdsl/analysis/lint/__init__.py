@@ -1,11 +1,10 @@
 """Findings in legal models: probable mistakes (warnings), and remarks (notes).
 
-`lint` reads a model, lets every rule of `lint.rules` in the `selection` look at it as a `subject`, and sorts out
-what comments in the file ask to ignore (`ignores`). A rule gives `finding`s, which `fix` remedies by `edits`.
+`lint` reads a model, applies every rule of `rules` in the `selection` to it as a `subject`, and leaves out what
+comments in the file ask to ignore. A rule gives a `finding`, which `fix` corrects in the file.
 
-Rules decide by `analysis` for all states and by `numbers` at one, read `source_expressions` as they are written, and
-ask `dependencies` and `units`. In a system of parts they look at each of its `automata`; `parts` has what is found
-besides.
+Rules decide by `hsdsl.mathematics.decisions` for all states and by `Subject.numbers` at one. They read
+`source_expressions` as they are written, and `units`. In a system of parts `parts` applies them to each automaton.
 """
 
 from __future__ import annotations

@@ -2,8 +2,5 @@
 
 `targets` reads what is differentiated by, `overrides` puts the overrides of a run into the mathematics, `augment`
 writes the system with its variational equations and saltation matrices as an ordinary hybrid system, and `result` reads
-the derivatives off an execution of it; `summary` has them as text and JSON.
-
-`augment` builds on `dependence` (which derivatives are not zero), `derivatives` (total ones of initial values and
-inputs), `chain` (the chain rule) and `state_names`. `ties`, `landing` and `touching` find where no derivative exists.
+the derivatives off an execution of it, also as text and JSON. `ties` finds where no derivative exists.
 """

@@ -1,7 +1,6 @@
-"""Many runs of one model at once: their results as arrays.
+"""Many runs of one model at once: their results as arrays, and as pandas DataFrames.
 
-MERGE: write one docstring of these.
-`frames` was: Tables of an ensemble as pandas DataFrames: a row for each run, each sample, or each transition.
+A DataFrame has a row for each run, each sample, or each transition.
 """
 
 from __future__ import annotations

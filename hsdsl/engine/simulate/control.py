@@ -18,11 +18,8 @@ A state that has been zero so far has no scale. It is held against its own value
 a power of time that is above the method's order, no step is short enough for that: over the least step a state that has
 been no more than the tolerance times what it is then does not count.
 
-MERGE: write one docstring of these.
-`scales` was: The scales of states along a run: what errors are held against, and what counts as moving.
-
-See `hsdsl.engine.integrators.stepper`. What a flow is computed from is looked at only where a step would be rejected
-for the second time.
+The scales of states grow along a run (`hsdsl.engine.integrators.stepper`). The terms that a flow is computed from are
+evaluated only where a step would be rejected for the second time.
 """
 
 from __future__ import annotations
