@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any, Self
 
 from hsdsl.base.errors import UsageError
@@ -43,6 +44,9 @@ def elsewhere(model: Runs, name: str) -> str | None:
     if name in model.program.all_states:
         return f"it is a state: initial={{'{name}': ...}}"
     return ELSEWHERE.get(name)
+
+
+_GIVEN = itemgetter(*ARGUMENTS)  # of the arguments of `Runs.simulate`, where these are declared once
 
 
 @partial(checks_methods, elsewhere=elsewhere, name="Model")
@@ -151,11 +155,11 @@ class Runs:
 
         Raises UsageError: a name, value or combination is not valid.
         """
-        given = locals()
-        call = {name: given[name] for name in ARGUMENTS}
+        arguments = _GIVEN(locals())
+        call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
         if outputs is not None:
             return self._reduced_run(outputs, call, watch)
-        key = call_key(*call.values())
+        key = call_key(*arguments)
         ready = self._prepared.find(key)
         with in_notebook() as show:
             watch = watch or (show and partial(running, show))
