@@ -58,6 +58,8 @@ LACKS = """\
 # - The located scheme, 2 and 3: a step is looked at in nine points, its ends and seven between. Of two crossings of a
 #   surface within an eighth of a step both may be missed, and nothing says so: compare with a shorter step.
 # - The located scheme, 4: a guard beyond which the flow has no value fires where no step is short enough.
+# - The located scheme, tails: edges that take turns, as the two feet of a rocking block do, are not taken to their
+#   limit. Such a run goes on until flights are no longer than round-off (`zeno`), or ends with `transition_limit`.
 # - The step: the pace of a run is not looked at. One that creeps ends with `steps`, after ten million rounds, as may
 #   one that goes to and fro where the flow jumps.
 # - M5: a chain of entries is held against its last sixteen states. One that returns later ends with `transition_limit`.
