@@ -22,7 +22,7 @@ MOST_UNKNOWN = 0.03
 def errors_of(run: hsdsl.Execution, found: str) -> Errors:
     """What its verdict has held margins against: a shadow run, or else a finer one."""
     compiled: Any = run.compiled
-    view = RunView(compiled.under_way.plan.problem, run, by_shadow=found == "holds" and "finer" not in run.__dict__)
+    view = RunView(compiled.plan.problem, run, by_shadow=found == "holds" and "finer" not in run.__dict__)
     assert view.errors is not None
     return view.errors
 

@@ -163,7 +163,7 @@ def test_of_a_clear_run_nothing_is_undecided() -> None:
 
 def test_a_far_turning_point_is_the_nearest_miss() -> None:
     run = run_of(model("cos(t)", "0", "x >= 2"), "taylor", 1e-9)
-    modes = run.compiled.under_way.plan.problem.program.modes
+    modes = run.compiled.plan.problem.program.modes
     (sentence,) = screen_of(run).margins.nearest_miss(modes)
     assert "t = 1.570796327" in sentence
     assert "more than a million times" in sentence
@@ -192,5 +192,5 @@ def test_reasons_that_are_read_later_are_those_of_their_run() -> None:
     verdicts = [run.verdict for run in runs]
     assert all("reasons" not in vars(found) for found in verdicts)
     for run, found in zip(runs, verdicts, strict=True):
-        fresh = assess(RunView(run.compiled.under_way.plan.problem, run), Diagnostics())
+        fresh = assess(RunView(run.compiled.plan.problem, run), Diagnostics())
         assert pickle.loads(pickle.dumps(found)) == found == fresh

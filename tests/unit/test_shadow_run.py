@@ -61,7 +61,7 @@ experiment: {{until: {until}, scheme: located, method: {method}}}
 
 
 def view(run: Any, **options: Any) -> RunView:
-    return RunView(run.compiled.under_way.plan.problem, run, **options)
+    return RunView(run.compiled.plan.problem, run, **options)
 
 
 def stiff(name: str) -> Any:

@@ -34,13 +34,7 @@ class Deferred:
         Fields in ``later`` must have no default; nothing is checked. ``known`` is what many have in common.
         """
         made = object.__new__(cls)
-        made.__dict__.update({**known, **now} if known else now, _later=later)
-        return made
-
-    def attached(self, **now: Any) -> Self:
-        """Make the same one, with other values of fields that no other field follows from."""
-        made = object.__new__(type(self))
-        made.__dict__.update(self.__dict__, **now)
+        object.__setattr__(made, "__dict__", {**known, **now, "_later": later})
         return made
 
     def _elsewhere(self, name: str) -> str:
@@ -60,8 +54,8 @@ class Deferred:
     def __dir__(self) -> list[str]:
         """List the public names: fields, computed or deferred, properties and methods."""
         own = {field.name for field in fields(self)}  # pyright: ignore[reportArgumentType]
-        hidden = ("attached", "deferred")
-        return sorted(name for name in own.union(dir(type(self))) if not name.startswith("_") and name not in hidden)
+        names = own.union(dir(type(self))) - {"deferred"}
+        return sorted(name for name in names if not name.startswith("_"))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return every field; the functions that compute deferred fields are not pickled."""

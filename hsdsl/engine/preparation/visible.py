@@ -42,6 +42,7 @@ def visible_run(run: Execution, prepared: Prepared) -> Execution:
     }
     return Execution.deferred(
         later,
+        prepared.links,
         **{name: getattr(run, name) for name in _AS_THEY_ARE},
         stop=view.stop,
         output_function=None if run.output_function is None else view.output_values,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property, partial
 from types import MappingProxyType
 from typing import Any
@@ -61,7 +60,7 @@ class CompiledPlan:
         self.sampled = Sampled(runtime(), compiled, self.timeline)
         self._mode, self._x = problem.mode, np.array(problem.x, np.float64)
         self._start = len(problem.x), self._x.ctypes.data
-        self.until, self.memory = settings.until, settings.memory
+        self.until, self.memory, self.queued = settings.until, settings.memory, bool(program.queues)
         self.of_screens: dict[bool, Any] = {}  # those of its runs, by whether they are held against shadow runs
         self._formulas = compiled.shared("formulas", partial(_tables, program)) if settings.moves else None
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
@@ -133,26 +132,26 @@ class _Timeline:
         self.pointer = structures.address(ctypes.pointer(table))
 
 
-@dataclass
 class CompiledRun:
-    """One run of the compiled loop at a workspace, to be looked at while it is under way.
+    """One run of the compiled loop at a workspace, to be looked at while it is under way, and what it has written.
 
     A workspace that another run works at afterwards tells of that one.
     """
 
-    plan: CompiledPlan
-    workspace: Workspace
-    review: Review | None = None
-    waits: Mapping[str, Number] = field(default_factory=lambda: NOTHING)  # at its end, as states
-    _columns: Columns | None = None
+    columns: Columns | None = None  # once it is over
+    waits: Mapping[str, Number] = NOTHING  # at its end, as states
+    _counted: tuple[int, int] | None = None
     _accumulated: Stop | None = None
+
+    def __init__(self, plan: CompiledPlan, workspace: Workspace, review: Review | None = None) -> None:
+        self.plan, self.workspace, self.review = plan, workspace, review
 
     @cached_property
     def diagnostics(self) -> Diagnostics:
         """What the run has noted; most runs note nothing."""
         diagnostics = Diagnostics()
-        if self._columns is not None and self._columns.notes:
-            self._note(self._columns["note"], diagnostics)
+        if self.columns is not None and self.columns.notes:
+            self._note(self.columns["note"], diagnostics)
         return diagnostics
 
     @property
@@ -168,18 +167,24 @@ class CompiledRun:
     @property
     def made(self) -> int:
         """How many transitions were made."""
-        return self.workspace.task.made
+        return self._counts[0]
 
     @property
-    def entries(self) -> int:
-        """How many of them on entry."""
-        return self.workspace.task.entries
+    def enters_beyond(self) -> bool:
+        """Whether one fired on entry."""
+        return self._counts[1] > 0
 
-    def follow(self) -> tuple[Stop, Columns]:
-        """Run to the end: why it stopped, and the columns that were written."""
+    @property
+    def _counts(self) -> tuple[int, int]:
+        task = self.workspace.task
+        return self._counted or (task.made, task.entries)
+
+    def follow(self) -> Stop:
+        """Run to the end: why it stopped."""
         self._run()
-        self._columns = self.workspace.chunks.whole(self.workspace.pack, self.plan.layouts)
-        return self._stop(), self._columns
+        self._counted = self._counts
+        self.columns = self.workspace.chunks.whole(self.workspace.pack, self.plan.layouts)
+        return self._stop()
 
     def stream(self, sink: Sink) -> tuple[Stop, dict[str, Array]]:
         """Run to the end, handing over every chunk as soon as it is full: why it stopped, and the last chunk."""
@@ -200,7 +205,7 @@ class CompiledRun:
             self.workspace.simulate()
         if self.workspace.failed:
             raise self.workspace.failed[0]
-        if self.plan.problem.program.queues:
+        if self.plan.queued:
             program = self.plan.problem.program
             sizes = {queue.name: len(queue.values) for mode in program.modes for queue in mode.queues}
             self.waits = Tails(self.workspace.waits(program.queues, sizes)).states(program.modes)

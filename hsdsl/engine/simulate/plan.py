@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any
@@ -56,9 +56,13 @@ Streamed = tuple[Stop, CompiledRun, dict[str, Array]]
 
 @dataclass(frozen=True, eq=False)
 class Prepared(Problem):
-    """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it."""
+    """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it.
+
+    ``links`` are the fields of its executions by which these answer what takes more than their numbers.
+    """
 
     plan: CompiledPlan | None
+    links: dict[str, Any] = field(default_factory=dict[str, Any])
     finer: dict[int, Prepared] = field(default_factory=dict[int, "Prepared"])  # by the rows of the run
 
     def simulate(self, watch: Watch | None = None, seconds: Mapping[str, float] = MappingProxyType({})) -> Execution:
@@ -98,17 +102,19 @@ class Prepared(Problem):
         rows = len(execution.times)  # fewer where a run was interrupted
         if rows not in self.finer:
             settings = finer_settings(self.settings, execution, self.arithmetic)
-            self.finer[rows] = prepare(self.moved_with(settings), self.plan and self.plan.compiled)
+            self.finer[rows] = self._prepared(self.moved_with(settings))
         return self.finer[rows].simulate()
 
     def prepared_with(self, settings: Settings) -> Prepared:
         """Prepare the same problem with other settings."""
-        return prepare(self.with_settings(settings), self.plan and self.plan.compiled)
+        return self._prepared(self.with_settings(settings))
+
+    def _prepared(self, problem: Problem) -> Prepared:
+        return replace(prepare(problem, self.plan and self.plan.compiled), links=self.links)
 
     @cached_property
     def _about(self) -> dict[str, Any]:
-        assert self.plan is not None
-        return about(self.plan.problem, "c")
+        return {**about(self, "python" if self.plan is None else "c"), **self.links}
 
     def _run(self, review: Review | None, watch: Watch | None, spent: dict[str, float]) -> Execution:
         if self.plan is not None:
@@ -148,7 +154,7 @@ class Prepared(Problem):
         except OutOfRoom:
             stop = memory(self.settings.memory, run.recorder.now)
         spent["simulate"] = time.perf_counter() - began
-        return from_recorder(run, stop, spent, self.again)
+        return from_recorder(self._about, run, stop, spent, self.again)
 
     def _by_compiled_loop(
         self, plan: CompiledPlan, review: Review | None, watch: Watch | None, spent: dict[str, float]
@@ -157,11 +163,11 @@ class Prepared(Problem):
         if watch is not None:
             watch(under_way)
         began = time.perf_counter()
-        stop, whole = under_way.follow()
+        stop = under_way.follow()
         spent["simulate"] = time.perf_counter() - began
         if watch is None:  # else someone may look at the workspace for longer than the run lasts
             plan.workspaces.leave(under_way.workspace)
-        return written(self._about, under_way, whole, stop, spent, self.again)
+        return written(self._about, under_way, stop, spent, self.again)
 
 
 def prepare(problem: Problem, code: CompiledModel | None = None) -> Prepared:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from functools import cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -25,12 +25,14 @@ Repetition = Callable[[Execution], Execution]
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 
 
-def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Repetition) -> Execution:
+def from_recorder(
+    known: dict[str, Any], run: Run, stop: Stop, seconds: dict[str, float], again: Repetition
+) -> Execution:
     """Make the execution of what the Python loop has recorded; ``again`` makes the run finer."""
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
         {"verdict": _verdict},
-        about(run, "python"),
+        known,
         stop=stop,
         seconds=seconds,
         assessment=partial(_assessment, run, lambda: run.diagnostics),
@@ -46,18 +48,14 @@ def from_recorder(run: Run, stop: Stop, seconds: dict[str, float], again: Repeti
 
 
 def written(
-    known: dict[str, Any],
-    under_way: CompiledRun,
-    columns: Columns,
-    stop: Stop,
-    seconds: dict[str, float],
-    again: Repetition,
+    known: dict[str, Any], run: CompiledRun, stop: Stop, seconds: dict[str, float], again: Repetition
 ) -> Execution:
     """Make the execution of what the compiled loop has written, ``known`` being what all such runs have in common.
 
     Arrays and objects are made on first use: for a short run they would take longer than the run.
     """
-    plan = under_way.plan
+    plan, columns = run.plan, run.columns
+    assert columns is not None
     layouts, found = plan.layouts, None
     if layouts.one:
         states = layouts.kinds[0]
@@ -69,26 +67,11 @@ def written(
         stop=stop,
         seconds=seconds,
         states=states,
-        assessment=partial(_assessment_of, under_way),
+        assessment=partial(_assessment_of, run),
         repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
-        compiled=_Written(under_way, columns, under_way.made, under_way.entries, under_way.waits),
+        compiled=run,
     )
-
-
-class _Written(NamedTuple):
-    """What the compiled loop wrote: a `CompiledRecord`."""
-
-    under_way: CompiledRun
-    columns: Columns
-    made: int
-    entries: int
-    waits: Mapping[str, Number]
-
-    @property
-    def enters_beyond(self) -> bool:
-        """Whether one fired on entry."""
-        return self.entries > 0
 
 
 def _assessment_of(
@@ -107,35 +90,40 @@ def _of_compiled() -> Callable[..., Verdict]:
 
 
 def _column(name: str) -> Callable[[Execution], Any]:
-    return lambda execution: _of(execution).columns[name]
+    return lambda execution: _columns(execution)[name]
 
 
-def _of(execution: Execution) -> _Written:
-    assert isinstance(execution.compiled, _Written)
+def _of(execution: Execution) -> CompiledRun:
+    assert isinstance(execution.compiled, CompiledRun)
     return execution.compiled
 
 
+def _columns(execution: Execution) -> Columns:
+    columns = _of(execution).columns
+    assert columns is not None
+    return columns
+
+
 def _settings(execution: Execution) -> dict[str, Any]:
-    problem = _of(execution).under_way.plan.problem
+    problem = _of(execution).plan.problem
     return described(problem.settings, problem.program.left_out)
 
 
 def _transitions(execution: Execution) -> tuple[Transition, ...]:
-    of = _of(execution)
-    return tuple(transitions_of(of.columns, of.under_way.plan.problem.program))
+    return tuple(transitions_of(_columns(execution), _of(execution).plan.problem.program))
 
 
 def _arcs(execution: Execution) -> tuple[Arc, ...]:
-    of = _of(execution)
-    arcs = tuple(arcs_of(of.columns, of.under_way.plan.problem.program, of.under_way.plan.layouts))
+    plan = _of(execution).plan
+    arcs = tuple(arcs_of(_columns(execution), plan.problem.program, plan.layouts))
     execution.__dict__["arcs"] = arcs
     execution.check()
     return arcs
 
 
 def _last_arc(execution: Execution) -> Arc:
-    of = _of(execution)
-    return last_arc(of.columns, of.under_way.plan.problem.program, of.under_way.plan.layouts)
+    plan = _of(execution).plan
+    return last_arc(_columns(execution), plan.problem.program, plan.layouts)
 
 
 def _verdict(execution: Execution) -> Verdict:
@@ -152,7 +140,7 @@ _LATER: dict[str, Callable[[Execution], Any]] = {
     "transitions": _transitions,
     "arcs": _arcs,
     "final": lambda execution: _final(
-        _last_arc(execution), _of(execution).columns, execution.output_names, _of(execution).waits
+        _last_arc(execution), _columns(execution), execution.output_names, _of(execution).waits
     ),
     "verdict": _verdict,
 }

@@ -53,14 +53,15 @@ class Workspace:
 
     def clear(self, rows: float, memory: int, review: Review | None = None) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
-        for tail in self.tails if self._queued else ():
-            tail.first = tail.count = 0
+        if self._queued:
+            for tail in self.tails:
+                tail.first = tail.count = 0
         self.pressed = False
-        self.failed.clear()
+        if self.failed:
+            self.failed = []
         self.chunks.clear(rows, memory, review)
         if len(self._visited) > 1:  # a large set takes long to forget
             self._visited = [grown(self.task.visited, VISITED, self._width)]
-        self.task.now, self.task.made = 0.0, 0
 
     def move_by(self, formulas: Any) -> None:
         """Let round-off move runs by these `FormulaTables`; by none where that is None."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
-from operator import itemgetter
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, cast
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_methods, did_you_mean
@@ -13,7 +13,7 @@ from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.progress import in_notebook, running
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation import automatic
-from hsdsl.engine.preparation.options import ARGUMENTS, Options, overrides_of
+from hsdsl.engine.preparation.options import Options, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.preparation.visible import visible_run
@@ -44,9 +44,6 @@ def elsewhere(model: Runs, name: str) -> str | None:
     if name in model.program.all_states:
         return f"it is a state: initial={{'{name}': ...}}"
     return ELSEWHERE.get(name)
-
-
-_GIVEN = itemgetter(*ARGUMENTS)  # of the arguments of `Runs.simulate`, where these are declared once
 
 
 @partial(checks_methods, elsewhere=elsewhere, name="Model")
@@ -155,21 +152,28 @@ class Runs:
 
         Raises UsageError: a name, value or combination is not valid.
         """
-        arguments = _GIVEN(locals())
-        call: dict[str, Any] = dict(zip(ARGUMENTS, arguments, strict=True))
+        call = locals()  # the arguments, declared once
+        del call["self"], call["outputs"], call["watch"]
         if outputs is not None:
             return self._reduced_run(outputs, call, watch)
-        key = call_key(*arguments)
+        key = call_key(*call.values())
         ready = self._prepared.find(key)
         with in_notebook() as show:
             watch = watch or (show and partial(running, show))
             if ready is not None:
                 run = ready.simulate(watch, self.pipeline.seconds)
             else:
-                ready, run = automatic.run(self.pipeline.prepare(call), watch, self.pipeline.seconds)
+                ready, run = automatic.run(self._linked(call), watch, self.pipeline.seconds)
                 self._prepared.keep(key, ready)
-        run = visible_run(run, ready)
-        return run.attached(differentiation=partial(self._differentiate, call), look=partial(self.look, parameters))
+        return visible_run(run, ready)
+
+    def _linked(self, call: Mapping[str, Any]) -> Prepared:
+        """Prepare runs that know their derivatives and look; mappings are copied, since callers may change them."""
+        call = {name: dict(cast("Any", a)) if isinstance(a, Mapping) else a for name, a in call.items()}
+        look = partial(self.look, call["parameters"])
+        return replace(
+            self.pipeline.prepare(call), links={"differentiation": partial(self._differentiate, call), "look": look}
+        )
 
     def _differentiate(self, call: dict[str, Any], wrt: str | Sequence[str]) -> Sensitivity:
         return self._sliding_for(call)._differentiator.of_run(call, wrt)

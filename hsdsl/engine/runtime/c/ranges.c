@@ -33,18 +33,24 @@ HS_INLINE hs_range outwards(double low, double high, double units) {
   return found;
 }
 
-
-/* A sum that is zero is exact. */
-HS_INLINE hs_range range_sum(double low, double high) {
-  hs_range found = outwards(low, high, 0x1p-52);
+/* The same of values that are exact where they are zero, as sums are and functions with one zero. It saves time, too:
+   numbers below the least normal one take a hundred times as long as others. */
+HS_INLINE hs_range with_exact_zeros(double low, double high, double units) {
+  hs_range found = outwards(low, high, units);
   if (low == 0.0) found.low = 0.0;
   if (high == 0.0) found.high = 0.0;
   return found;
 }
 
+HS_INLINE hs_range range_sum(double low, double high) { return with_exact_zeros(low, high, 0x1p-52); }
+
+HS_INLINE int is_zero(hs_range a) { return a.low == 0.0 && a.high == 0.0; }
+
 HS_INLINE hs_range range_product(hs_range a, hs_range b) {
   const double p = a.low * b.low, q = a.low * b.high, r = a.high * b.low, s = a.high * b.high;
   if (p != p || q != q || r != r || s != s) return everything;
+  if (is_zero(a)) return a;
+  if (is_zero(b)) return b;
   hs_range found = outwards(hs_min(hs_min(p, q), hs_min(r, s)), hs_max(hs_max(p, q), hs_max(r, s)), 0x1p-52);
   if (found.low < 0.0 && ((a.low >= 0.0 && b.low >= 0.0) || (a.high <= 0.0 && b.high <= 0.0))) found.low = 0.0;
   return found;
@@ -80,7 +86,7 @@ static hs_range range_sine(hs_range a, double quarter) {
   double low = a.low * turn - less, high = a.high * turn - less;
   low -= ANGLE * (1 + fabs(low)), high += ANGLE * (1 + fabs(high));
   const double p = quarter == 0.0 ? sin(a.low) : cos(a.low), q = quarter == 0.0 ? sin(a.high) : cos(a.high);
-  hs_range found = outwards(hs_min(p, q), hs_max(p, q), LIBRARY);
+  hs_range found = with_exact_zeros(hs_min(p, q), hs_max(p, q), LIBRARY);
   if (!(floor(high + 0.5) < ceil(low + 0.5)) || !(found.low > -1.0)) found.low = -1.0;
   if (!(floor(high) < ceil(low)) || !(found.high < 1.0)) found.high = 1.0;
   return found;
@@ -103,18 +109,16 @@ HS_INLINE hs_range range_of(const hs_operation *o, hs_range a, hs_range b) {
   case HS_MAX: found.low = hs_max(a.low, b.low), found.high = hs_max(a.high, b.high); return found;
   case HS_SQRT:
     if (!(a.low >= 0.0)) return everything;
-    found = outwards(sqrt(a.low), sqrt(a.high), LIBRARY);
-    if (found.low < 0.0) found.low = 0.0;
-    return found;
+    return with_exact_zeros(sqrt(a.low), sqrt(a.high), LIBRARY);
   case HS_EXP:
     found = outwards(exp(a.low), exp(a.high), LIBRARY);
     if (found.low < 0.0) found.low = 0.0;
     return found;
-  case HS_LOG: return a.low > 0.0 ? outwards(log(a.low), log(a.high), LIBRARY) : everything;
+  case HS_LOG: return a.low > 0.0 ? with_exact_zeros(log(a.low), log(a.high), LIBRARY) : everything;
   case HS_SIN: return range_sine(a, 0.0);
   case HS_COS: return range_sine(a, 1.0);
-  case HS_TANH: return outwards(tanh(a.low), tanh(a.high), LIBRARY);
-  case HS_ATAN: return outwards(atan(a.low), atan(a.high), LIBRARY);
+  case HS_TANH: return with_exact_zeros(tanh(a.low), tanh(a.high), LIBRARY);
+  case HS_ATAN: return with_exact_zeros(atan(a.low), atan(a.high), LIBRARY);
   case HS_SIGN: found.low = sign_of(a.low), found.high = sign_of(a.high); return found;
   case HS_FLOOR: found.low = floor(a.low), found.high = floor(a.high); return found;
   default: return everything;

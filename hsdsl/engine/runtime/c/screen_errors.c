@@ -101,10 +101,10 @@ static int round_off_at(hs_view *v, int64_t row, const double *before) {
   const hs_record *const run = &v->s->run;
   const double span = run->times[run->rows - 1] - run->times[0], unit = ERROR_UNITS * HS_UNIT;
   const double t = run->times[row], *x = recorded_row(run, row);
-  v->range[0] = outwards(t - unit * fabs(t), t + unit * fabs(t), 0x1p-52);
+  v->range[0] = range_sum(t - unit * fabs(t), t + unit * fabs(t));
   for (int i = 0; i < v->n; i++) {
     const double wide = unit * fabs(x[i]) + before[v->table->state[i]];
-    v->range[1 + i] = outwards(x[i] - wide, x[i] + wide, 0x1p-52);
+    v->range[1 + i] = range_sum(x[i] - wide, x[i] + wide);
   }
   range_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->range);
   for (int i = 0; i < v->n; i++) {

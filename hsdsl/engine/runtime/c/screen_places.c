@@ -223,10 +223,10 @@ static int reset_jumps(hs_view *v, const hs_transition *made, const double *x) {
   const int w = v->s->model->width, results = v->f->curved[made->edge] < w ? v->f->curved[made->edge] : w;
   double *const narrow = v->y;
   for (int times = 1; times <= WIDER && results; times += WIDER - 1) {
-    v->range[0] = outwards(made->time - times * late, made->time + times * late, 0x1p-52);
+    v->range[0] = range_sum(made->time - times * late, made->time + times * late);
     for (int i = 0; i < v->n; i++) {
       const double wide = times * SAFE * v->mode_error[i];
-      v->range[1 + i] = outwards(x[i] - wide, x[i] + wide, 0x1p-52);
+      v->range[1 + i] = range_sum(x[i] - wide, x[i] + wide);
     }
     range_operations(v->f, reset->first, reset->last, first_register(v), v->range);
     for (int i = 0; i < results; i++) {

@@ -108,9 +108,9 @@ static void note_near_miss(hs_view *v, int64_t row) {
     if (!evaluated) {
       along_step(v, run, row, 0.5, v->z);
       if (v->table->values(v->p, middle, v->z, v->values)) return;
-      v->range[0] = outwards(middle, middle, 0.0);
+      v->range[0] = range_sum(middle, middle);
       for (int i = 0; i < v->n; i++)
-        v->range[1 + i] = outwards(v->z[i] - v->mode_error[i], v->z[i] + v->mode_error[i], 0x1p-52);
+        v->range[1 + i] = range_sum(v->z[i] - v->mode_error[i], v->z[i] + v->mode_error[i]);
       range_operations(v->f, surfaces->first, surfaces->last, first_register(v), v->range);
       evaluated = 1;
     }

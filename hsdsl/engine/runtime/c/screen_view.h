@@ -152,11 +152,11 @@ static int has_shadow(const hs_screen *s) { return s->order || s->correction; }
 
 static void set_box(hs_view *v, double low, double high, int i, double more) {
   const double wide = more + CUTTING * hs_max(fabs(low), fabs(high));
-  v->range[1 + i] = outwards(low - wide, high + wide, 0x1p-52);
+  v->range[1 + i] = range_sum(low - wide, high + wide);
 }
 
 static void set_times(hs_view *v, double begin, double length, double start, double width) {
-  v->range[0] = outwards(begin + start * length, begin + (start + width) * length, 0x1p-52);
+  v->range[0] = range_sum(begin + start * length, begin + (start + width) * length);
 }
 
 /* Time and states of a row as ranges of one number each. */

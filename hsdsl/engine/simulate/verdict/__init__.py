@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +35,7 @@ from hsdsl.engine.execution import INCOMPLETE, LEFT, Execution, Verdict
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stalls import SHORT
 from hsdsl.engine.simulate.stops import Diagnostics, show
-from hsdsl.engine.simulate.verdict.commutation import choices, keep_values, together, waiting_orders
+from hsdsl.engine.simulate.verdict.commutation import choices, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
 from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_the_end, remarked
 from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
@@ -50,23 +51,23 @@ __all__ = ["RunView", "assess", "assess_compiled"]
 MANY = 10_000  # steps
 
 
-def assess_compiled(under_way: CompiledRun, execution: Execution) -> Verdict:
+def assess_compiled(run: CompiledRun, execution: Execution) -> Verdict:
     """Decide the same as `assess` of a compiled run.
 
     Where the screen finds it clear by its shadow run, sentences on its margins are written when they are read.
     """
-    compiled: Any = execution.compiled
-    columns, problem, screens = compiled.columns, under_way.plan.problem, screens_of(under_way.plan, True)
+    columns, problem, screens = run.columns, run.plan.problem, screens_of(run.plan, True)
+    assert columns is not None
+    view = partial(RunView, problem, execution)
     crowded = columns.rows > MANY and _crowded_steps(problem, execution)
     if screens is None or columns.notes or crowded or not execution.stop.complete:
-        return assess(RunView(problem, execution), under_way.diagnostics)
+        return assess(view(), run.diagnostics)
     screen = screens.take()
-    run = RunView(problem, execution, screen_made=screen)
-    if not screen.decide(columns) or (keep_values(problem.program) and any(waiting_orders(run))):
-        return assess(run, under_way.diagnostics)
-    shown = problem.program, compiled.made, screen.margins, screen.commuting
+    if not screen.decide(columns) or (screens.keep_values and any(waiting_orders(view()))):
+        return assess(view(screen_made=screen), run.diagnostics)
+    shown = problem.program, run.made, screen.margins, screen.commuting
     screens.leave(screen)
-    found = list(at_the_end(run))
+    found = list(at_the_end(view())) if screens.final_walls else []
     return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=(found, problem.program))
 
 

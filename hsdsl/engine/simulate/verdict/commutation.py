@@ -17,7 +17,7 @@ from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
 from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
-from hsdsl.mathematics.program import ModeProgram, Program, Queue
+from hsdsl.mathematics.program import ModeProgram, Queue
 
 SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
@@ -103,11 +103,6 @@ def _goes_at_once(place: Place, since: Number) -> int | None:
     ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]
     ready = ready or surfaces.standing(place.t, place.x, since)
     return min(ready, key=lambda k: (-edges[k].priority, k), default=None)
-
-
-def keep_values(program: Program) -> bool:
-    """Whether executions that wait have values of their own."""
-    return any(len(queue.values) > 1 for mode in program.modes for queue in mode.queues)
 
 
 def waiting_orders(run: RunView) -> Iterator[str]:

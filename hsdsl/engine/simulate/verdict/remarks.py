@@ -51,7 +51,7 @@ def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
 def at_the_end(run: RunView) -> Iterator[Remark]:
     """Walls of the final mode that a run ended in: nothing flows there, so nothing has checked them."""
     modes = run.problem.program.modes
-    if run.stop.reason != "final" or not any(mode.final and mode.walls for mode in modes):
+    if run.stop.reason != "final":
         return
     final = run.execution.final
     mode = modes[run.index(final.mode)]

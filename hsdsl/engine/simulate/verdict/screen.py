@@ -155,6 +155,9 @@ class Screens:
             relaxation=settings.relaxation,
             tolerance=settings.tolerance,
         )
+        modes = problem.program.modes
+        self.keep_values = any(len(queue.values) > 1 for mode in modes for queue in mode.queues)  # that wait
+        self.final_walls = any(mode.final and mode.walls for mode in modes)
         self._left: list[Screen] = []
 
     def take(self) -> Screen:
@@ -192,7 +195,7 @@ def screened(run: Execution, finer: Execution | None) -> Screen | None:
         return None
     if one.columns.notes or (other and other.columns.notes):
         return None
-    screens = screens_of(one.under_way.plan, finer is None)
+    screens = screens_of(one.plan, finer is None)
     if screens is None:
         return None
     screen = screens.take()
