@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Mapping
 from math import cosh, exp
 from pathlib import Path
 
 import pytest
-import yaml
 
 import hsdsl
 from hsdsl.base import limits
 from hsdsl.interface.cli.verbs import obey
-from hsdsl.interface.imports.sbml import converted, imported
+from hsdsl.interface.imports.sbml import imported
 from hsdsl.language.source.xml import read_xml
 
 MATH = '<math xmlns="http://www.w3.org/1998/Math/MathML">{}</math>'
@@ -167,15 +167,14 @@ CASES = {
 def test_converted_models_have_the_values_of_their_solution(case: str) -> None:
     """Each file is converted without code around it, and runs to the exact values at its end."""
     text, outputs, right = CASES[case]
-    document = converted("model.xml", text.encode(), outputs, "2")
-    run = hsdsl.loads(yaml.safe_dump(document)).simulate(engine="python")
+    run = hsdsl.loads(of(text, outputs=outputs)).simulate(engine="python")
     assert run.verdict.theorem == "holds"
     assert {name: run.final.outputs[f"out_{name}"] for name in right} == pytest.approx(right, abs=1e-8)
 
 
-def of(text: str, until: str = "2") -> str:
+def of(text: str, until: str = "2", outputs: Mapping[str, str] | None = None) -> str:
     """The model's text for the text of a file."""
-    return imported(read_xml("model.xml", text.encode(), 100), until)
+    return imported(read_xml("model.xml", text.encode(), 100), until, outputs)
 
 
 LEVEL_2 = f"""<?xml version="1.0" encoding="UTF-8"?>

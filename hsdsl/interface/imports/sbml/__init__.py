@@ -7,16 +7,15 @@ text of the language, and what each quantity is; `convert` the document of a mod
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from hsdsl.base.errors import ModelError
 from hsdsl.interface.imports import end_of_run
 from hsdsl.interface.imports.sbml.convert import Converter, written
 from hsdsl.interface.imports.sbml.document import NotExpressible, is_sbml, model_of
 from hsdsl.language.expression.timebox import deep_stack
-from hsdsl.language.source.xml import Element, read_xml
+from hsdsl.language.source.xml import Element
 
-__all__ = ["DEEPEST", "FEATURE", "converted", "imported", "is_sbml"]
+__all__ = ["DEEPEST", "FEATURE", "imported", "is_sbml"]
 
 _HINTS = {"the package 'comp'": "have its submodels written out, by COPASI or libSBML"}
 FEATURE = "HS334"  # the code of what a model cannot keep
@@ -25,7 +24,7 @@ FEATURE = "HS334"  # the code of what a model cannot keep
 DEEPEST = 256  # elements of a file in each other
 
 
-def imported(root: Element, until: str | None = None) -> str:
+def imported(root: Element, until: str | None = None, outputs: Mapping[str, str] | None = None) -> str:
     """The text of a model for the root of a file.
 
     Parameters
@@ -34,37 +33,19 @@ def imported(root: Element, until: str | None = None) -> str:
         Of an SBML file, Level 2 or 3.
     until : str
         The end of the run, which SBML does not say.
+    outputs : mapping of str to str
+        What is recorded: names, each with ``value``, ``amount`` or ``concentration``.
 
     Raises ModelError: what a model cannot keep, with its place.
     Raises UsageError: no end of the run.
     """
     end = end_of_run(until, "SBML does not say it: give --until")
-    converter = _converter(root)
-    return written(converter, _document(converter, {}, end), root.file.path)
-
-
-def converted(path: str, data: bytes, outputs: Mapping[str, str], until: str) -> dict[str, Any]:
-    """The document of a file with what is recorded: names, each with ``value``, ``amount`` or ``concentration``.
-
-    Raises ModelError: what a model cannot keep, with its place.
-    """
-    return _document(_converter(read_xml(path, data, DEEPEST)), outputs, until)
-
-
-def _converter(root: Element) -> Converter:
     try:
         with deep_stack():
-            return Converter(model_of(root))
+            converter = Converter(model_of(root))
+            return written(converter, converter.document(outputs or {}, end), root.file.path)
     except NotExpressible as feature:
         raise _refused(feature, root) from None
-
-
-def _document(converter: Converter, outputs: Mapping[str, str], until: str) -> dict[str, Any]:
-    try:
-        with deep_stack():
-            return converter.document(outputs, until)
-    except NotExpressible as feature:
-        raise _refused(feature, converter.model.element) from None
 
 
 def _refused(feature: NotExpressible, element: Element) -> ModelError:

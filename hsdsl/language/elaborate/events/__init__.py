@@ -47,8 +47,9 @@ def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
     for event in drafts:  # what is stored may be that of a state itself
         changes.append((event.edge.name, {symbol(x): symbol(name) for x, name in event.stored.items()}))
     for name, meaning in changes:
-        concerned = index.concerned(meaning)
-        jumps |= {e.edge.name for e in concerned if e.touched(meaning) or (e.edge.name != name and e.leaves(meaning))}
+        for event in index.concerned(meaning):  # a reset of its own that it makes later is one as any other
+            other = event.edge.name != name or event.delay is not None
+            jumps |= {event.edge.name} if event.touched(meaning) or (other and event.leaves(meaning)) else set()
     return tuple(replace(e, jumps=not e.event.initially or e.edge.name in jumps) for e in drafts)
 
 
