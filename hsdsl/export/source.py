@@ -265,6 +265,11 @@ def _letters(sign: str) -> str:
     return greek.group(1).lower() if greek else "_"
 
 
+def filled(text: str, **values: object) -> str:
+    """A text with values in place of their names between two ``@``."""
+    return re.sub("@([A-Z]+)@", lambda match: str(values[match[1].lower()]), text)
+
+
 def explicit(source: Source, target: str) -> tuple[Source, ButcherTableau]:
     """The source with an explicit method, and its table: where `auto` is Taylor's method, `AUTO` in its place.
 

@@ -8,7 +8,7 @@ import pytest
 
 import hsdsl
 from hsdsl.analysis.report.summary import summary
-from hsdsl.analysis.report.words import REMEDIES, remedies_of, remedy_table
+from hsdsl.analysis.report.words import remedies_of, remedy_of
 
 ROOT = Path(hsdsl.__file__).parent
 CLOSE = """\
@@ -24,13 +24,13 @@ experiment: {until: 3, tolerance: 1e-6}
 
 
 def test_the_documentation_has_the_table() -> None:
-    assert remedy_table() in (ROOT.parent / "docs/how-to/unknown.md").read_text()
+    assert (ROOT / "analysis/report/remedies.md").read_text() in (ROOT.parent / "docs/how-to/unknown.md").read_text()
 
 
-@pytest.mark.parametrize("reason", [reason for each in REMEDIES for reason in each.reasons])
+@pytest.mark.parametrize("reason", remedy_of())
 def test_a_reason_has_its_own_remedy(reason: str) -> None:
     written = reason.replace("...", "something at t = 1.25")
-    assert remedies_of([written, written]) == [next(each.remedy for each in REMEDIES if reason in each.reasons)]
+    assert remedies_of([written, written]) == [remedy_of()[reason]]
 
 
 def test_the_summary_says_what_to_do() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 
@@ -26,26 +25,24 @@ def pages() -> dict[str, str]:
 @cache
 def rule_pages() -> dict[str, str]:
     """The pages of rules, in one file a family; the first line of a page is its title."""
-    return {code: page for family in FAMILIES for code, page in _pages(f"rules/{family}.md").items()}
+    return {code: page for family in FAMILIES for code, page in _pages("analysis.lint.rules", f"{family}.md").items()}
 
 
-def error_pages() -> dict[str, str]:
+def error_pages(file: str = "errors.md") -> dict[str, str]:
     """The pages of errors, with their titles. The first example of a page is wrong, the second right."""
-    return _titled("errors.md", CODES)
+    pages = {
+        code: _WRONG.sub(r"## Example\n\n\1## Use instead\n\n", page) for code, page in _pages("base", file).items()
+    }
+    return {code: page[0].upper() + page[1:].replace("\n", ".\n", 1) for code, page in pages.items()}
 
 
 def warning_pages() -> dict[str, str]:
     """The pages of warnings of runs, in the same form."""
-    return _titled("warnings.md", WARNINGS)
+    return error_pages("warnings.md")
 
 
-def _titled(file: str, titles: Mapping[str, str]) -> dict[str, str]:
-    pages = {code: _WRONG.sub(r"## Example\n\n\1## Use instead\n\n", page) for code, page in _pages(file).items()}
-    return {code: f"{titles[code][0].upper()}{titles[code][1:]}.\n\n{page}" for code, page in pages.items()}
-
-
-def _pages(file: str) -> dict[str, str]:
+def _pages(package: str, file: str) -> dict[str, str]:
     """The pages of a file, each below its code."""
-    text = resources.files("hsdsl.analysis.lint").joinpath(file).read_text(encoding="utf-8")
-    _, *parts = re.split(r"^# (HS\d{3})\n", text, flags=re.MULTILINE)
+    text = resources.files(f"hsdsl.{package}").joinpath(file).read_text(encoding="utf-8")
+    _, *parts = re.split(r"^# (HS\d{3})\s", text, flags=re.MULTILINE)
     return {code: page.strip() for code, page in zip(parts[::2], parts[1::2], strict=True)}

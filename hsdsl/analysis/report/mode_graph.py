@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from html import escape
 from itertools import pairwise
+from pathlib import Path
 from typing import NamedTuple
 
 from hsdsl.base.names import shown, visible, without_memory
@@ -23,19 +24,7 @@ SIZE, PITCH, LETTER, INSIDE = 13, 18.0, 7.85, 12.0  # of the font, between lines
 LONGEST, MOST_LINES, MOST_MODES = 34, 7, 6  # of a line; of a flow's lines; of modes whose flow is in their box
 MOST_DRAWN = 60  # modes of which there is a picture
 BADGE = 9.0
-CSS = """
-.modes text { font: 13px ui-monospace, SFMono-Regular, Menlo, Consolas, "DejaVu Sans Mono", monospace;
-  fill: var(--text, currentColor) }
-.modes .name { font-weight: 700 }
-.modes .box { fill: var(--panel, transparent); stroke: var(--ink, currentColor); stroke-width: 1.2 }
-.modes .unused { fill: var(--ground, transparent); stroke: #8b97a3; stroke-dasharray: 4 3 }
-.modes .edge { fill: none; stroke: var(--ink, currentColor); stroke-width: 1.4 }
-.modes .never { stroke: #8b97a3; stroke-dasharray: 4 3 }
-.modes .made { fill: var(--ink, currentColor) }
-.modes .badge { fill: #2f5f8f }
-.modes .badge.never { fill: #6b7783; stroke: none }
-.modes .number { font-size: 10px; fill: #fff; text-anchor: middle }
-"""
+CSS = Path(__file__).with_name("mode_graph.css").read_text(encoding="utf-8")
 
 
 def mode_graph(program: Program, execution: Execution | None = None) -> str:

@@ -11,6 +11,7 @@ import ctypes
 import textwrap
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from hsdsl.base.names import visible
@@ -24,61 +25,16 @@ from hsdsl.engine.simulate import Problem, Settings
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.moving import LEAST_UNITS
 from hsdsl.engine.simulate.surfaces import Interpolation, along_steps, interpolation
-from hsdsl.export.source import Source, derived, given, structural
+from hsdsl.export.source import Source, derived, filled, given, structural
 from hsdsl.mathematics.program import ModeProgram, Program
 
-_HEADER = """
-#ifndef PROBLEM_H
-#define PROBLEM_H
-
-#include "hs_simulate.h"
-
-{sizes}
-extern const hs_model hs_the_model;
-extern const hs_method problem_method;
-extern const hs_timeline problem_timeline;
-extern const hs_settings problem_settings;
-extern const hs_interpolation problem_interpolation;
-extern const int problem_mode, problem_dimension; /* the start */
-extern const hs_real problem_x[];
-
-/* Names, for people: of the model; of each mode, its states and its edges; of the states that an edge leads to; of
-   parameters, outputs and all states. */
-extern const char problem_name[], problem_scheme[], problem_method_name[];
-extern const char *const problem_mode_name[];
-extern const char *const *const problem_state[];
-extern const char *const *const problem_edge[];
-extern const char *const *const *const problem_edge_state[];
-extern const char *const problem_start_state[];
-extern const char *const problem_parameter[];
-extern const char *const problem_output[];
-
-/* Of a system of parts: the state that is the number of each part's mode, from 1 on, or -1 where it has one mode; names
-   of parts and their modes; the part that each state is of, or -1; of each mode of that a 1 where it has the state. */
-extern const int problem_part_number[], problem_owner[];
-extern const char *const problem_part[];
-extern const char *const *const problem_part_mode[];
-extern const char *const problem_owned[];
-
-/* Of each parameter whether others decide it, and whether it decides the times of inputs, which stay as exported. */
-extern const int problem_derived[], problem_structural[];
-
-/* Of each state of the start whether the export gave its value; others follow parameters and those. */
-extern const char problem_given[];
-
-/* Derive parameters from the ones before them. Derive those initial values in `x` that are not `given` from parameters
-   and others, as in the file. Not 0 where one has no value. */
-int problem_derive(hs_real *p);
-int problem_start(const hs_real *p, const char *given, hs_real *x);
-
-#endif
-"""
+PARTS = Path(__file__).parent / "parts"
 
 
 def header(source: Source, tunable: bool = False) -> str:
     """The text of ``problem.h``."""
     sizes = ("#define PROBLEM_TUNABLE\n" if tunable else "") + _sizes(source.problem)
-    return comment(source.heading) + _HEADER.format(sizes=sizes)
+    return comment(source.heading) + "\n" + filled((PARTS / "problem.h.in").read_text(), sizes=sizes)
 
 
 def _sizes(problem: Problem) -> str:
@@ -357,41 +313,6 @@ def in_both(single: str, double: str) -> str:
 PRECISIONS: tuple[Arithmetic, ...] = (FLOAT32, FLOAT64)
 
 
-_DERIVE = """
-int problem_derive(hs_real *p) {{
-  int bad = 0;
-  (void)p;
-{calls}
-  return bad;
-}}
-"""
-_START = """
-/* See hsdsl/engine/preparation/values.py: initial_columns. */
-int problem_start(const hs_real *p, const char *given, hs_real *x) {{
-  hs_real row[PROBLEM_PARAMETERS + {width}] = {{0}}, own[{width}] = {{0}}, *const initial = row + PROBLEM_PARAMETERS;
-  char known[{width}] = {{0}};
-  int any = 0, bad = 0;
-  for (int i = 0; i < PROBLEM_PARAMETERS; i++) row[i] = p[i];
-  for (int i = 0; i < {starts}; i++) {{
-    if (!given[i]) continue;
-    any = 1;
-    if (start_place[i] >= 0) initial[start_place[i]] = x[i], known[start_place[i]] = 1;
-  }}
-  if (any && {followers}) {{
-    for (int k = 0; k < {followers}; k++)
-      if (!known[follower[k]]) bad |= following[k](row, initial + follower[k]);
-  }} else {{
-    bad = initial_values(p, own);
-    for (int k = 0; k < {states}; k++)
-      if (!known[k]) initial[k] = own[k];
-  }}
-  for (int i = 0; i < {starts}; i++)
-    if (!given[i] && start_place[i] >= 0) x[i] = initial[start_place[i]];
-  return bad;
-}}
-"""
-
-
 def derivations(problem: Problem) -> str:
     """The definitions of ``problem_derive`` and ``problem_start``, and of what kind each parameter is."""
     program = problem.program
@@ -403,7 +324,13 @@ def derivations(problem: Problem) -> str:
         if name in own:
             functions.append(function(f"parameter_{i}", "const hs_real *p", bodies[f"parameter_{i}"]))
             calls.append(f"  bad |= parameter_{i}(p, p + {i});")
-    return flags + "".join(functions) + _DERIVE.format(calls="\n".join(calls)) + _starts(problem)
+    return (
+        flags
+        + "".join(functions)
+        + "\n"
+        + filled((PARTS / "derive.c.in").read_text(), calls="\n".join(calls))
+        + _starts(problem)
+    )
 
 
 def _starts(problem: Problem) -> str:
@@ -419,6 +346,14 @@ def _starts(problem: Problem) -> str:
     pointers = (f"initial_{i}" for i in program.initial_order)
     text += array("static int (*const", "following", pointers, ")(const hs_real *, hs_real *)")
     text += array("const char", "problem_given", (str(int(name in chosen)) for name in problem.states))
-    return text + _START.format(
-        width=len(known) + 1, states=len(known), starts=len(problem.states), followers=len(program.initial_order)
+    return (
+        text
+        + "\n"
+        + filled(
+            (PARTS / "start.c.in").read_text(),
+            width=len(known) + 1,
+            states=len(known),
+            starts=len(problem.states),
+            followers=len(program.initial_order),
+        )
     )

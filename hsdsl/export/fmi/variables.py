@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -25,7 +26,7 @@ from hsdsl.engine.simulate import Problem
 from hsdsl.engine.simulate.verdict.run_view import RunView
 from hsdsl.export import Modes
 from hsdsl.export.c.problem import array, comment, function, string
-from hsdsl.export.source import Source, derived, drivable, structural, used_by, with_sources
+from hsdsl.export.source import Source, derived, drivable, filled, structural, used_by, with_sources
 from hsdsl.language.elaborate.inputs import switch_name
 from hsdsl.mathematics.lower.slopes import Slopes, lower_given, lower_slopes
 
@@ -328,78 +329,23 @@ def _knowns(unit: Unit, mode: int, columns: frozenset[int], further: set[int]) -
     return known
 
 
-_HEADER = """
-#ifndef VARIABLES_H
-#define VARIABLES_H
-
-#include "hs.h"
-
-enum {{ FMU_TIME, FMU_STATE, FMU_DERIVATIVE, FMU_PARAMETER, FMU_INPUT, FMU_OUTPUT, FMU_MODE, FMU_INDICATOR }};
-
-#define FMU_VARIABLES {variables}
-#define FMU_STATES {states} /* those that flow, before the numbers of the modes of parts */
-#define FMU_INPUTS {inputs}
-#define FMU_SLOPES {slopes}
-#define FMU_TOKEN {token}
-
-/* A variable by its reference: its kind, and its place among those of the kind. */
-typedef struct {{
-  int kind, index;
-}} fmu_variable;
-
-/* An input: its place among sampled ones, the parameter that turns its expression off (-1: samples), whether it stays
-   as given, and whether it changes at events alone. */
-typedef struct {{
-  int samples, given, fixed, held;
-}} fmu_input_place;
-
-/* The slopes of a mode that are not zero everywhere, by references of unknown and known. */
-typedef struct {{
-  hs_routine *values;
-  int count;
-  const unsigned *row, *column;
-}} fmu_slope_table;
-
-extern const fmu_variable fmu_variables[];
-extern const fmu_input_place fmu_input[];
-extern const double fmu_input_start[], fmu_input_nominal[], fmu_nominal[];
-extern const fmu_slope_table fmu_slopes[];
-extern const char *const fmu_moves[]; /* for each mode: of each surface whether each input moves it */
-
-/* Which parameter is beyond a bound of its own; 0 for none. */
-const char *fmu_beyond(const double *p);
-
-/* The value of the expression of an input. */
-double fmu_given(int input, const double *p, double t);
-
-#endif
-"""
-_BEYOND = """
-const char *fmu_beyond(const double *p) {{
-  double bound;
-  (void)p, (void)bound;
-{tests}
-  return 0;
-}}
-"""
-_GIVEN = """
-double fmu_given(int input, const double *p, double t) {{
-  double out[1] = {{NAN}};
-  (void)input, (void)p, (void)t;
-{calls}
-  return out[0];
-}}
-"""
+def _part(name: str) -> str:
+    return (Path(__file__).parent / "parts" / name).read_text()
 
 
 def header(unit: Unit, token: str) -> str:
     """The text of ``variables.h``."""
-    return comment(unit.source.heading) + _HEADER.format(
-        variables=len(unit.variables),
-        states=len(unit.references("state")),
-        inputs=len(unit.source.system.inputs),
-        slopes=max(len(slopes.places) for slopes in unit.slopes),
-        token=string(token),
+    return (
+        comment(unit.source.heading)
+        + "\n"
+        + filled(
+            _part("variables.h.in"),
+            variables=len(unit.variables),
+            states=len(unit.references("state")),
+            inputs=len(unit.source.system.inputs),
+            slopes=max(len(slopes.places) for slopes in unit.slopes),
+            token=string(token),
+        )
     )
 
 
@@ -466,7 +412,7 @@ def _given(unit: Unit) -> str:
     routines = lower_given(unit.source.system)
     calls = (f"  if (input == {name.removeprefix('given_')}) {name}(p, t, 0, out);" for name in routines.names)
     functions = routine_functions(routines, unit.problem.program, "")
-    return functions + _GIVEN.format(calls="\n".join(calls))
+    return functions + "\n" + filled(_part("given.c.in"), calls="\n".join(calls))
 
 
 def _bounds(unit: Unit) -> str:
@@ -478,4 +424,4 @@ def _bounds(unit: Unit) -> str:
                 functions.append(function(bound, "const hs_real *p", bodies[bound]))
                 text = string(f"parameter {name} is beyond its {kind}")
                 tests.append(f"  if (!{bound}(p, &bound) && p[{i}] {relation} bound) return {text};")
-    return "".join(functions) + _BEYOND.format(tests="\n".join(tests))
+    return "".join(functions) + "\n" + filled(_part("beyond.c.in"), tests="\n".join(tests))

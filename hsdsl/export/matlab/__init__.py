@@ -5,15 +5,12 @@ from __future__ import annotations
 import ast
 import hashlib
 from collections.abc import Iterable
-from pathlib import Path
 from textwrap import wrap
 
 from hsdsl.base.names import visible
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
-from hsdsl.export.matlab.model import ModelText, body, comment, helpers, literal, parameter_fields, string
+from hsdsl.export.matlab.model import PARTS, ModelText, body, comment, helpers, literal, parameter_fields, string
 from hsdsl.export.source import Source, definitions, derived, followed, structural
-
-PARTS = Path(__file__).parent / "parts"
 
 
 def files(source: Source) -> dict[str, bytes]:

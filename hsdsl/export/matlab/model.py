@@ -9,6 +9,7 @@ import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from hsdsl.base.names import visible
 from hsdsl.base.parts import layout_of
@@ -18,45 +19,6 @@ from hsdsl.engine.simulate import Problem
 from hsdsl.engine.simulate.control import LARGEST_SHARE
 from hsdsl.export.source import Source, data_names, identifiers, mode_definitions
 from hsdsl.mathematics.program import ModeProgram, Program
-
-_LAST = """
-function k = enabled(m, x, t, p)
-% The number of the edge that is made at x = [mode; states], 0 where there is none.
-  k = 0;
-  q = x(1);
-  y = reshape(x(2:m.dim(q) + 1), [], 1);
-  edges = numel(m.edge_target{q});
-  if m.final(q) || edges == 0
-    return
-  end
-  d = m.data(max(1, find(m.starts <= t, 1, 'last')), :);
-  values = m.surfaces{q}(t, y, p, d);
-  best = -Inf;
-  for i = 1:edges
-    noise = m.roundoff(m, q, i, t, y, p, d, m.typical(m.state_index{q}));
-    made = values(i) >= -noise && m.rate{q}{i}(t, y, p, d) >= 0;
-    parts = m.condition{q}{i};
-    for part = 1:numel(parts)
-      made = made && parts{part}(t, y, p, d);
-    end
-    if made && m.edge_priority{q}(i) > best
-      k = i;
-      best = m.edge_priority{q}(i);
-    end
-  end
-end
-
-function bound = roundoff(m, q, k, t, x, p, d, scale)
-% Below this a value of surface k counts as zero: round-off of the numbers that it is computed from.
-  sides = m.magnitudes{q}(t, x, p, d);
-  slopes = m.gradient{q}{k}(t, x, p, d);
-  if ~all(isfinite(slopes))
-    bound = 16 * eps * sides(k);
-    return
-  end
-  bound = 16 * eps * (sides(k) + abs(slopes(1)) * abs(t) + sum(abs(slopes(2:end)) .* max(abs(x), abs(scale))));
-end
-"""
 
 
 def parameter_fields(program: Program) -> dict[str, str]:
@@ -94,7 +56,7 @@ class ModelText:
             *(f"  m.{key} = {value};\n" for key, value in run_fields(problem)),
             "end\n\n",
         ]
-        functions = "\n".join(self.functions) + _LAST
+        functions = "\n".join([*self.functions, (PARTS / "last.m.in").read_text()])
         calls = helpers(functions)
         return "".join(parts) + functions + (f"\n{calls}" if calls else "")
 
@@ -253,6 +215,7 @@ switch try until unwind_protect while arguments import
 KEYWORDS = frozenset(_WORDS.split())
 BUILT_IN = ("sin", "cos", "tan", "atan", "atan2", "sinh", "cosh", "tanh", "asinh", "exp", "abs", "sign", "floor")
 _FUNCTIONS = frozenset((*BUILT_IN, "min", "max", "zeros", "pi", "eps", "Inf", "NaN", "i", "j", "e"))
+PARTS = Path(__file__).parent / "parts"
 _PLAIN = re.compile(rf"\bhs_({'|'.join(BUILT_IN)})\(")
 _HELPER = re.compile(r"\bhs_(\w+)\(")
 _TEMPORARY = re.compile(r"\b[vw]\d+\b")

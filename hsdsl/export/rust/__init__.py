@@ -16,7 +16,7 @@ from hsdsl.engine.runtime.kernel import CompiledModel, runtime
 from hsdsl.engine.simulate import prepare
 from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.rust.model import literal, model_text, string
-from hsdsl.export.source import Source, identifiers, structural
+from hsdsl.export.source import Source, filled, identifiers, structural
 
 MOST = 100  # transitions; of longer runs these are enough
 
@@ -69,20 +69,14 @@ def files(source: Source) -> dict[str, bytes]:
     parts = {path.relative_to(CRATE).as_posix(): path.read_text(encoding="utf-8") for path in CRATE.rglob("*.*")}
     c = {f"c/{path}": content.decode() for path, content in c_sources(source, True, "given.h").items()}
     own = f"{name}_{_digest(c)}"
-    names = {"@PREFIX@": own, "@EXACT@": ",\n    ".join(f'"{flag}"' for flag in EXACT_FLAGS)}
-    texts = {path: _filled(text, names) for path, text in parts.items() if path.endswith((".rs", ".c"))} | c
+    names = {"prefix": own, "exact": ",\n    ".join(f'"{flag}"' for flag in EXACT_FLAGS)}
+    texts = {path: filled(text, **names) for path, text in parts.items() if path.endswith((".rs", ".c"))} | c
     texts["c/prefix.h"] = _prefixes(texts, own)
     texts["Cargo.toml"] = _manifest(source, name)
     texts["README.md"] = _readme(source)
     texts["src/model.rs"] = model_text(source)
     texts["tests/expected/mod.rs"] = expected_text(source)
     return {name: texts[name].encode() for name in sorted(texts)}
-
-
-def _filled(text: str, names: Mapping[str, str]) -> str:
-    for name, value in names.items():
-        text = text.replace(name, value)
-    return text
 
 
 def _digest(texts: Mapping[str, str]) -> str:

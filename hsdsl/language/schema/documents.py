@@ -1,4 +1,7 @@
-"""The documents of a model file: the keys of each mapping, and the values that each may hold."""
+"""The documents of a model file: the keys of each mapping, and the values that each may hold.
+
+What the keys mean, in words and with examples, is in ``keys.toml``.
+"""
 
 from __future__ import annotations
 
@@ -37,9 +40,7 @@ from hsdsl.language.schema.fields import (
     described,
     items,
     mapping,
-    optional,
     refuse,
-    required,
     shaped_as_list,
 )
 from hsdsl.language.source.nodes import ABSENT, Mapping, Node, Scalar, Sequence, absent
@@ -100,14 +101,14 @@ class PointShape(ShapeDocument):
     """A point, drawn as a dot of fixed size."""
 
     kind = "point"
-    point: Pair = required("Where it is.", ["x", "y"])
+    point: Pair
 
 
 class LineShape(ShapeDocument):
     """A line from point to point."""
 
     kind = "line"
-    line: Points = required("Its points, at least two.", [[0, 0], ["L*sin(phi)", "-L*cos(phi)"]])
+    line: Points
 
 
 class CircleShape(ShapeDocument):
@@ -115,15 +116,15 @@ class CircleShape(ShapeDocument):
 
     kind = "circle"
     sized_by = ("radius",)
-    circle: Pair = required("Its centre.", ["x", "y"])
-    radius: Expression = required("Its radius.", "0.1")
+    circle: Pair
+    radius: Expression
 
 
 class SpringShape(ShapeDocument):
     """A spring between two points, drawn as a zigzag."""
 
     kind = "spring"
-    spring: Ends = required("Its two ends.", [[0, 0], ["x", 0]])
+    spring: Ends
 
 
 class BoxShape(ShapeDocument):
@@ -131,10 +132,10 @@ class BoxShape(ShapeDocument):
 
     kind = "box"
     sized_by = ("width", "height", "angle")
-    box: Pair = required("Its centre.", ["x", "y"])
-    width: Expression = required("Its width.", "0.4")
-    height: Expression = required("Its height.", "0.2")
-    angle: OptionalExpression = optional("By how much it is turned, counterclockwise, in radians.", "theta")
+    box: Pair
+    width: Expression
+    height: Expression
+    angle: OptionalExpression = None
 
 
 def _kind(value: Any) -> str:
@@ -185,36 +186,30 @@ AsExpression = Annotated[Expression, Tag("<expression>")]
 class ParameterEntry(Document):
     """A parameter with more than its value."""
 
-    value: Expression = required("A number, or an expression of earlier parameters.", "9.81", "2*omega")
-    unit: Text = optional("Its unit, such as `m/s`.", "m/s**2")
-    min: OptionalExpression = optional("The least value it may have.", 0)
-    max: OptionalExpression = optional("The largest value it may have.", 1)
-    about: Text = optional("What it is, for people.", "coefficient of restitution")
+    value: Expression
+    unit: Text = None
+    min: OptionalExpression = None
+    max: OptionalExpression = None
+    about: Text = None
 
 
 Parameter = Annotated[AsExpression | Annotated[ParameterEntry, Tag("<mapping>")], Discriminator(_mapping_or_not)]
-_HOLD = (
-    "Between samples: `zero` keeps the last sample's value, `linear` joins them by straight lines. "
-    "With `linear` two samples at one time are a jump."
-)
 
 
 class InputSamples(Document):
     """An input given by samples in the file."""
 
-    times: Items[Expression] = required("The times of the samples, increasing.", [0, 1, 2])
-    values: Items[Expression] = required("The values at those times.", [0, 5, 0])
-    hold: Hold = optional(_HOLD, "linear", default="zero")
+    times: Items[Expression]
+    values: Items[Expression]
+    hold: Hold = "zero"
 
 
 class InputFile(Document):
     """An input given by samples in a CSV file."""
 
-    file: Label = required(
-        "A CSV file with a column `time`, by its path from the model's own folder, inside it.", "u.csv"
-    )
-    column: Label | None = optional("The name of its column with the values. Left out, the name of the input.", "u (V)")
-    hold: Hold = optional(_HOLD, "linear", default="zero")
+    file: Label
+    column: Label | None = None
+    hold: Hold = "zero"
 
 
 Input = Annotated[
@@ -226,17 +221,15 @@ Input = Annotated[
 class FunctionDocument(Document):
     """A function of its arguments, of parameters and of other functions, written out where it is called."""
 
-    of: Items[ArgumentName] = required("The names of its arguments, in the order of a call.", ["x", "k"])
-    expression: Expression = required("Its value.", "x**2/(k**2 + x**2)", alias="is")
+    of: Items[ArgumentName]
+    expression: Expression = Field(alias="is")
 
 
 class SolveDocument(Document):
     """Unknowns that linear equations give, for use as names of `let`; they are solved at each evaluation."""
 
-    unknowns: Items[ArgumentName] = required("The names of the unknowns.", ["a", "force"])
-    equations: Items[Equation] = required(
-        "As many equations, linear in the unknowns.", ["m*a == force - m*g", "force == k*x - d*a"]
-    )
+    unknowns: Items[ArgumentName]
+    equations: Items[Equation]
 
 
 OPTIONS = ("delay", "values", "persistent", "waiting", "initially", "priority")  # of a transition
@@ -245,53 +238,18 @@ OPTIONS = ("delay", "values", "persistent", "waiting", "initially", "priority") 
 class TransitionDocument(Document):
     """An edge that leaves a mode: with `when` and `to`, or with `event`."""
 
-    when: Inequality = required(
-        "One inequality, such as `x >= x_max`: the surface at which the transition fires.", "x >= x_max", "h <= 0"
-    )
-    event: OptionalCondition = optional(
-        "A condition, instead of `when`: the transition fires where it turns true. Without `to` the mode stays.",
-        "x >= 1 and y < 2",
-    )
-    condition: OptionalCondition = optional(
-        "Which part of the surface is the guard: a condition.", "v > 0 and y < 1", alias="if"
-    )
-    to: Label = required("The mode entered.", "free")
-    reset: OpenTable[Expression] = mapping(
-        "State of the target: its value after the transition, in terms of the values before it. States not named keep "
-        "their value.",
-        {"v": "-c*v"},
-    )
-    name: OptionalLabel = optional("What to call the transition; left out, it is `SRC->DST`.", "impact")
-    priority: Priority = optional(
-        "Of transitions reached together, the one with the largest priority goes first. That of an event may be an "
-        "expression, whose value at that instant counts.",
-        1,
-        "2*x",
-        default=0,
-    )
-    delay: OptionalExpression = optional(
-        "With `event`: how long after its condition turned true the transition is made; see `values`.", 2
-    )
-    values: ValuesOf = optional(
-        "With `delay`: whether the `reset` has the values of the `trigger`, where the condition turned true, or those "
-        "of the `execution`, where the transition is made.",
-        "execution",
-        default="trigger",
-    )
-    persistent: Flag = optional(
-        "With `event`: whether the transition is made even if its condition turns false before.", False, default=True
-    )
-    waiting: Whole = optional(
-        "With `delay`: how many executions can wait at a time; one more ends the run with `waiting_limit`.",
-        50,
-        default=MOST_WAITING,
-    )
-    initially: Flag = optional(
-        "With `event`: what its condition counts as before the mode is entered; with `false` it fires there if it "
-        "holds.",
-        False,
-        default=True,
-    )
+    when: Inequality
+    event: OptionalCondition = None
+    condition: OptionalCondition = Field(None, alias="if")
+    to: Label
+    reset: OpenTable[Expression] = mapping()
+    name: OptionalLabel = None
+    priority: Priority = 0
+    delay: OptionalExpression = None
+    values: ValuesOf = "trigger"
+    persistent: Flag = True
+    waiting: Whole = MOST_WAITING
+    initially: Flag = True
 
     @property
     def target(self) -> str | None:
@@ -322,27 +280,13 @@ class TransitionDocument(Document):
 class ModeDocument(Document):
     """A mode: how the state flows, where it may be, and how it is left."""
 
-    flow: StateTable[Expression] | None = optional(
-        "State: its time derivative. The keys are the mode's states.", {"x": "v", "v": "-omega**2*x"}
-    )
-    domain: Items[Inequality] = items(
-        "Inequalities that are walls without a guard: leaving through one stops the run.", ["x >= -1", "x <= 1"]
-    )
-    final: Flag = optional("Whether the run ends on entering the mode. It then needs no `flow`.", True, default=False)
-    let: Table[Expression] = mapping(
-        "Named subexpressions of this mode, each of earlier ones; they shadow the top ones.", {"force": "-k*x"}
-    )
-    solve: SolveDocument | None = optional(
-        "Unknowns of this mode, which linear equations give.", {"unknowns": ["a"], "equations": ["m*a == -k*x"]}
-    )
-    outputs: Table[Expression] = mapping(
-        "Outputs of this mode. They go before those of the model with the same name, and have no value in modes that "
-        "do not define them.",
-        {"power": "k*v**2"},
-    )
-    transitions: Items[TransitionDocument] = items(
-        "The edges that leave the mode.", [{"when": "x >= 1", "to": "free", "reset": {"v": "-v"}}]
-    )
+    flow: StateTable[Expression] | None = None
+    domain: Items[Inequality] = items()
+    final: Flag = False
+    let: Table[Expression] = mapping()
+    solve: SolveDocument | None = None
+    outputs: Table[Expression] = mapping()
+    transitions: Items[TransitionDocument] = items()
 
 
 class InitialDocument(Document):
@@ -351,13 +295,13 @@ class InitialDocument(Document):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[AnyKey, Expression]  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    mode: Label = required("The mode a run starts in.", "free")
+    mode: Label
 
 
 class MultiplesDocument(Document):
     """Times at a fixed distance, from 0 to the end."""
 
-    every: Expression = required("The time between two samples.", "1/50")
+    every: Expression
 
 
 Samples = Annotated[
@@ -369,45 +313,25 @@ Samples = Annotated[
 class ExperimentDocument(Document):
     """How to run the model by default. Numbers are expressions of parameters."""
 
-    until: Expression = required("The time at which a run ends; it starts at 0.", "40*pi")
-    scheme: Scheme = optional("How transitions are made.", "relaxed")
-    completion: Completion = optional(
-        "How a run goes on where transitions accumulate: `contact` along the guard of a transition to the same mode, "
-        "`auto` also along a surface that two modes press on (sliding), `none` not at all. Left out, `contact`.",
-        "auto",
-    )
-    method: Word = optional("The integrator, such as `midpoint`, or `auto`.", "auto", "midpoint")
-    step: OptionalExpression = optional("The step of a fixed-step method. Excludes `tolerance`.", "1e-3")
-    tolerance: OptionalExpression = optional(
-        "The bound on the local error of an adaptive method, relative to the largest size each state has had. Excludes "
-        "`step`.",
-        "1e-9",
-    )
-    relaxation: OptionalExpression = optional(
-        "The paper's epsilon: depth of the strips, in the model's own units and in time. Left out, 1e-6, or 1e-6 of a "
-        "run that is shorter than 1.",
-        "1e-6",
-    )
-    scale: OpenTable[Expression] = mapping(
-        "State: its typical size, positive. The scale of a state is this size until the state has been larger.",
-        {"x": "1e-3", "v": 1},
-    )
-    samples: Samples | None = optional(
-        "How many samples to record, or a list of their times, or the time between them.",
-        201,
-        [0, "1/2", 1],
-        {"every": "1/50"},
-    )
-    max_transitions: OptionalExpression = optional("Stop rather than make more transitions.", "1e6")
+    until: Expression
+    scheme: Scheme = None
+    completion: Completion = None
+    method: Word = None
+    step: OptionalExpression = None
+    tolerance: OptionalExpression = None
+    relaxation: OptionalExpression = None
+    scale: OpenTable[Expression] = mapping()
+    samples: Samples | None = None
+    max_transitions: OptionalExpression = None
 
 
 class ReferenceTransitionDocument(Document):
     """A transition known exactly."""
 
-    time: Expression = required("When the guard is reached.", "1.25")
-    edge: OptionalLabel = optional("The transition's name.", "impact", "heating->idle")
-    before: OpenTable[Expression] = mapping("States before it.", {"x": 14, "v": "25.6"})
-    after: OpenTable[Expression] = mapping("States after it.", {"v": "-23"})
+    time: Expression
+    edge: OptionalLabel = None
+    before: OpenTable[Expression] = mapping()
+    after: OpenTable[Expression] = mapping()
 
 
 ReferenceEvent = Annotated[
@@ -421,22 +345,18 @@ class ReferenceStateDocument(Document):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[AnyKey, Expression]  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    time: Expression = required("When.", 1)
-    mode: OptionalLabel = optional("In which mode.", "free")
+    time: Expression
+    mode: OptionalLabel = None
 
 
 class ReferenceDocument(Document):
     """Exact knowledge of a run. Numbers are expressions of parameters."""
 
-    settings: OpenTable[Expression] = mapping(
-        "What differs from the file, as for `--set`: `initial.w: -0.4`.", {"initial.w": "-0.4"}, alias="set"
-    )
-    source: Text = optional("Where the numbers come from.", "closed form")
-    trust: OptionalExpression = optional("The bound on their absolute error.", "1e-12")
-    transitions: Items[ReferenceEvent] = items(
-        "The first transitions: their times, or mappings.", [1, {"time": 2, "edge": "impact"}]
-    )
-    states: Items[ReferenceStateDocument] = items("States at times.", [{"time": 1, "mode": "free", "x": "1/2"}])
+    settings: OpenTable[Expression] = mapping(alias="set")
+    source: Text = None
+    trust: OptionalExpression = None
+    transitions: Items[ReferenceEvent] = items()
+    states: Items[ReferenceStateDocument] = items()
 
 
 def _one_or_many(value: Any) -> Any:
@@ -448,94 +368,54 @@ def _one_or_many(value: Any) -> Any:
 class ModelDocument(Document):
     """A controlled hybrid system."""
 
-    hsdsl: Version = required("The version of the language.", 1)
-    title: Text = optional("What the model is, in a few words.", "Bouncing ball")
-    source: Text = optional("Where the model comes from.", "Burden et al. 2013, Fig. 1")
-    assumptions: Items[Text] = items(
-        "Sentences on what the model takes for granted, as an import does: each run gives them as warnings.",
-        ["the constraint S <= 2 of the file is not checked"],
-    )
-    parameters: Table[Parameter] = mapping(
-        "Name: number, expression of earlier parameters, or a mapping with its value.",
-        {"g": "9.81", "e": {"value": "0.8", "min": 0, "max": 1}},
-    )
-    functions: Table[FunctionDocument] = mapping(
-        "Name: a function for use in every expression of the file.",
-        {"hill": {"of": ["x", "k"], "is": "x**2/(k**2 + x**2)"}},
-    )
-    inputs: Table[Input] = mapping(
-        "Name: expression of `t` and parameters, or samples, or a CSV file.", {"u": "20*cos(2.5*t)"}
-    )
-    let: Table[Expression] = mapping("Named subexpressions, each of earlier ones.", {"energy": "v**2/2"})
-    solve: SolveDocument | None = optional(
-        "Unknowns that linear equations give.", {"unknowns": ["a"], "equations": ["m*a == -k*x"]}
-    )
-    modes: ModeTable[ModeDocument] = required("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
-    outputs: Table[Expression] = mapping(
-        "Name: expression, recorded with the states. Each mode reads it with its own `let`; it has no value in a "
-        "mode that lacks one of its names.",
-        {"energy": "m*g*h + m*v**2/2"},
-    )
-    scene: Items[Shape] = items(
-        "Shapes that show the states, drawn in this order; x goes right and y up. Their numbers are read as outputs "
-        "are; in a mode that lacks one of its numbers a shape is not drawn.",
-        [{"line": [[0, 0], ["x", "y"]]}, {"circle": ["x", "y"], "radius": "0.1"}],
-    )
-    units: OpenTable[Text] = mapping("Unit of a state, parameter, input or output, or of `t`.", {"h": "m", "v": "m/s"})
-    initial: InitialDocument = required(
-        "Where a run starts: `mode`, and a value for each of its states.", {"mode": "fall", "h": 10, "v": 0}
-    )
-    experiment: ExperimentDocument = required("How to run the model by default.", {"until": 12})
-    reference: Annotated[list[ReferenceDocument], BeforeValidator(_one_or_many)] = items(
-        "Exact knowledge: one mapping, or a list of them.", {"trust": "1e-12", "transitions": ["1.428"]}
-    )
+    hsdsl: Version
+    title: Text = None
+    source: Text = None
+    assumptions: Items[Text] = items()
+    parameters: Table[Parameter] = mapping()
+    functions: Table[FunctionDocument] = mapping()
+    inputs: Table[Input] = mapping()
+    let: Table[Expression] = mapping()
+    solve: SolveDocument | None = None
+    modes: ModeTable[ModeDocument]
+    outputs: Table[Expression] = mapping()
+    scene: Items[Shape] = items()
+    units: OpenTable[Text] = mapping()
+    initial: InitialDocument
+    experiment: ExperimentDocument
+    reference: Annotated[list[ReferenceDocument], BeforeValidator(_one_or_many)] = items()
 
 
 class PartTransitionDocument(TransitionDocument):
     """An edge that leaves a mode of a part."""
 
-    when: Inequality | None = optional(  # pyright: ignore[reportIncompatibleVariableOverride]
-        "One inequality, such as `x >= x_max`: the surface at which the transition fires.", "x >= x_max", "h <= 0"
-    )
-    on: OptionalLabel = optional(
-        "A transition of another instance, instead of `when`: this one fires together with it. The name of an "
-        "automaton stands for all of its instances.",
-        "a.too_warm",
-        "leg[index - 1].touchdown",
-    )
-    to: OptionalLabel = optional("The mode entered; left out, the mode stays.", "free")  # pyright: ignore[reportIncompatibleVariableOverride]
-    reset: OpenTable[Expression] = mapping(
-        "State: its value after the transition, in terms of the values before it. States not named keep their value. "
-        "States of other instances can be set as well.",
-        {"v": "-c*v", "body.v": 0},
-    )
+    when: Inequality | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
+    on: OptionalLabel = None
+    to: OptionalLabel = None  # pyright: ignore[reportIncompatibleVariableOverride]
+    reset: OpenTable[Expression] = mapping()
 
 
 class PartModeDocument(ModeDocument):
     """A mode of a part."""
 
-    transitions: Items[PartTransitionDocument] = items(  # pyright: ignore[reportIncompatibleVariableOverride]
-        "The edges that leave the mode.", [{"when": "x >= 1", "to": "free", "reset": {"v": "-v"}}]
-    )
+    transitions: Items[PartTransitionDocument] = items()  # pyright: ignore[reportIncompatibleVariableOverride]
 
 
 class AutomatonDocument(Document):
     """A kind of part: modes with what they need to know of the rest of the model."""
 
-    parameters: Table[Parameter] = mapping("Parameters, which each instance may set.", {"power": 30})
-    inputs: Items[ArgumentName] = items("Names that each instance connects to an expression.", ["beside"])
-    let: Table[Expression] = mapping("Named subexpressions.", {"gain": "wall*(beside - T)"})
-    outputs: Table[Expression] = mapping("Name: expression, recorded as `instance.name`.", {"energy": "v**2/2"})
-    units: OpenTable[Text] = mapping("Unit of a state, parameter, input or output of the instances.", {"v": "m/s"})
-    modes: ModeTable[PartModeDocument] = required("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
+    parameters: Table[Parameter] = mapping()
+    inputs: Items[ArgumentName] = items()
+    let: Table[Expression] = mapping()
+    outputs: Table[Expression] = mapping()
+    units: OpenTable[Text] = mapping()
+    modes: ModeTable[PartModeDocument]
 
 
 class AutomatonFile(Document):
     """A kind of part that is in a file of its own."""
 
-    file: Label = required(
-        "A YAML file with the keys of an automaton, by its path from the model's own folder, inside it.", "leg.yaml"
-    )
+    file: Label
 
 
 Automaton = Annotated[
@@ -550,41 +430,27 @@ class PartInitialDocument(Document):
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[AnyKey, Expression]  # pyright: ignore[reportIncompatibleVariableOverride]
 
-    mode: OptionalLabel = optional("The mode it starts in; of an automaton with one mode it is left out.", "on")
+    mode: OptionalLabel = None
 
 
 class InstanceDocument(Document):
     """A part of the system: an automaton with its numbers and connections."""
 
-    automaton: Label = required("Which automaton.", "room")
-    initial: PartInitialDocument = optional(
-        "Where it starts: `mode`, and a value for each of its states.", {"mode": "on", "T": 20}
-    )
-    inputs: OpenTable[Expression] = mapping("Each input of the automaton: an expression.", {"beside": "b.T"})
-    parameters: OpenTable[Expression] = mapping("Parameters that differ from the automaton's.", {"power": 20})
-    count: Whole | None = optional("How many: `NAME[1]`, `NAME[2]` and so on, with `index` in expressions.", 20)
-    at_ends: OpenTable[Expression] = mapping(
-        "Name: what `NAME[0].name` and those behind the last one are; `index` is the number beyond the end. For the "
-        "name of a transition, the one that `on` means there.",
-        {"x": 0, "spike": "neuron[5].spike"},
-    )
+    automaton: Label
+    initial: PartInitialDocument = None  # pyright: ignore[reportAssignmentType]
+    inputs: OpenTable[Expression] = mapping()
+    parameters: OpenTable[Expression] = mapping()
+    count: Whole | None = None
+    at_ends: OpenTable[Expression] = mapping()
 
 
 class SystemDocument(ModelDocument):
     """A controlled hybrid system, as modes or as a system of parts."""
 
-    modes: ModeTable[ModeDocument] = mapping("The modes.", {"fall": {"flow": {"h": "v", "v": "-g"}}})
-    initial: InitialDocument = optional(
-        "Where a run starts: `mode`, and a value for each of its states.", {"mode": "fall", "h": 10, "v": 0}
-    )
-    automata: Table[Automaton] = mapping(
-        "Kinds of parts by name, each with its modes, or in a file.",
-        {"clock": {"modes": {"run": {"flow": {"s": 1}}}}, "leg": {"file": "leg.yaml"}},
-    )
-    system: StateTable[InstanceDocument] = mapping(
-        "The parts of the model by name: their automata, numbers and connections. A model has either these or `modes`.",
-        {"a": {"automaton": "room", "initial": {"mode": "on", "T": 20}, "inputs": {"beside": "b.T"}}},
-    )
+    modes: ModeTable[ModeDocument] = mapping()
+    initial: InitialDocument = None  # pyright: ignore[reportAssignmentType]
+    automata: Table[Automaton] = mapping()
+    system: StateTable[InstanceDocument] = mapping()
 
 
 # the document of each kind of mapping by its path, and a phrase for it; `*` is any key or index

@@ -197,24 +197,14 @@ def shaped_as_list(value: Any) -> Any:
     return [] if _is_left_out(value) else value  # pyright: ignore[reportUnknownVariableType]
 
 
-def required(description: str, *examples: Any, alias: str | None = None) -> Any:
-    """A key that must be there."""
-    return Field(description=description, examples=list(examples), alias=alias)
-
-
-def optional(description: str, *examples: Any, default: Any = None, alias: str | None = None) -> Any:
-    """A key with a default."""
-    return Field(default, description=description, examples=list(examples), alias=alias)
-
-
-def mapping(description: str, *examples: Any, alias: str | None = None) -> Any:
+def mapping(alias: str | None = None) -> Any:
     """A key whose mapping is empty where it is left out."""
-    return Field(default_factory=dict[Any, Any], description=description, examples=list(examples), alias=alias)
+    return Field(default_factory=dict[Any, Any], alias=alias)
 
 
-def items(description: str, *examples: Any) -> Any:
+def items() -> Any:
     """A key whose list is empty where it is left out."""
-    return Field(default_factory=list[Any], description=description, examples=list(examples))
+    return Field(default_factory=list[Any])
 
 
 class Document(BaseModel):

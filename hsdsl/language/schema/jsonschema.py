@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
@@ -12,7 +15,15 @@ _DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 class _Generator(GenerateJsonSchema):
-    """Without the titles that pydantic makes out of names."""
+    """With a description and examples of each key, and without the titles that pydantic makes out of names."""
+
+    def model_schema(self, schema: Any) -> dict[str, Any]:
+        """The schema of a class; a key that the class has from another means the same."""
+        made = super().model_schema(schema)
+        for name, field in schema["cls"].model_fields.items():
+            about, *examples = next(keys[name] for keys in map(_keys_of, schema["cls"].__mro__) if name in keys)
+            made["properties"][field.alias or name] |= {"description": about, "examples": examples}
+        return made
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         """Never."""
@@ -43,6 +54,15 @@ def json_schema() -> dict[str, Any]:
     }
     root["anyOf"] = [{"required": ["modes", "initial"]}, {"required": ["automata", "system"]}]
     return {"$schema": _DRAFT, **root, "definitions": definitions}
+
+
+@cache
+def _keys() -> dict[str, Any]:
+    return tomllib.loads(Path(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
+
+
+def _keys_of(document: type) -> dict[str, Any]:
+    return _keys().get(_short(document.__name__), {})
 
 
 def _short(name: str) -> str:
