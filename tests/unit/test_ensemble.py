@@ -9,11 +9,13 @@ import threading
 import numpy as np
 import pytest
 from engines import ENGINES, needs_compiler
-from shipped import MODELS
+from shipped import MODELS, shipped
 
 import hsdsl
 from hsdsl.base.errors import UsageError
+from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution.records import same
+from hsdsl.engine.preparation.values import initial_state, with_parameters
 from hsdsl.engine.simulate import output_buffers
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
@@ -61,6 +63,50 @@ def test_instances_are_single_runs(engine, scheme):
     assert ensemble.shape == (2, 3) and ensemble.engine == engine and not ensemble.failed.any()
     assert ensemble.varied["c"].tolist() == [[0.3, 0.6, 0.9]] * 2 and ensemble.failures() == ()
     assert_as_single_runs(ensemble)
+
+
+def varied_by_the_first_name(model):
+    """The first parameter, or the first state of a start where there is none, with three values near its own."""
+    values = with_parameters(model.pipeline.values(FLOAT64), {})
+    names, numbers, group = model.program.parameters, values.parameters, "parameters"
+    if not names:
+        (_, names, numbers), group = initial_state(values, {}), "initial"
+    return {group: {names[0]: numbers[0] + np.array([0, 1e-3, -2e-3])}}
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", sorted(path.stem for path in MODELS.glob("*.yaml")))
+@pytest.mark.parametrize("how", [{}, {"method": "dopri5", "tolerance": 1e-7}, {"method": "rk4", "step": 1e-2}])
+def test_instances_of_every_model_are_single_runs(name, how):
+    model = shipped(name)
+    stiff = name == "stiff-switch" and how.get("method") == "dopri5"  # of which it takes millions of steps
+    until = 1e-3 if stiff else 2 * model.simulate(max_transitions=2, **how).times[-1]
+    assert_as_single_runs(model.ensemble(**varied_by_the_first_name(model), until=until, samples=5, **how))
+
+
+FUNCTIONS = """
+hsdsl: 1
+parameters:
+  a: 1
+  w: 3
+  curved: {value: sinh(w/3) + tanh(a)**0.3 - asinh(w)*cos(a), min: w - 100}
+  whole: max(floor(3*a), sign(w - 2)) - abs(min(a, w))/3
+inputs: {u: {times: [0, 0.3, 1.1], values: [0, 2, 0], hold: linear}}
+modes:
+  one:
+    flow: {x: 1 + a + u/10 + sign(sin(3*t)), y: -a*y + abs(cos(t/5))}
+    transitions: [{when: x >= curved, to: one, reset: {x: curved - a}}]
+initial: {mode: one, x: y/5 - 2, y: exp(w) + whole}
+experiment: {until: 3}
+"""
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("how", [{}, {"until": "a + abs(w)/5"}, {"initial": {"y": np.linspace(0, 2, 9)}}])
+def test_numbers_of_columns_are_those_of_single_runs(engine, how):
+    several = model(FUNCTIONS)
+    given = {"a": np.geomspace(0.1, 9, 9), "w": np.linspace(-4, 4, 9)}
+    assert_as_single_runs(several.ensemble(parameters=given, engine=engine, tolerance=1e-6, **how))
 
 
 MODES = """

@@ -8,9 +8,11 @@ executions of events that wait beyond the first are numbers of its start.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
+from itertools import repeat
 from operator import index
 from typing import TYPE_CHECKING, Any, SupportsIndex
 
@@ -21,6 +23,7 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import current
 from hsdsl.base.names import did_you_mean, nth_memory, without_memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, TIE, Arithmetic, Number, multiprecision
+from hsdsl.base.numbers.columns import COLUMNS, Column, each, varies
 from hsdsl.base.parts import meant, numbers_of, of_all
 from hsdsl.engine.backends.python import PythonKernel, compile_routines
 from hsdsl.engine.execution import Array
@@ -112,7 +115,7 @@ class Values:
 
     def constant(self, name: str) -> Row:
         """One of the program's constants; its numbers must be finite."""
-        return self.alone().constant(name, name)[0]
+        return self.alone().constant(name, name)
 
     def has(self, name: str) -> bool:
         """Whether the file gives this constant."""
@@ -120,57 +123,101 @@ class Values:
 
     def alone(self) -> InstanceTable:
         """A table of one instance, which refuses by an exception."""
-        return InstanceTable(self, [self.parameters], strict=True)
+        return InstanceTable(self, parameters=self.parameters)
+
+
+_SIGNALS = (*DOMAIN_ERRORS, FloatingPointError)
 
 
 @dataclass
 class InstanceTable:
-    """Numbers of instances; ``rows`` has their parameters.
+    """Numbers of so many instances, by columns; ``parameters`` has those of each parameter.
 
     ``refused`` has the instances without numbers, and why; with ``strict`` a refusal is an exception.
     """
 
     values: Values
-    rows: list[Row]
+    count: int = 1
+    parameters: Row = ()
     refused: dict[int, str] = field(default_factory=dict[int, str])
-    strict: bool = False
+    strict: bool = True
 
-    def refuse(self, instance: int, why: str) -> None:
-        """Note why an instance has no numbers; the first reason counts."""
-        if self.strict:
-            raise UsageError(why)
-        self.refused.setdefault(instance, why)
+    @staticmethod
+    def of_many(values: Values, count: int) -> InstanceTable:
+        """A table of instances whose numbers may be arrays."""
+        return InstanceTable(replace(values, kernel=values.kernel.over(COLUMNS)), count, strict=False)
 
-    def of(self, routine: Routine, what: str) -> list[Row]:
-        """The values of a routine of the parameters, of every instance."""
+    def refuse(self, bad: Column, why: Callable[[int], str]) -> None:
+        """Note why instances have no numbers, where ``bad`` is true of them; the first reason counts."""
+        if bad is False:
+            return
+        for instance in np.flatnonzero(np.broadcast_to(bad, self.count)).tolist():
+            if self.strict:
+                raise UsageError(why(instance))
+            self.refused.setdefault(instance, why(instance))
+
+    def of(self, routine: Routine, what: str, *further: Column) -> Row:
+        """The columns of a routine of the parameters, and of further columns."""
+        arguments = *self.parameters, *further
         try:
-            rows = [routine(*row) for row in self.rows]
-        except DOMAIN_ERRORS:
-            attempts = [_attempt(routine, row) for row in self.rows]
-            width = max(map(len, attempts))
-            rows = [row or (self.values.kernel.arithmetic.functions["nan"],) * max(1, width) for row in attempts]
-        isfinite = self.values.kernel.arithmetic.isfinite
-        for i, numbers in enumerate(rows):
-            if not all(map(isfinite, numbers)):
-                self.refuse(i, f"{what} has no finite value with these parameters")
-        return rows
+            if self.strict:
+                found = routine(*arguments)
+            else:
+                with np.errstate(divide="raise", invalid="raise", over="ignore"):
+                    found = routine(*arguments)
+        except _SIGNALS:
+            found = self._one_by_one(routine, arguments)
+        for column in found:
+            self.refuse(self._lacks(column), lambda _: f"{what} has no finite value with these parameters")
+        return tuple(map(_finite, found))
 
-    def constant(self, name: str, what: str) -> list[Row]:
-        """One of the program's constants, of every instance."""
+    def _one_by_one(self, routine: Routine, arguments: Row) -> Row:
+        """The columns of a routine that some instances have no value of."""
+        rows = [_attempt(routine, row) for row in self.rows(arguments)]
+        nan, width = self.values.kernel.arithmetic.functions["nan"], max(map(len, rows), default=0)
+        columns = zip(*(row or (nan,) * max(1, width) for row in rows), strict=True)
+        return tuple(column[0] if self.strict else np.array(column, float) for column in columns)
+
+    def rows(self, columns: Sequence[Column]) -> Iterable[Row]:
+        """The numbers of each instance."""
+        if self.strict or not columns:
+            return repeat(tuple(columns), self.count)
+        return zip(*(column_of(column, self.count).tolist() for column in columns), strict=True)
+
+    def _lacks(self, column: Column) -> Column:
+        """Whether the numbers of a column are not finite."""
+        if varies(column):
+            return ~np.isfinite(column)
+        return not self.values.kernel.arithmetic.isfinite(column)
+
+    def constant(self, name: str, what: str) -> Row:
+        """The columns of one of the program's constants."""
         constant = self.values.kernel.constant
         return self.of(lambda *row: constant(name, row), what)
 
-    def expression(self, value: Any, what: str) -> list[Number]:
-        """A number or an expression of all parameters, of every instance."""
-        routine = self.values.routine(value, what, len(self.values.program.parameters))
-        return [row[0] for row in self.of(routine, what)]
+    def expression(self, value: Any, what: str) -> Column:
+        """A number or an expression of all parameters."""
+        return self.of(self.values.routine(value, what, len(self.values.program.parameters)), what)[0]
 
-    def given(self, column: Sequence[Number], what: str) -> list[Number]:
+    def given(self, column: Column, what: str) -> Column:
         """The numbers that a call gives to the instances."""
-        isfinite = self.values.kernel.arithmetic.isfinite
-        for i in (i for i, value in enumerate(column) if not isfinite(value)):
-            self.refuse(i, f"{what}: {column[i]} has no finite value")
-        return list(column)
+        self.refuse(self._lacks(column), lambda i: f"{what}: {at(column, i)} has no finite value")
+        return _finite(column)
+
+
+def _finite(column: Column) -> Column:
+    """A column with not-a-number where it is not finite, which further arithmetic takes without a warning."""
+    return np.where(np.isfinite(column), column, np.nan) if varies(column) else column
+
+
+def at(column: Column, instance: int) -> Number:
+    """The number of an instance."""
+    return column[instance].item() if varies(column) else column
+
+
+def column_of(column: Column, count: int) -> Array:
+    """A column as an array with a number of each of so many instances."""
+    return np.broadcast_to(np.asarray(column, float), count)
 
 
 def _attempt(routine: Routine, row: Row) -> Row:
@@ -182,36 +229,35 @@ def _attempt(routine: Routine, row: Row) -> Row:
 
 def with_parameters(values: Values, overrides: Mapping[str, Any]) -> Values:
     """The values of a single run with these overrides."""
-    columns = InstanceTable(values, [()], strict=True)
-    evaluate_parameters(columns, overrides, {})
-    return replace(values, parameters=columns.rows[0])
+    table = InstanceTable(values)
+    evaluate_parameters(table, overrides, {})
+    return replace(values, parameters=table.parameters)
 
 
-def evaluate_parameters(
-    columns: InstanceTable, shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]
-) -> None:
+def evaluate_parameters(table: InstanceTable, shared: Mapping[str, Any], varied: Mapping[str, Column]) -> None:
     """Evaluate the parameters in file order, derived ones anew, and check the bounds of the file."""
-    values = columns.values
-    program = values.program
+    values, program = table.values, table.values.program
     for name in (*shared, *varied):
         if name not in program.parameters:
             raise UsageError(f"the model has no parameter '{name}'", _elsewhere(name, program))
     for i, name in enumerate(program.parameters):
         what = f"parameter {name}"
         if name in varied:
-            column = columns.given(varied[name], what)
+            column = table.given(varied[name], what)
         elif name in shared:
-            column = [row[0] for row in columns.of(values.routine(shared[name], what, i), what)]
+            (column,) = table.of(values.routine(shared[name], what, i), what)
         else:
-            column = [row[0] for row in columns.constant(f"parameter_{i}", what)]
-        columns.rows = [(*row, number) for row, number in zip(columns.rows, column, strict=True)]
+            (column,) = table.constant(f"parameter_{i}", what)
+        table.parameters = (*table.parameters, column)
     for i, name in enumerate(program.parameters):
         for kind, sign in (("minimum", 1), ("maximum", -1)):
-            bounds = columns.constant(f"{kind}_{i}", f"the {kind} of {name}") if values.has(f"{kind}_{i}") else ()
-            for k, (bound,) in enumerate(bounds):
-                if sign * (columns.rows[k][i] - bound) < 0:
-                    value = show(columns.rows[k][i])
-                    columns.refuse(k, f"parameter {name} = {value} is beyond its {kind} {show(bound)}")
+            if values.has(f"{kind}_{i}"):
+                (bound,), own = table.constant(f"{kind}_{i}", f"the {kind} of {name}"), table.parameters[i]
+                table.refuse(sign * (own - bound) < 0, partial(_beyond, name, kind, own, bound))
+
+
+def _beyond(name: str, kind: str, own: Column, bound: Column, instance: int) -> str:
+    return f"parameter {name} = {show(at(own, instance))} is beyond its {kind} {show(at(bound, instance))}"
 
 
 def _elsewhere(name: str, program: Program) -> str | None:
@@ -229,8 +275,7 @@ def initial_state(values: Values, overrides: Mapping[str, Any]) -> tuple[int, tu
     """The initial mode's index, its states and their values; ``overrides`` may name ``mode`` and states."""
     overrides = start_of_parts(values.program, overrides)
     index, states = initial_layout(values, overrides)
-    columns = initial_columns(values.alone(), states, overrides, {})
-    return index, states, tuple(column[0] for column in columns)
+    return index, states, initial_columns(values.alone(), states, overrides, {})
 
 
 def start_of_parts(program: Program, overrides: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -286,38 +331,31 @@ def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, t
 
 
 def initial_columns(
-    columns: InstanceTable, states: Sequence[str], shared: Mapping[str, Any], varied: Mapping[str, Sequence[Number]]
-) -> list[Sequence[Number]]:
+    table: InstanceTable, states: Sequence[str], shared: Mapping[str, Any], varied: Mapping[str, Column]
+) -> Row:
     """The initial value of each state, of every instance; those that use a given one follow it."""
-    numbers: dict[str, Sequence[Number]] = {}
+    program, numbers = table.values.program, dict[str, Column]()
     for name in states:
         if name in varied:
-            numbers[name] = columns.given(varied[name], f"initial.{name}")
+            numbers[name] = table.given(varied[name], f"initial.{name}")
         elif name in shared:
-            numbers[name] = columns.expression(shared[name], f"initial.{name}")
-    if columns.values.program.initial_order and numbers:
-        numbers = _following(columns, numbers) | numbers
+            numbers[name] = table.expression(shared[name], f"initial.{name}")
+    if program.initial_order and numbers:
+        numbers = _following(table, numbers) | numbers
     else:
-        in_file = columns.constant("initial", "initial")
-        numbers = dict(zip(columns.values.program.initial_states, zip(*in_file, strict=True), strict=False)) | numbers
-    return [numbers[name] for name in states]
+        numbers = dict(zip(program.initial_states, table.constant("initial", "initial"), strict=False)) | numbers
+    return tuple(numbers[name] for name in states)
 
 
-def _following(columns: InstanceTable, given: Mapping[str, Sequence[Number]]) -> dict[str, Sequence[Number]]:
+def _following(table: InstanceTable, given: Mapping[str, Column]) -> dict[str, Column]:
     """The initial values of the file, those that use a given one computed from it."""
-    program, arithmetic = columns.values.program, columns.values.kernel.arithmetic
+    program, arithmetic = table.values.program, table.values.kernel.arithmetic
     routines = compile_routines(program.initial_values, arithmetic, "initial")()
-    zero: Sequence[Number] = [arithmetic.zero] * len(columns.rows)
-    numbers: dict[str, Sequence[Number]] = {name: given.get(name, zero) for name in program.initial_states}
+    numbers: dict[str, Column] = {name: given.get(name, arithmetic.zero) for name in program.initial_states}
     for i, routine in zip(program.initial_order, routines, strict=True):
         name = program.initial_states[i]
-        if name in given:
-            continue
-        rows = [(*row, *own) for row, *own in zip(columns.rows, *numbers.values(), strict=True)]
-        joined = InstanceTable(columns.values, rows, strict=columns.strict)
-        numbers[name] = [row[0] for row in joined.of(routine, f"initial.{name}")]
-        for instance, why in joined.refused.items():
-            columns.refuse(instance, why)
+        if name not in given:
+            (numbers[name],) = table.of(routine, f"initial.{name}", *numbers.values())
     return numbers
 
 
@@ -331,9 +369,8 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
     Raises UsageError: a number that is out of its range, or a method that cannot serve this model.
     """
     arithmetic = values.kernel.arithmetic
-    numbers: dict[str, Any]
-    (numbers,) = setting_columns(options, values.alone())
-    numbers = {"step": None, "tolerance": None} | numbers
+    numbers: dict[str, Any] = {"step": None, "tolerance": None} | setting_columns(options, values.alone())
+    numbers["max_transitions"] = int(numbers["max_transitions"])
     until, step, tolerance = numbers["until"], numbers["step"], numbers["tolerance"]
     if step is not None and until > 0 and until + step == until:
         raise UsageError(f"a step of {step} is lost in the round-off of until = {until}", "take a larger step")
@@ -356,45 +393,32 @@ def settings_of(options: Options, values: Values, overrides: Mapping[str, Any]) 
     )
 
 
-def setting_columns(options: Options, columns: InstanceTable) -> list[dict[str, Any]]:
+def setting_columns(options: Options, table: InstanceTable) -> dict[str, Any]:
     """The numbers of the settings of every instance, by their names in `Settings`."""
     scales = [name for name in options.values if name.startswith(SCALE)]
-    names = ("until", "max_transitions", "relaxation", options.size, *scales)
-    numbers = zip(*(_column(options, columns, name) for name in names), strict=True)
-    rows: list[dict[str, Any]] = [dict(zip(names, row, strict=True)) for row in numbers]
-    by_default, refused = options.values["relaxation"].origin == DEFAULT, columns.refused
-    for i, row in enumerate(rows):
-        if i not in refused and (why := _refusal(row)):
-            columns.refuse(i, why)
-        if i not in refused:
-            row["max_transitions"] = int(row["max_transitions"])
-            if by_default:
-                row["relaxation"] = least_relaxation(row["relaxation"], row["until"])
-        row["scale"] = {name.removeprefix(SCALE): row.pop(name) for name in scales}
-    return rows
+    columns = {
+        name: _column(options, table, name)
+        for name in ("until", "max_transitions", "relaxation", options.size, *scales)
+    }
+    most = columns["max_transitions"]
+    table.refuse((most < 0) | (most % 1 != 0), lambda i: f"max_transitions must be a whole number, not {at(most, i)}")
+    table.refuse(columns["until"] < 0, lambda i: f"until must not be negative, not {at(columns['until'], i)}")
+    for name in ("relaxation", options.size, *scales):
+        table.refuse(columns[name] <= 0, lambda i, name=name: f"{name} must be positive, not {at(columns[name], i)}")
+    if options.values["relaxation"].origin == DEFAULT:
+        columns["relaxation"] = each(least_relaxation, columns["relaxation"], columns["until"])
+    return columns | {"scale": {name.removeprefix(SCALE): columns.pop(name) for name in scales}}
 
 
-def _column(options: Options, columns: InstanceTable, name: str) -> Sequence[Number]:
-    option, program = options.values[name], columns.values.program
+def _column(options: Options, table: InstanceTable, name: str) -> Column:
+    option, program = options.values[name], table.values.program
     state = name.removeprefix(SCALE)
     if state != name and state not in program.all_states:
         raise UsageError(f"{name}: the model has no state '{state}'", meant(state, program.all_states))
     if option.origin != FILE:
-        return columns.expression(option.value, name)
+        return table.expression(option.value, name)
     place = program.scaled_states.index(state) if state != name else 0
-    return [row[place] for row in columns.constant("scale" if state != name else name, name)]
-
-
-def _refusal(row: Mapping[str, Any]) -> str | None:
-    most = row["max_transitions"]
-    if most < 0 or most != int(most):
-        return f"max_transitions must be a whole number, not {most}"
-    for name, number in row.items():
-        if name == "until" and number < 0:
-            return f"until must not be negative, not {number}"
-        if not number > 0 and name not in ("until", "max_transitions"):
-            return f"{name} must be positive, not {number}"
-    return None
+    return table.constant("scale" if state != name else name, name)[place]
 
 
 def following_digits(settings: Settings, options: Options, arithmetic: Arithmetic) -> Settings:

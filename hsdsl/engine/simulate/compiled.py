@@ -32,6 +32,7 @@ from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.workspace import Workspace, Workspaces
 from hsdsl.mathematics.program import Program
 
+MOST_TRANSITIONS = 2**62
 NOTHING: Mapping[str, Number] = MappingProxyType({})  # to call a generic alias takes longer than a short run has
 
 
@@ -100,7 +101,7 @@ def task_settings(settings: Settings, states: tuple[str, ...]) -> Any:
         control.largest,
         settings.relaxation,
         settings.until,
-        min(settings.max_transitions, 2**62),
+        min(settings.max_transitions, MOST_TRANSITIONS),
         structures.SCHEMES.index(settings.scheme),
         settings.completion != "none",
         _doubles(scale),

@@ -41,6 +41,7 @@ STRETCH = 1e-3  # of the largest step: the time in which rejections are counted 
 BAND_FROM, BAND_TO = 0.9, 1.2  # an implicit step is kept where it would change by a factor between these
 LEAST_SEEN = 1e-10  # an error ratio below this counts as this
 LEAST_BEFORE = 0.3  # a root of the one before likewise
+FIRST_PART = 100  # the first step is the largest one divided by this
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
 
 
@@ -157,7 +158,7 @@ class Control:
 
 
 def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
-    """Start from the fixed step, or from a hundredth of the largest step and the error formula."""
+    """Start from the fixed step, or from a part of the largest step and the error formula."""
     order = settings.method.error_order if settings.method else 1
     if settings.step is not None:
         return Control(settings.step, None, order, settings.step, None)
@@ -165,7 +166,7 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     if settings.longest_step is not None:
         largest = min(largest, settings.longest_step)
     implicit = settings.method is not None and settings.method.implicit
-    control = Control(largest / 100, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
+    control = Control(largest / FIRST_PART, settings.tolerance, order, largest, arithmetic.functions["pow"], implicit)
     control.first_steps = iter(settings.first_steps) if settings.first_steps else None
     control.first = control.h
     control.least = max(control.tolerance, arithmetic.sqrt(arithmetic.unit)) * largest

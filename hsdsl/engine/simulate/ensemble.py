@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,12 +12,13 @@ import numpy as np
 from hsdsl.engine.execution import REASONS, Array
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate.columns import StateLayouts
-from hsdsl.engine.simulate.compiled import CompiledPlan, task_settings
+from hsdsl.engine.simulate.compiled import MOST_TRANSITIONS, CompiledPlan, task_settings
+from hsdsl.engine.simulate.control import FIRST_PART, LARGEST_SHARE
 from hsdsl.engine.simulate.input_segments import Timeline
-from hsdsl.engine.simulate.settings import Settings
+from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stops import codes_of
 
-TIMELINE = np.dtype([("segments", "i8"), ("start", "u8"), ("end", "u8"), ("jump", "u8"), ("data", "u8")])
+TIMELINE, SETTINGS = np.dtype(structures.Timeline), np.dtype(structures.Settings)
 LONGEST = f"U{max(map(len, REASONS))}"
 NOTICED = {"in contact": "held", "replaced": "replaced", "unsettled": "rough", "crowded": "crowded"}
 SLID = 16  # the bit of `HS_SLID`
@@ -29,12 +29,16 @@ Logged = tuple[Array, Array, Array]  # transitions as `hs_transition`, and the s
 
 @dataclass(frozen=True, eq=False)
 class Instances:
-    """What differs between instances.
+    """What differs between so many instances, as columns: one number where all have it, else an array.
 
-    ``start`` has shape (instances, states), ``time`` (the samples, never decreasing) shape (instances, samples).
+    ``settings`` are ``until``, ``max_transitions``, ``relaxation`` and ``scale``, the last one by states. There is one
+    timeline that all have, but for ``parameters`` and ``until``, or one for each. ``start`` has shape (instances,
+    states), ``time`` (the samples, never decreasing) shape (instances, samples).
     """
 
-    settings: Sequence[Settings]
+    count: int
+    settings: Mapping[str, Any]
+    parameters: Sequence[Any]
     timelines: Sequence[Timeline]
     start: Array
     time: Array
@@ -63,6 +67,13 @@ class Kept:
         self.states = np.full((instances, columns, samples), nan)
         self.results = np.full((instances, samples, outputs), nan)
 
+    def told(self) -> None:
+        """Put into words what the compiled loop has said by numbers."""
+        self.stop[:] = np.array([*structures.STOPPED, "interrupted"], LONGEST)[self.reason]
+        for notices in np.unique(self.notices).tolist():
+            codes = codes_of(kind for bit, kind in KINDS_OF_NOTICES if notices >> bit & 1)
+            self.noted[self.notices == notices] = codes
+
     def logged(self) -> Logged:
         """Every transition, in the order of the instances."""
         empty = np.empty(0, structures.TRANSITION), np.empty((0, self.width)), np.empty((0, self.width))
@@ -83,10 +94,9 @@ class CompiledEnsemble:
         self._plan, self._kept = plan, kept
         self._start = np.ascontiguousarray(instances.start, np.float64)
         self._time = np.ascontiguousarray(instances.time, np.float64)
-        self._settings = (structures.Settings * len(instances.settings))(
-            *(task_settings(settings, plan.problem.program.all_states) for settings in instances.settings)
-        )
-        self._timelines, self._numbers = _timelines(instances.timelines)
+        self._settings, *of_settings = _settings(plan.problem, instances)
+        self._timelines, *of_timelines = _timelines(instances)
+        self._numbers = of_settings, of_timelines  # what they point into
         self._names, self._layouts = names, plan.layouts
         modes = plan.problem.program.modes
         self._slides = np.array([bool(mode.slides) for mode in modes] * any(mode.slides for mode in modes), np.int32)
@@ -106,21 +116,15 @@ class CompiledEnsemble:
         table, kept = place.table, self._kept
         table.done, table.instances = 0, last - first
         table.samples, table.most_transitions = self._time.shape[1], kept.crossed.shape[1]
-        table.timeline, table.start, table.time = (
-            _row(self._timelines, first),
-            _row(self._start, first),
-            _row(self._time, first),
-        )
-        table.settings = ctypes.addressof(self._settings) + first * ctypes.sizeof(structures.Settings)
+        for name, column in (("timeline", self._timelines), ("settings", self._settings)):
+            setattr(table, name, _row(column, first))
+        table.start, table.time = _row(self._start, first), _row(self._time, first)
         table.stop, table.slides = self._stop.ctypes.data, self._slides.ctypes.data if len(self._slides) else None
         for name in BY_INSTANCE:
             setattr(table, name, _row(getattr(kept, name), first))
         place.workspace.run_ensemble(table)
         if place.workspace.failed:
             raise place.workspace.failed[0]
-        known = np.array([*structures.STOPPED, "interrupted"], LONGEST)
-        kept.stop[first:last] = known[kept.reason[first:last]]
-        kept.noted[first:last] = [_codes(notices) for notices in kept.notices[first:last].tolist()]
         if kept.logs:
             kept.log[first] = place.logged(int(kept.transitions[first:last].sum()))
 
@@ -181,28 +185,54 @@ class ThreadWorkspace:
         return first, second, third
 
 
-@cache
-def _codes(notices: int) -> str:
-    """The codes of notices, a bit each."""
-    return codes_of(kind for bit, kind in KINDS_OF_NOTICES if notices >> bit & 1)
-
-
 def _row(array: Any, row: int) -> int:
     return array.ctypes.data + row * array.strides[0] if len(array) else array.ctypes.data
 
 
-def _timelines(timelines: Sequence[Timeline]) -> tuple[Array, tuple[Array, ...]]:
+def _settings(problem: Problem, instances: Instances) -> tuple[Array, ...]:
+    """The settings of all instances as ``hs_settings``, and the columns they point into."""
+    states, given = problem.program.all_states, instances.settings
+    base = np.frombuffer(task_settings(problem.settings, states), SETTINGS)
+    table = np.repeat(base, instances.count)
+    for name in ("until", "relaxation", "max_transitions"):
+        table[name] = np.minimum(given[name], MOST_TRANSITIONS) if name == "max_transitions" else given[name]
+    if problem.settings.tolerance is not None:
+        table["largest"] = table["until"] * LARGEST_SHARE
+        table["step"] = table["largest"] / FIRST_PART
+    scale = np.zeros((instances.count, len(states)))
+    for name, column in given["scale"].items():
+        scale[:, states.index(name)] = column
+    if given["scale"]:
+        table["scale"] = _rows(scale)
+    return table, base, scale
+
+
+def _timelines(instances: Instances) -> tuple[Array, ...]:
     """All timelines as ``hs_timeline``, and the columns they point into."""
+    timelines, n = instances.timelines, instances.count
     counts = np.array([len(timeline.segments) for timeline in timelines])
     segments = [segment for timeline in timelines for segment in timeline.segments]
-    columns = (
-        np.array([s.start for s in segments]),
-        np.array([s.end for s in segments]),
-        np.array([s.jump for s in segments], np.int32),
-        np.array([s.data for s in segments], np.float64).reshape(len(segments), -1),
-    )
-    table, first = np.empty(len(timelines), TIMELINE), np.cumsum(counts) - counts
+    first = np.cumsum(counts) - counts
+    columns = {
+        "start": np.array([s.start for s in segments]),
+        "end": np.array([s.end for s in segments]),
+        "jump": np.array([s.jump for s in segments], np.int32),
+        "data": np.array([s.data for s in segments], np.float64).reshape(len(segments), -1),
+    }
+    table = np.empty(n, TIMELINE)
     table["segments"] = counts
-    for name, column in zip(("start", "end", "jump", "data"), columns, strict=True):
-        table[name] = column.ctypes.data + first * column.strides[0]
-    return table, columns
+    for name, column in columns.items():
+        table[name] = _rows(column)[first]
+    if len(timelines) == 1:
+        columns["data"] = np.tile(columns["data"], (n, 1, 1))
+        for k, column in enumerate(instances.parameters):
+            columns["data"][:, :, k] = np.reshape(column, (-1, 1))
+        columns["end"] = np.tile(columns["end"], (n, 1))
+        columns["end"][:, -1] = instances.settings["until"]
+        table["data"], table["end"] = _rows(columns["data"]), _rows(columns["end"])
+    return table, *columns.values()
+
+
+def _rows(column: Array) -> Array:
+    """The addresses of the rows of an array."""
+    return column.ctypes.data + np.arange(len(column)) * column.strides[0]

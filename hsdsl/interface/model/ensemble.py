@@ -7,11 +7,12 @@ instance. What runs keep is put into arrays.
 from __future__ import annotations
 
 import math
+import re
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,14 +21,17 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import INITIAL
 from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
+from hsdsl.base.numbers.columns import Column, varies
 from hsdsl.engine.execution import Array, Ensemble, Execution, Transition, TransitionTable
 from hsdsl.engine.execution.run import columns_by_name
 from hsdsl.engine.preparation import automatic
-from hsdsl.engine.preparation.options import KEYS, Options, check_arguments, overrides_of
+from hsdsl.engine.preparation.options import KEYS, check_arguments, overrides_of
+from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.preparation.values import (
     InstanceTable,
     check_alone,
     check_memory,
+    column_of,
     evaluate_parameters,
     initial_columns,
     setting_columns,
@@ -35,10 +39,12 @@ from hsdsl.engine.preparation.values import (
     whole,
 )
 from hsdsl.engine.runtime import structures
-from hsdsl.engine.simulate import Prepared, Settings
+from hsdsl.engine.simulate import Prepared
 from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.compiled import CompiledPlan
 from hsdsl.engine.simulate.ensemble import CompiledEnsemble, Instances, Kept, Logged
+from hsdsl.engine.simulate.input_segments import Timeline
+from hsdsl.mathematics.program import Routines
 
 if TYPE_CHECKING:
     from hsdsl.interface.model.runs import Runs
@@ -58,7 +64,7 @@ class PreparedEnsemble:
 
     request: EnsembleRequest
     base: Prepared
-    columns: InstanceTable
+    table: InstanceTable
     places: list[int]
     instances: Instances
     kinds: list[tuple[str, ...]]
@@ -137,7 +143,7 @@ class PreparedEnsemble:
 
         def placed(array: Array, missing: Any) -> Array:
             """Put an array in its place among all instances."""
-            full = np.full((len(self.columns.rows), *array.shape[1:]), missing, dtype=array.dtype)
+            full = np.full((self.table.count, *array.shape[1:]), missing, dtype=array.dtype)
             full[self.places] = array
             return full.reshape((*shape, *array.shape[1:]))
 
@@ -148,7 +154,7 @@ class PreparedEnsemble:
         sampled += [(name, kept.results[:, :, i]) for i, name in enumerate(program.outputs)]
         final, _ = columns_by_name(kept.final, kept.kind, self.kinds, self.names)
         modes = np.array([*program.mode_names, ""])
-        refused = self.columns.refused.items()
+        refused = self.table.refused.items()
         return Ensemble(
             model=program.path,
             digest=program.digest,
@@ -196,45 +202,63 @@ def prepare_ensemble(request: EnsembleRequest) -> PreparedEnsemble:
     """
     model, call = request.model, request.call
     pipeline = model.pipeline
-    values = pipeline.values(FLOAT64)
-    columns = InstanceTable(values, [()] * math.prod(request.shape))
-    evaluate_parameters(columns, call["parameters"], request.arrays(initial=False))
+    table = InstanceTable.of_many(pipeline.values(FLOAT64), math.prod(request.shape))
+    evaluate_parameters(table, call["parameters"], request.arrays(initial=False))
     finite = np.logical_and.reduce([np.isfinite(array) for array in request.varied.values()] or [[True]])
-    first = next((k for k in np.flatnonzero(finite).tolist() if k not in columns.refused), None)
+    first = next((k for k in np.flatnonzero(finite).tolist() if k not in table.refused), None)
     if first is None:
-        why = next(iter(columns.refused.values()), "there is none" if len(finite) == 0 else "a value is not finite")
+        why = next(iter(table.refused.values()), "there is none" if len(finite) == 0 else "a value is not finite")
         raise NothingToRunError(why)
     base = automatic.settled(pipeline.prepare(request.single(first)))
     varied = request.arrays(initial=True)
     shared = start_of_parts(pipeline.program, dict.fromkeys(varied) | call["initial"])
     shared = {name: value for name, value in shared.items() if name not in varied}
-    start = np.array(initial_columns(columns, base.states, shared, varied), dtype=float)
-    check_alone(base.program.modes[base.mode], start)
+    start = np.empty((table.count, len(base.states)))
+    for k, column in enumerate(initial_columns(table, base.states, shared, varied)):
+        start[:, k] = column
+    check_alone(base.program.modes[base.mode], start.T)
     options = pipeline.resolve(call.get("settings"), {key: call.get(key) for key in KEYS})
-    settings = _settings(columns, base.settings, options)
-    places = list(settings)
-    until = np.full(len(columns.rows), math.nan)
-    until[places] = [settings[k].until for k in places]
-    samples, times = request.times(until, columns)
-    kept = 2 * len(base.states) + request.transition_times + samples * (1 + len(model.columns))
-    check_memory(base.settings.memory, len(columns.rows), "instances", kept)
-    instances = Instances(
-        settings=list(settings.values()),
-        timelines=[pipeline.timeline(values, columns.rows[k], settings[k].until) for k in places],
-        start=start.reshape(len(base.states), len(columns.rows)).T[places],
-        time=times()[places],
-    )
-    kinds = list(StateLayouts(model.program, base.states).kinds)
-    return PreparedEnsemble(request, base, columns, places, instances, kinds)
-
-
-def _settings(columns: InstanceTable, base: Settings, options: Options) -> dict[int, Settings]:
-    """The settings of every instance that can be run, by its number."""
-    rows = enumerate(setting_columns(options, columns))
-    kept: Mapping[int, dict[str, Any]] = {k: row for k, row in rows if k not in columns.refused}
-    if any(row[options.size] != getattr(base, options.size) for row in kept.values()):
+    settings = setting_columns(options, table)
+    places = np.setdiff1d(np.arange(table.count), list(table.refused))
+    if np.any(np.broadcast_to(settings[options.size], table.count)[places] != getattr(base.settings, options.size)):
         raise UsageError(f"{options.size} differs between the instances of an ensemble", "give it as a number")
-    return {k: replace(base, **row) for k, row in kept.items()}
+    until = np.full(table.count, math.nan)
+    until[places] = np.broadcast_to(settings["until"], table.count)[places]
+    samples, times = request.times(until, table)
+    kept = 2 * len(base.states) + request.transition_times + samples * (1 + len(model.columns))
+    check_memory(base.settings.memory, table.count, "instances", kept)
+
+    def placed(column: Column) -> Column:
+        """Leave those out that are refused."""
+        return column[places] if varies(column) else column
+
+    settings = {name: placed(settings[name]) for name in ("until", "relaxation", "max_transitions")} | {
+        "scale": {name: placed(column) for name, column in settings["scale"].items()}
+    }
+    parameters = [*map(placed, table.parameters)]
+    timelines = _timelines(pipeline, base, parameters, settings["until"], len(places))
+    instances = Instances(len(places), settings, parameters, timelines, placed(start), times()[places])
+    kinds = list(StateLayouts(model.program, base.states).kinds)
+    return PreparedEnsemble(request, base, table, places.tolist(), instances, kinds)
+
+
+def _timelines(
+    pipeline: Pipeline, base: Prepared, parameters: Sequence[Column], until: Column, count: int
+) -> list[Timeline]:
+    """The timeline that instances share but for their parameters and ends; that of each where there is none such."""
+    program = base.program
+    decisive = parameters_of(program.constants, "input_") | parameters_of(program.switching, "")
+    timed = until if program.inputs or program.switches else None
+    if not varies(timed, *(column for k, column in enumerate(parameters) if f"p{k}" in decisive)):
+        return [base.timeline]
+    rows = zip(*(column_of(column, count).tolist() for column in (*parameters, until)), strict=True)
+    return [pipeline.timeline(pipeline.values(FLOAT64), row, end) for *row, end in rows]
+
+
+def parameters_of(routines: Routines, name: str) -> set[str]:
+    """The parameters that routines are computed from, of those whose names begin so."""
+    texts = (text for text in routines.source.split("    def ")[1:] if text.startswith(name))
+    return set(re.findall(r"\bp\d+\b", "".join(texts)))
 
 
 def run_ensemble(
@@ -296,10 +320,10 @@ class EnsembleRequest:
         flat = {name: array.reshape(-1) for name, array in zip(varied, common, strict=True)}
         return EnsembleRequest(model, call, flat, shape, _samples(samples), transition_times, every_transition)
 
-    def arrays(self, initial: bool) -> dict[str, list[float]]:
+    def arrays(self, initial: bool) -> dict[str, Array]:
         """The columns of initial states or of parameters, by name."""
         columns = ((name, array) for name, array in self.varied.items() if name.startswith(INITIAL) == initial)
-        return {name.removeprefix(INITIAL): array.tolist() for name, array in columns}
+        return {name.removeprefix(INITIAL): array for name, array in columns}
 
     def __call__(self, place: tuple[int, ...]) -> Execution:
         """Run the instance at a place."""
@@ -326,7 +350,7 @@ class EnsembleRequest:
         if given is None:
             return 0, lambda: np.empty((len(until), 0))
         if isinstance(given, str):
-            return _times_every(np.array(table.expression(given, "the time between samples"), float), until)
+            return _times_every(column_of(table.expression(given, "the time between samples"), table.count), until)
         if isinstance(given, int):
             return given, lambda: _evenly(until, given)
         return len(given), lambda: np.tile(given, (len(until), 1))
@@ -377,7 +401,7 @@ def _samples(given: Any) -> int | Array | str | None:
     raise UsageError("samples of an ensemble are times from 0 on that never decrease, or a whole number of at least 2")
 
 
-SLICE = 32  # instances that a thread takes at a time
+SHARE = 4  # a thread takes this part of what is its share of the instances that are left, so that all end together
 INTERVAL = 0.1  # seconds between looks at how far it is
 Progress = Callable[[int, int], None]
 
@@ -391,19 +415,19 @@ def run_compiled(
     progress: Progress | None,
 ) -> None:
     """Run all instances on so many threads; at Ctrl-C finished ones are kept."""
-    ensemble, count = CompiledEnsemble(plan, instances, kept, names), len(instances.settings)
-    firsts, failed = iter(range(0, count, SLICE)), list[BaseException]()
+    ensemble, count = CompiledEnsemble(plan, instances, kept, names), instances.count
+    slices, failed = iter(_slices(count, threads)), list[BaseException]()
 
     def work() -> None:
         try:
             place = ensemble.place()
-            while not ensemble.stopped and (first := next(firsts, None)) is not None:  # one at a time: the GIL
-                ensemble.work(first, min(first + SLICE, count), place)
+            while not ensemble.stopped and (taken := next(slices, None)) is not None:  # one at a time: the GIL
+                ensemble.work(*taken, place)
         except BaseException as error:
             failed.append(error)
             ensemble.stop()
 
-    workers = [threading.Thread(target=work, daemon=True) for _ in range(min(threads, max(1, -(-count // SLICE))))]
+    workers = [threading.Thread(target=work, daemon=True) for _ in range(min(threads, count))]
     for worker in workers:
         worker.start()
     try:
@@ -420,3 +444,14 @@ def run_compiled(
             worker.join()
     if failed:
         raise failed[0]
+    kept.told()
+
+
+def _slices(count: int, threads: int) -> list[tuple[int, int]]:
+    """Instances that a thread takes at a time, from the first up to the last: fewer towards the end."""
+    found, first = list[tuple[int, int]](), 0
+    while first < count:
+        last = first + -(-(count - first) // (SHARE * threads))
+        found.append((first, last))
+        first = last
+    return found
