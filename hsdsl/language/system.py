@@ -390,6 +390,7 @@ class HybridSystem:
     functions: tuple[FunctionText, ...] = ()
     unknowns: tuple[str, ...] = ()  # of linear equations: their solutions are substituted everywhere
     assumptions: tuple[str, ...] = ()  # sentences that every run tells
+    ranges: tuple[tuple[str, sp.Expr, sp.Expr], ...] = ()  # states that start anywhere from one value to another
 
     def __post_init__(self) -> None:
         names = [mode.name for mode in self.modes]

@@ -341,7 +341,8 @@ class Program:
     order ``initial_values`` has a routine of the parameters and ``initial_states`` for each.
 
     ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.
-    ``assumptions`` are sentences that every run tells.
+    ``assumptions`` are sentences that every run tells. ``ranges`` names the states that may start in a range: then
+    ``constants`` has its ends, ``least`` and ``most``, and ``initial`` the centre.
     """
 
     path: str
@@ -367,6 +368,7 @@ class Program:
     contacts: tuple[ModeProgram, ...] = ()
     parts: tuple[Part, ...] = ()
     assumptions: tuple[str, ...] = ()
+    ranges: tuple[str, ...] = ()
 
     @property
     def flows(self) -> tuple[ModeProgram, ...]:

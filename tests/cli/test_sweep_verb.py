@@ -48,7 +48,8 @@ def test_a_sweep_that_has_no_picture_is_summarised(command, model, tmp_path):
     ("words", "message"),
     [
         ([], "expected a model, or --show DIR"),
-        (["MODEL"], "expected --vary"),
+        (["MODEL"], "expected --out DIR"),
+        (["MODEL", "--out", "OUT"], "a sweep needs something that varies"),
         (["MODEL", "--vary", "rate=1"], "expected --out DIR"),
         (["MODEL", "--vary", "rat=1", "--out", "OUT"], "initial value 'rat'\n  hint: did you mean 'rate'"),
         (["MODEL", "--vary", "rate=1:x:3", "--out", "OUT"], "--vary rate"),

@@ -57,7 +57,7 @@ scene:
   - {circle: [xm + xs, xm - xs], radius: xs + xm}
   - {box: [xm + xs, xm - xs], width: xs + xm, height: xs + xm, angle: xs + xm}
 units: {xm: m, xs: s, t: s}
-initial: {mode: m, x: xm + xs}
+initial: {mode: m, x: START}
 experiment:
   until: xm + xs
   step: xm + xs
@@ -77,7 +77,8 @@ reference:
 def documents():
     for samples in ("xm + xs", "[xm + xs, xm - xs]", "{every: xm + xs}"):
         findings = Findings("whole.yaml")
-        text = decode("whole.yaml", WHOLE.replace("SAMPLES", samples).encode())
+        start = "xm + xs" if samples == "xm + xs" else "{min: xm - xs, max: xm + xs}"
+        text = decode("whole.yaml", WHOLE.replace("SAMPLES", samples).replace("START", start).encode())
         yield read(compose(text, findings), findings)
         assert not findings.diagnostics
 

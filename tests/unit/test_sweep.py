@@ -416,3 +416,27 @@ def test_models_without_a_file_are_called_so(model, tmp_path):
         sweep = one.sweep(["c=0.7,0.8"], tmp_path / name)
         for shown in (repr(ensemble), ensemble._repr_html_(), repr(sweep), sweep.summary):
             assert name in shown and "text>" not in shown
+
+
+def test_an_initial_box_is_drawn_from_where_nothing_else_is_given(tmp_path):
+    box = hsdsl.loads(TEXT.replace("x: 0, v: 5}", "x: {min: 0, max: c}, v: {min: 4, max: 6}}"))
+    texts = ["initial.x~uniform(0, 0.8)", "initial.v~uniform(4, 6)"]
+    expected = read(["g=9,10", *texts], 50, 3).values(0, 100)
+    found = box.sweep(["g=9,10"], tmp_path / "box", random=50, seed=3)
+    assert [found[name].tolist() for name in expected] == [column.tolist() for column in expected.values()]
+    run = box.simulate(
+        initial={"x": float(found["initial.x"][7]), "v": float(found["initial.v"][7])}, parameters={"g": 9}
+    )
+    assert run.final.state["x"] == found["final.x"][7]
+    fixed = box.sweep({"initial.x": [0.1, 0.2]}, tmp_path / "fixed", initial={"v": 5})
+    assert [item["name"] for item in fixed.as_json()["vary"]] == ["initial.x"]
+    with pytest.raises(UsageError, match="the number of draws is missing"):
+        box.sweep(["c=0.7,0.8"], tmp_path / "none")
+
+
+def test_a_run_says_that_it_took_the_centre_of_a_box():
+    box = hsdsl.loads(TEXT.replace("x: 0, v: 5}", "x: 0, v: {min: 4, max: 6}}"))
+    run = box.simulate()
+    assert run.final.state == hsdsl.loads(TEXT).simulate().final.state
+    (warning,) = run.warnings
+    assert warning.code == "HS707" and "v from 4 to 6" in warning.message and "centre" in warning.message

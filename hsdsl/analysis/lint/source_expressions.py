@@ -16,7 +16,6 @@ from hsdsl.language.expression.scope import functions_called
 from hsdsl.language.schema.documents import (
     AutomatonDocument,
     ExperimentDocument,
-    InitialDocument,
     InputFile,
     InputSamples,
     InstanceDocument,
@@ -24,7 +23,7 @@ from hsdsl.language.schema.documents import (
     ModelDocument,
     MultiplesDocument,
     ParameterEntry,
-    PartInitialDocument,
+    RangeDocument,
     ReferenceDocument,
     SolveDocument,
     SystemDocument,
@@ -119,8 +118,9 @@ def written(document: ModelDocument) -> Iterator[SourceExpression]:
         yield SourceExpression("output", scalar, name)
     for shape in document.scene:
         yield from _each("scene", (*chain.from_iterable(shape.points), *shape.sizes), "")
-    for name, scalar in _starts(document.initial).items():
-        yield SourceExpression("initial", scalar, name)
+    start = document.initial  # None in a system of parts
+    for name, given in (start.__pydantic_extra__ if start else {}).items():  # pyright: ignore[reportUnnecessaryComparison]
+        yield from _each("initial", (given.min, given.max) if isinstance(given, RangeDocument) else (given,), name)
     for name, part in document.system.items() if isinstance(document, SystemDocument) else ():
         yield from _of_instance(name, part)
     yield from _of_experiment(document.experiment)
@@ -149,15 +149,11 @@ def _of_instance(name: str, part: InstanceDocument) -> Iterator[SourceExpression
     tables: tuple[tuple[Role, Mapping[Key, Scalar]], ...] = (
         ("parameter", part.parameters),
         ("input", part.inputs),
-        ("initial", _starts(part.initial)),
+        ("initial", part.initial.__pydantic_extra__ if part.initial else {}),
     )
     for role, given in tables:
         for key, scalar in given.items():
             yield SourceExpression(role, scalar, f"{name}.{key}")
-
-
-def _starts(initial: InitialDocument | PartInitialDocument | None) -> Mapping[Key, Scalar]:
-    return {} if initial is None else initial.__pydantic_extra__
 
 
 def _of_experiment(experiment: ExperimentDocument) -> Iterator[SourceExpression]:

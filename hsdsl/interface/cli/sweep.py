@@ -61,8 +61,8 @@ def sweep(
                 engine=engine, random=random, seed=seed, record=record, cluster=cluster, processes=processes,
                 chunk=chunk, outputs=names_of(outputs) or None,
             )  # fmt: skip
-            assert model is not None and vary is not None and out is not None
-            found = _run(model, vary, out, settings, answer.hidden)
+            assert model is not None and out is not None
+            found = _run(model, vary or [], out, settings, answer.hidden)
         target = plot or (show and show / "_picture.png")
         if target is not None:
             _draw(found, target, of, {"tail": tail, "over": over}, any(x is not None for x in (plot, of, over)))
@@ -74,8 +74,6 @@ def _check(model: Path | None, vary: list[str] | None, out: Path | None, show: P
         raise UsageError("--show shows a dataset that is there, and takes neither MODEL nor --vary nor --out")
     if show is None and model is None:
         raise UsageError("expected a model, or --show DIR", "hsdsl sweep MODEL --vary c=0.5:0.9:101 --out DIR")
-    if show is None and not vary:
-        raise UsageError("expected --vary", "for example --vary c=0.5:0.9:101, or --vary initial.v=10:40:200")
     if show is None and out is None:
         raise UsageError("expected --out DIR, the folder of the dataset", "for example --out sweep")
 

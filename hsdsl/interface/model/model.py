@@ -335,6 +335,7 @@ class Model(Runs):
         vary : sequence of str or mapping
             Texts such as ``"c=0.5:0.95:101"`` and ``"c~normal(0.9, 0.02)"`` (`sweep.variation`), or by name what
             follows the name, or an array of values. Names are parameters, and initial states as ``initial.NAME``.
+            A state with a range under `initial` is drawn from it, where it is neither named here nor given.
         out : path
             The folder of the dataset: a new one, or that of the same sweep.
         random : int, optional

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import time
 from collections.abc import Generator, Mapping, Sequence
 from contextlib import contextmanager
@@ -24,7 +25,7 @@ from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import meant, of_all
 from hsdsl.base.processes import can_fork
 from hsdsl.engine.preparation.options import KEYS, as_written, check_arguments, overrides_of
-from hsdsl.engine.preparation.values import with_parameters
+from hsdsl.engine.preparation.values import Values, with_parameters
 from hsdsl.interface.model.ensemble import NothingToRunError, Progress, run_ensemble
 
 if TYPE_CHECKING:
@@ -104,6 +105,7 @@ def _planned(
     fixed: dict[str, Mapping[str, Any]] = {group: given.get(group) or {} for group in ("parameters", "initial")}
     shared = overrides_of(given, "parameters", model.program)
     values = with_parameters(model.pipeline.values(FLOAT64), shared)
+    vary = _with_ranges(values, vary, given.get("initial") or {})
     varied = variation.read(vary, random, seed, lambda value, where: float(values.number(value, where)))
     _check_names(model, varied.names, fixed)
     if chunk is not None and chunk < 1:
@@ -123,6 +125,23 @@ def _planned(
         outputs=tuple(name for name in program.outputs if name in kept),
         chunk=chunk or 1,
     )
+
+
+def _with_ranges(values: Values, vary: Sequence[str] | Mapping[str, Any], fixed: Mapping[str, Any]) -> Any:
+    """What varies, and the initial values that have a range and are neither varied nor given: draws from it."""
+    names = values.program.ranges
+    if not names:
+        return vary
+    ends = zip(names, values.constant("least"), values.constant("most"), strict=True)
+    if isinstance(vary, str):
+        vary = [vary]
+    given = [re.split("[=~]", entry)[0].strip() for entry in vary]
+    draws = {
+        f"{INITIAL}{name}": f"~uniform({float(low)!r}, {float(high)!r})"
+        for name, low, high in ends
+        if low < high and name not in fixed and f"{INITIAL}{name}" not in given
+    }
+    return {**vary, **draws} if isinstance(vary, Mapping) else [*vary, *(n + draw for n, draw in draws.items())]
 
 
 def _as_data(value: Any) -> Any:

@@ -17,13 +17,13 @@ order; `symbols` has what its names mean, and reads its expressions.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from hsdsl.base import limits
 from hsdsl.base.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
-from hsdsl.base.names import SINCE
+from hsdsl.base.names import SINCE, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.definitions import (
     define_functions,
@@ -143,6 +143,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     inputs = define_inputs(symbols)
     parts: tuple[Part, ...] = ()
     of_parts: dict[str, str] = {}
+    ranges: tuple[tuple[str, Any, Any], ...] = ()
     if isinstance(document, SystemDocument) and (document.system or document.automata):
         whole = Parts(symbols, document)
         parameters, parts = parameters + whole.parameters, whole.parts
@@ -153,7 +154,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         modes = elaborate_modes(symbols, outputs)
         scene, numbers = elaborate_scene(symbols)
         modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
-        initial = elaborate_initial(symbols)
+        initial, ranges = elaborate_initial(symbols)
     experiment = elaborate_experiment(symbols)
     units = of_parts | elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)
@@ -180,8 +181,17 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         definitions=tuple(substituted_definitions(document)),
         functions=functions,
         unknowns=tuple(str(name) for solve in solves if solve is not None for name in solve.unknowns),
-        assumptions=tuple(filter(None, map(symbols.text, document.assumptions))),
+        assumptions=(*filter(None, map(symbols.text, document.assumptions)), *_of_ranges(document, ranges)),
+        ranges=ranges,
     )
+
+
+def _of_ranges(document: ModelDocument, ranges: tuple[tuple[str, Any, Any], ...]) -> Iterator[str]:
+    """The sentence that a run starts at the centre of an initial box."""
+    if ranges:
+        given = document.initial.ranges.items()
+        sides = ", ".join(f"{name} from {side.min.value} to {side.max.value}" for name, side in given)
+        yield f"`initial` has ranges ({shown(sides)}): a run takes the centre of each that it is given no value for"
 
 
 def parameter_expression(system: HybridSystem, text: str, where: str, allowed: Sequence[str] | None = None) -> Any:

@@ -16,6 +16,7 @@ from hsdsl.language.expression.scope import Scope, Value, state
 from hsdsl.language.schema.documents import (
     ExperimentDocument,
     MultiplesDocument,
+    RangeDocument,
     ReferenceDocument,
     ReferenceStateDocument,
     ReferenceTransitionDocument,
@@ -27,13 +28,15 @@ _OWN = ("step", "tolerance", "relaxation")
 _POSITIVE = (*_OWN, "every")
 
 
-def elaborate_initial(symbols: SymbolTable) -> Initial:
-    """The initial mode and the values of its states."""
+def elaborate_initial(symbols: SymbolTable) -> tuple[Initial, tuple[tuple[str, Any, Any], ...]]:
+    """The initial mode and the values of its states, and the states that start in a range, with its ends."""
     document = symbols.document.initial
-    given: dict[Key, Scalar] = document.__pydantic_extra__
+    given = document.values
     mode = known_mode(symbols, document.mode)
     if mode is not None:
         _check_states(symbols, mode, given)
+    ranges = {name: _range(symbols, side) for name, side in document.ranges.items()}
+    given = {name: scalar for name, scalar in given.items() if ranges.get(name, ...) is not None}
     texts = {str(key): scalar for key, scalar in given.items()}
     values, written = dict[str, Value | None](), list[tuple[str, Any]]()
     scope = symbols.parameter_scope("an initial value is an expression of parameters and of other initial values")
@@ -43,7 +46,22 @@ def elaborate_initial(symbols: SymbolTable) -> Initial:
         value = None if values[name] is None else symbols.number(texts[name], Scope({**scope.values, **own}))
         written += [(name, value.expr)] if value is not None else []
     known = {name for name, _ in written}
-    return started(mode or "", [name for name in texts if name in known], written)
+    initial = started(mode or "", [name for name in texts if name in known], written)
+    return initial, tuple((str(name), *ends) for name, ends in ranges.items() if ends is not None)
+
+
+def _range(symbols: SymbolTable, given: RangeDocument) -> tuple[Any, Any] | None:
+    """The ends of a range; None where they are broken."""
+    scope = symbols.parameter_scope("the ends of a range are expressions of parameters")
+    ends = symbols.numbers((given.min, given.max), scope, finite_now=True)
+    if ends is None:
+        return None
+    low, high = ends
+    if low.number is not None and high.number is not None and low.number > high.number:
+        message = f"`min` is {shown(given.min.value, 40)}, larger than `max`, {shown(given.max.value, 40)}"
+        symbols.report(given.min.place, "HS321", message, "exchange them")
+        return None
+    return low.expr, high.expr
 
 
 def _in_order(symbols: SymbolTable, given: dict[Key, Scalar]) -> list[str]:

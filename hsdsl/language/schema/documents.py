@@ -43,7 +43,7 @@ from hsdsl.language.schema.fields import (
     refuse,
     shaped_as_list,
 )
-from hsdsl.language.source.nodes import ABSENT, Mapping, Node, Scalar, Sequence, absent
+from hsdsl.language.source.nodes import ABSENT, Key, Mapping, Node, Scalar, Sequence, absent
 
 KINDS = ("point", "line", "circle", "spring", "box")
 
@@ -289,13 +289,37 @@ class ModeDocument(Document):
     transitions: Items[TransitionDocument] = items()
 
 
+class RangeDocument(Document):
+    """Values from one to another: a side of an initial box."""
+
+    min: Expression
+    max: Expression
+
+
 class InitialDocument(Document):
-    """Where a run starts."""
+    """Where a run starts: a value for each state, or a range, whose centre a run takes."""
 
     model_config = ConfigDict(extra="allow")
-    __pydantic_extra__: dict[AnyKey, Expression]  # pyright: ignore[reportIncompatibleVariableOverride]
+    __pydantic_extra__: dict[  # pyright: ignore[reportIncompatibleVariableOverride]
+        AnyKey, Annotated[AsExpression | Annotated[RangeDocument, Tag("<mapping>")], Discriminator(_mapping_or_not)]
+    ]
 
     mode: Label
+
+    @property
+    def ranges(self) -> dict[Key, RangeDocument]:
+        """The states that start anywhere in a range."""
+        return {key: given for key, given in self.__pydantic_extra__.items() if isinstance(given, RangeDocument)}
+
+    @property
+    def values(self) -> dict[Key, Scalar]:
+        """The values that a run takes."""
+
+        def centre(given: RangeDocument) -> Scalar:
+            return Scalar(f"(({given.min.value}) + ({given.max.value}))/2", False, given.min.place)
+
+        given = self.__pydantic_extra__.items()
+        return {key: centre(value) if isinstance(value, RangeDocument) else value for key, value in given}
 
 
 class MultiplesDocument(Document):
@@ -478,6 +502,7 @@ SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
     ("scene", "*", "<spring>"): (SpringShape, "a spring"),
     ("scene", "*", "<box>"): (BoxShape, "a box"),
     ("initial",): (InitialDocument, "`initial`"),
+    ("initial", "*", "<mapping>"): (RangeDocument, "a range"),
     ("experiment",): (ExperimentDocument, "`experiment`"),
     ("reference", "*"): (ReferenceDocument, "a reference"),
     ("reference", "*", "transitions", "*"): (ReferenceTransitionDocument, "a transition of a reference"),

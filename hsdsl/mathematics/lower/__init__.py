@@ -31,6 +31,7 @@ from hsdsl.mathematics.lower.constants import (
     lower_constants,
     lower_expressions,
     number,
+    ranges_of,
 )
 from hsdsl.mathematics.lower.mode import LoweredMode, idle_states, lowered_overlay
 from hsdsl.mathematics.lower.straight import print_routines
@@ -93,6 +94,7 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
         initial_order=initial_order(system),
         initial_values=print_routines(initial_values(system, names), ()),
         assumptions=system.assumptions,
+        ranges=tuple(name for name, _, _ in ranges_of(system)),
     )
 
 

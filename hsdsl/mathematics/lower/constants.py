@@ -76,6 +76,12 @@ def initial_values(system: HybridSystem, names: Names):
         yield Definition(f"initial_{i}", arguments, (replaced(value, names.shared | states, {}),), places=places)
 
 
+def ranges_of(system: HybridSystem):
+    """The ranges of initial values, of the states that are there."""
+    known = dict(system.initial.values)
+    return [side for side in system.ranges if side[0] in known]
+
+
 def constants(system: HybridSystem, names: Names):
     """Values and bounds of parameters, initial values, samples of inputs, settings."""
     places = {parameter: i for i, parameter in enumerate(names.parameters)}
@@ -92,6 +98,9 @@ def constants(system: HybridSystem, names: Names):
         if parameter.maximum is not None:
             yield define(f"maximum_{i}", parameter.maximum)
     yield define("initial", *(value for _, value in system.initial.values))
+    if ranges := ranges_of(system):
+        yield define("least", *(low for _, low, _ in ranges))
+        yield define("most", *(high for _, _, high in ranges))
     for i, given in enumerate(system.inputs):
         if any(isinstance(v, sp.Basic) for v in given.times + given.values):
             yield define(f"input_{i}", *given.times, *given.values)
