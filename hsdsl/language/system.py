@@ -132,7 +132,8 @@ class Edge:
     ``target_states`` are the target mode's states, or the source's where the target is final without a flow. The last
     ``derived`` of them are derivatives of others. One that ``stays`` does not enter its mode again.
     One that is part of an event has in ``of_event`` its name, how its condition is written, and its options. That of
-    a ``part`` leaves the mode with this number of it.
+    a ``part`` leaves the mode with this number of it. A ``strict`` one is made
+    behind its surface: not at the end of a run.
     """
 
     name: str
@@ -150,6 +151,7 @@ class Edge:
     stays: bool = False
     of_event: tuple[str, ...] = ()
     part: tuple[str, int] | None = None
+    strict: bool = False
 
     @property
     def values(self) -> dict[str, sp.Expr]:

@@ -122,7 +122,7 @@ class EdgeProgram:
     then; ``counts`` are states that the edge counts with, which keep their values there. Where its reset is
     ``branched``, that of `ModeProgram.held` is the branch for slow impacts. ``releases`` is the contact that an edge of
     `ModeProgram.held` ends. Of an edge that is part of an event ``of_event`` has its name, how its
-    condition is written, and its options.
+    condition is written, and its options. A ``strict`` one is made behind its surface.
     """
 
     name: str
@@ -141,6 +141,7 @@ class EdgeProgram:
     branched: bool = False
     releases: int | None = None
     of_event: tuple[str, ...] = ()
+    strict: bool = False
 
     @property
     def reset_texts(self) -> tuple[str, ...]:

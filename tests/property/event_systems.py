@@ -120,12 +120,16 @@ class EventSystem:
 class Memory:
     """What an event remembers: ``waits`` has times and values that the reset gets, None where it gets those of then.
 
-    It is ``due`` by the flow or by a reset.
+    It is ``due`` by the flow or by a reset, so many ``times``.
     """
 
     armed: bool
     due: Literal["", "flow", "reset"] = ""
+    times: int = 0
     waits: list[tuple[Any, Numbers | None]] = field(default_factory=list[Any])
+
+    def drop(self) -> None:
+        self.due, self.times, self.waits = "", 0, []
 
 
 @dataclass
@@ -169,7 +173,7 @@ class Simulator:
                 else:
                     memory.armed = True
                     if not event.persistent:
-                        memory.due, memory.waits = "", []
+                        memory.drop()
             count = count + 1 if self.t - instant <= SAME else 0
             instant = self.t
             if count > MOST_AT_ONCE:
@@ -201,7 +205,7 @@ class Simulator:
         """The condition turned true, with the values of this instant."""
         memory.armed = False
         if event.delay is None:
-            memory.due = by
+            memory.due, memory.times = by, memory.times + 1
             return
         delay = event.delay.value(self.names())
         values = None if event.at_execution else {x: value.value(self.names()) for x, value in event.reset.items()}
@@ -241,7 +245,8 @@ class Simulator:
     def make(self, k: int) -> None:
         event, memory, before = self.system.events[k], self.memory[k], self.names()
         values = None if memory.due else memory.waits.pop(0)[1]
-        memory.due = ""
+        memory.times -= bool(memory.due)
+        memory.due = memory.due if memory.times else ""
         values = values or {x: value.value(before) for x, value in event.reset.items()}
         self.x = {**self.x, **values}
         self.found.made.append((self.t, event.name))
@@ -254,7 +259,7 @@ class Simulator:
             if not self.holds(other, changed):
                 its.armed = True
                 if not other.persistent:
-                    its.due, its.waits = "", []
+                    its.drop()
             elif its.armed:
                 self.set_off(other, its, "reset")
             if its.due and other is not event:
@@ -274,7 +279,7 @@ class Simulator:
         if all(part.strict for part in event.parts) and not self.holds(event, set()):
             memory.armed = True
             if not event.persistent:
-                memory.due, memory.waits = "", []
+                memory.drop()
 
     def rest(self, k: int, changed: set[str]) -> None:
         """Take a ball whose flights are short to its rest, and from it where something moves it."""

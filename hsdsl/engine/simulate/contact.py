@@ -236,7 +236,8 @@ def in_contact(run: Run, here: ModeState, holding: Sequence[int], looked_at: Seq
     active = {j if j < len(edges) else j + more for j in here.surfaces.active if j not in levels}
     touched, pushes = frozenset(places[k] for k in holding), frozenset(places.values())
     scale, had = here.surfaces.scale, here.arc.scales
-    surfaces = Surfaces(kernel, program.edges, scale, run.arithmetic, active, set(), touched, pushes, had)
+    end = run.settings.until
+    surfaces = Surfaces(kernel, program.edges, scale, run.arithmetic, active, set(), touched, pushes, had, end)
     return replace(here, flow=number, mode=program, kernel=kernel, surfaces=surfaces, segment=segment)
 
 

@@ -153,7 +153,8 @@ def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> E
     """Say what happens first along a step: a guard, a wall with no guard on it, or nothing."""
     edges = len(here.mode.edges)
     found = [c for k in range(len(span.curves)) if (c := first_crossing(run, here, span, k))]
-    guards, walls = [c for c in found if c.edge < edges], [c for c in found if c.edge >= edges]
+    walls = [c for c in found if c.edge >= edges]
+    guards = [c for c in found if c.edge < edges and not here.surfaces.too_late(c.edge, c.time, run.tie(c.time))]
     wall = min(walls, key=lambda c: c.time, default=None)
     if wall and not any(c.time <= wall.time + run.tie(wall.time) for c in guards):
         standing = here.surfaces.standing(wall.time, wall.state, run.tie(wall.time))

@@ -101,7 +101,7 @@ class Run(Problem):
             outputs = before.kernel.outputs
         self.control.begin_arc(program.name)
         arc = self.recorder.begin(program.name, states, "flow", outputs, t, x)
-        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(active or ()))
+        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic, set(active or ()), end=self.settings.until)
         here = ModeState(mode, mode, program, kernel, surfaces, segment, arc, t, x)
         if not self.settings.moves or not t < segment.end or program.states != states:
             return here

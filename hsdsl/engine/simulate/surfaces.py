@@ -128,7 +128,7 @@ class Surfaces:
     count for the surfaces in ``active``, on which the state stood then, until it has left them. ``emerging`` are those
     that moved past the state while it waited in a strip, and that the flow leads back through. ``touched`` are the
     contacts that hold it. The surfaces of ``pushes``, these and other contacts, are the pushes on their guards: motion
-    along guards is off them by the sizes that states have ``had``.
+    along guards is off them by the sizes that states have ``had``. ``end`` is that of the run.
     """
 
     kernel: ModeKernel
@@ -140,6 +140,11 @@ class Surfaces:
     touched: frozenset[int] = frozenset()
     pushes: frozenset[int] = frozenset()
     had: Sequence[Number] = ()
+    end: Number | None = None
+
+    def too_late(self, k: int, t: Number, since: Number) -> bool:
+        """Whether an edge that is crossed at a time is one that is made behind it, and the run ends there."""
+        return self.edges[k].strict and self.end is not None and t + since >= self.end
 
     def releases(self, k: int) -> bool:
         """Whether surface k ends a contact that holds the state."""
@@ -211,7 +216,7 @@ class Surfaces:
         """
         found: list[int] = []
         for k in range(len(self.edges)):
-            if k in known or self.releases(k):
+            if k in known or self.releases(k) or self.too_late(k, t, since):
                 continue
             try:
                 r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]

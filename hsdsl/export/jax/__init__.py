@@ -55,6 +55,7 @@ def files(source: Source) -> dict[str, bytes]:
 LACKS = """\
 # This loop differentiates and vectorises. Of the rules of docs/meaning.md it lacks these:
 # - M13: one execution of an event waits at a time. A model that may need more is refused, and so are systems of parts.
+# - M8: an event with a strict comparison goes at the end of a run, too.
 # - The located scheme, 2 and 3: a step is looked at in nine points, its ends and seven between. Of two crossings of a
 #   surface within an eighth of a step both may be missed, and nothing says so: compare with a shorter step.
 # - The located scheme, 4: a guard beyond which the flow has no value fires where no step is short enough.

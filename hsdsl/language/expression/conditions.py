@@ -137,7 +137,9 @@ class Reached:
 
         A reset turns the flow back also where flights are too short to be resolved, and the flow before leads inwards.
         """
-        return _not_negative(after) * (1 - _positive(-before) * _positive(after)) if turned else _positive(after)
+        if turned:
+            return _not_negative(after) * (1 - _positive(-before) * _positive(after))
+        return _positive(after) if self.strict else _not_negative(after)
 
     def turns(self, other: Reached | None) -> bool | None:
         """Whether it turns true where another one does, or false; None where their surfaces are not the same."""

@@ -193,6 +193,7 @@ def _edge(edge: Edge, mode: Mode, indices: dict[str, int]) -> lowered.EdgeProgra
         change_texts=tuple(edge.reset_texts[i] for i in changed),
         condition_text=edge.condition_text or "",
         of_event=edge.of_event,
+        strict=edge.strict,
     )
 
 

@@ -302,7 +302,7 @@ class _Writer:
             f"{self.table('int', 'places', list(map(str, edge.changes)))}, "
             f"{-1 if edge.contact is None else edge.contact}, {edge.push_order}, {len(edge.counts)}, "
             f"{self.table('int', 'places', list(map(str, edge.counts)))}, {int(edge.branched)}, "
-            f"{int(bool(edge.of_event))}, {-1 if edge.releases is None else edge.releases}}}"
+            f"{bool(edge.of_event) + edge.strict}, {-1 if edge.releases is None else edge.releases}}}"
         )
 
     def pointers(self, names: Iterable[str]) -> str:

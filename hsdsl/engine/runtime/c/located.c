@@ -541,7 +541,7 @@ static int first_event(hs_run *run) {
     hs_crossing *const crossing = &run->crossings[k < mode->edges ? guards : k];
     const int found = first_crossing(run, k, crossing);
     if (found == RAISED) return WITHOUT_VALUE;
-    if (!found) continue;
+    if (!found || (k < mode->edges && too_late(run, k, crossing->time, tie(crossing->time)))) continue;
     if (k < mode->edges)
       guards++;
     else if (!wall || crossing->time < wall->time)

@@ -180,6 +180,11 @@ static int turns_back(hs_run *run, int k, hs_time t, const hs_real *x, hs_real r
   return bend > 0 && rate * rate <= 2 * bend * room;
 }
 
+/* Whether an edge that is crossed at a time is one that is made behind it, and the run ends there. */
+static int too_late(const hs_run *run, int k, hs_time t, hs_real since) {
+  return run->here.table->edge[k].of_event > 1 && t + since >= run->until;
+}
+
 /* Mark in run->tied, beside the edges that are marked, those on whose guards the state stands, with the flow pointing out
    and `if` true, which are not only touched. On the guard means to round-off, or within the time `since`: sums of steps
    are no more exact than that. */
@@ -191,7 +196,7 @@ static void standing(hs_run *run, hs_time t, const hs_real *x, hs_real since) {
     if (run->tied[k]) continue;
     if (!known && (mode->values(run->here.p, t, x, run->values) || magnitudes_at(run, t, x, run->magnitudes))) return;
     known = 1;
-    if (releases(run, k) || mode->rates[k](run->here.p, t, x, &rate)) continue;
+    if (releases(run, k) || too_late(run, k, t, since) || mode->rates[k](run->here.p, t, x, &rate)) continue;
     const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
     const int near = fabs(run->values[k]) <= hs_max(noise, rate * since);
     if (!near || !points_out(run, k, t, x, rate)) continue;

@@ -94,9 +94,14 @@ class Event:
             ready = below(self.symbol("waiting"), HALF, ZERO, ONE) * reached(TIME, self.at)
         else:
             ready = self.symbol("armed") * self.rises()
-            ready = either([ready, self.symbol("due")]) if self.jumps else ready
+            ready = either([ready, self.due]) if self.jumps else ready
         here = self.here({}, {})
         return ready if here == 1 else select(here, self.guarded(ready, here), ZERO)
+
+    @property
+    def due(self) -> Any:
+        """1 where resets have set it off, else 0."""
+        return below(self.symbol("due"), HALF, ZERO, ONE)
 
     def goes_before(self, other: Event) -> bool:
         """Whether it goes before another one, of those that are made at one instant, by M6."""
@@ -144,22 +149,25 @@ class Event:
         """1 where the condition holds at new values of states."""
         return number(self.event.trigger, lambda part: part.holds(meaning))
 
-    def going_on(self, meaning: Mapping[Any, Any], reached: Reached | None, next_along: bool = False) -> Any:
-        """1 where the condition holds at new values of states in a mode that goes on.
+    def going_on(self, meaning: Mapping[Any, Any], reached: Reached | None, own: bool = False) -> Any:
+        """1 where the condition holds at new values of states in a mode that goes on; ``own`` are those of its reset.
 
-        A comparison that stays is on its surface, as that which was ``reached`` is, or has its value. There strict ones
-        are what they are next along the flow; with ``next_along`` others are, too.
+        A comparison that the reset changes has its value. Others count as what they are next along the flow: on the
+        surface that was ``reached`` the opposite one is false. One that turned true there stays so, if it is not
+        strict, though the flow is turned back, but for an event's own reset. A strict one that this leaves on the
+        surface that set it off is no crossing of its own.
         """
 
         def of(part: Reached) -> Any:
-            if part.residual.xreplace(meaning) != part.residual:
-                return part.holds(meaning)
             turns, rate = part.turns(reached), self.rates[part.residual]
-            if not part.strict and not next_along:
-                return part.holds(meaning) if turns is None else ONE
+            if part.residual.xreplace(meaning) != part.residual:
+                stands = own and bool(turns) and part.strict
+                return part.goes_on(rate, TIME).xreplace(meaning) if stands else part.holds(meaning)
             if turns is None:
                 return part.holds(meaning) if rate == 0 else part.goes_on(rate, TIME).xreplace(meaning)
-            return part.holds_next(turns and next_along, rate, rate.xreplace(meaning))
+            if part.strict or own or not turns:
+                return part.holds_next(turns and own, rate, rate.xreplace(meaning))
+            return ONE
 
         return number(self.event.trigger, of)
 

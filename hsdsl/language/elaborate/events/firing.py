@@ -44,9 +44,10 @@ def edges_of(event: Event, events: Sequence[Event]) -> Iterator[Draft]:
         others = condition(trigger, partial(_with, event, part, True))
         surface = event.surface(part.left, part.right, part.text)
         when = all_of(at_least(armed, HALF), others, *free)
+        fires = replace(fires, strict=part.strict)
         yield replace(fires, surface=surface, condition=when, condition_text=_text(event)), event, part
     if event.jumps:
-        now = event.symbol("due")
+        now = event.due
         if turn is not None and event.delay is None:
             now *= turn
         for other in events if event.delay is None else ():
@@ -64,13 +65,16 @@ def edges_of(event: Event, events: Sequence[Event]) -> Iterator[Draft]:
         holds = condition(trigger, partial(_with, event, part, False))
         surface = event.surface(part.right, part.left, part.opposite)
         when = all_of(at_least(HALF, armed), ~holds)
+        if dropped(event):  # what waits is gone where a strict comparison ends, and is made where another one does
+            others = [edge.priority for edge in event.mode.edges]
+            arms = replace(arms, priority=max(others) + 1 if part.strict else min(others) - 1)
         yield replace(arms, surface=surface, condition=when, condition_text=f"not ({_text(event)})"), None, None
 
 
 def _when_due(edge: Edge, event: Event, truth: Any) -> Edge:
     """An edge that goes where a number is 1 or more, and not where it is 0 or less."""
     surface = event.surface(truth, HALF, f"{event.names['due']} >= 1/2")
-    return replace(edge, surface=surface, condition=None, condition_text=None)
+    return replace(edge, surface=surface, condition=None, condition_text=None, strict=False)
 
 
 def _with(event: Event, reached: Reached, value: bool, part: Reached) -> Any:

@@ -100,11 +100,12 @@ def _after_firing(event: Event, meaning: Mapping[Any, Any], reached: Reached | N
     Then its condition is false however short the flow goes back for, unless that drops what waits. Where it was due it
     need not have held: a reset that makes it true then sets it off again.
     """
-    changed, armed, due = event.touched(meaning), ZERO, ZERO
+    changed, armed = event.touched(meaning), ZERO
+    left = maximum(event.symbol("due") - 1, ZERO) if event.jumps and reached is None else ZERO
     if reached is None or changed or event.leaves(meaning):
         holds = event.going_on(meaning, reached, not dropped(event))
-        armed, due = ONE - holds, event.symbol("armed") * holds if changed and reached is None else ZERO
-    return {event.names["armed"]: armed} | ({event.names["due"]: due} if event.jumps else {})
+        armed, left = ONE - holds, left + (event.symbol("armed") * holds if changed and reached is None else ZERO)
+    return {event.names["armed"]: armed} | ({event.names["due"]: left} if event.jumps else {})
 
 
 def _changed(event: Event, meaning: Mapping[Any, Any], reached: Reached | None) -> Values:
@@ -114,9 +115,9 @@ def _changed(event: Event, meaning: Mapping[Any, Any], reached: Reached | None) 
         return {}
     armed, holds, rises = event.symbol("armed"), event.going_on(meaning, reached), event.rises(reached)
     now = (maximum(holds, rises) if persistent else holds) if touched else rises  # the flow may turn it true at once
-    due = maximum(event.symbol("due"), armed * now)
+    due = event.symbol("due") + armed * now  # each time that it turns true at one instant
     values = {
         event.names["armed"]: ONE - holds if touched else select(rises, ONE - holds, armed),
-        event.names["due"]: due if persistent else due * holds,
+        event.names["due"]: due if persistent else maximum(event.symbol("due"), armed * now) * holds,
     }
     return values | {name: symbol(name) * holds for name in dropped(event)}
