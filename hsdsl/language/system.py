@@ -257,13 +257,19 @@ class Mode:
         return dict(zip(map(symbol, self.states), self.flow, strict=True))
 
     def mapped(self, change: Callable[[Any], Any]) -> Mode:
-        """The mode with changed expressions, but those of its scene."""
+        """The mode with changed expressions, but those of its scene; each is changed once."""
+        done: dict[int, Any] = {}  # by the objects: resets have the same symbols of the states that they keep
+
+        def once(expr: Any) -> Any:
+            found = done.get(id(expr))
+            return done.setdefault(id(expr), change(expr)) if found is None else found
+
         return replace(
             self,
-            flow=tuple(map(change, self.flow)),
-            walls=tuple(wall.mapped(change) for wall in self.walls),
-            edges=tuple(edge.mapped(change) for edge in self.edges),
-            outputs=tuple(None if output is None else change(output) for output in self.outputs),
+            flow=tuple(map(once, self.flow)),
+            walls=tuple(wall.mapped(once) for wall in self.walls),
+            edges=tuple(edge.mapped(once) for edge in self.edges),
+            outputs=tuple(None if output is None else once(output) for output in self.outputs),
         )
 
 

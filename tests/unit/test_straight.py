@@ -13,7 +13,7 @@ from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
 from hsdsl.language.expression.algebra import derivative
-from hsdsl.mathematics.lower.straight import LARGEST, WIDEST, Cut, Gradient, written_out
+from hsdsl.mathematics.lower.straight import LARGEST, WIDEST, Cut, Definition, Gradient, text_of, written_out
 
 MANY = multiprecision(60)
 X, Y = sp.symbols("x y", real=True)
@@ -152,3 +152,23 @@ def test_derivatives_cost_as_much_as_the_function_for_each_column(levels):
 def operations(results, statements=()):
     known, last = written_out(results, statements)
     return sum(map(sp.count_ops, (*(expr for _, expr in known), *last)))
+
+
+@pytest.mark.parametrize("numbers", [(1, 2, 3), (3, 2, 1), (9, 10, 11), (1, 10, 2), (2, 20, 100)])
+def test_routines_that_differ_in_numbers_of_names_are_written_as_each_by_itself(
+    numbers: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The order of names is that of their texts: x10 comes before x2, and so in sums and products."""
+
+    def written(numbers: tuple[int, ...]) -> str:
+        a, b, c = (sp.Symbol(f"x{i}", real=True) for i in numbers)
+        p, v = (sp.Symbol(name, real=True) for name in ("p1", "v7"))
+        first = p * (b - a) ** 2 / c + sp.sin(a * b - c) * v + below(c, sp.Rational(3, 2), a + b, a - 2 * b)
+        return text_of(Definition("one", (), (first, (a - b) * first, b - a), [(v, a + b * c)], {a: 1, b: 2, c: 3}))
+
+    monkeypatch.setattr("hsdsl.mathematics.lower.straight._texts", {})
+    for others in ((1, 2, 3), (1, 10, 2), (30, 4, 200)):
+        written(others)
+    shared = written(numbers)
+    monkeypatch.setattr("hsdsl.mathematics.lower.straight._texts", {})
+    assert shared == written(numbers)

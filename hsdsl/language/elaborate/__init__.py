@@ -121,7 +121,7 @@ def _elaborated(symbols: SymbolTable, root: Node, text: Text) -> Elaboration:
     try:
         with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.box:
             system = with_events(_system(symbols))
-            system = with_timers(system) if symbols.timed else system
+            system = with_timers(system) if symbols.timed and not system.parts else system
     except OutOfTime:
         message = "working this expression out takes too long"
         hint = "make parts of it states, or allow more time with --limit seconds=600"

@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from typing import Literal, Protocol
 
 from hsdsl.base.names import LOOKALIKES, normalised, shown
@@ -301,6 +302,7 @@ _BINDING = {"or": _OR, "and": _AND, "+": _ADD, "-": _ADD, "*": _MULTIPLY, "/": _
 _BINDING.update(dict.fromkeys(_COMPARISONS, _COMPARE))
 
 
+@lru_cache(maxsize=1 << 12)  # the instances of an automaton have the same expressions
 def parse(text: str, expected: Expected = "number") -> Tree:
     """The tree of an expression of at most 10,000 characters, nested at most 200 deep; ``expected`` words the hints.
 

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
@@ -87,7 +87,7 @@ class Scope:
     """
 
     values: Mapping[str, Meaning]
-    states: frozenset[str] | None = None
+    states: Set[str] | None = None
     place: str = "here"
     expanded: Callable[[Tree], Tree] | None = None
 

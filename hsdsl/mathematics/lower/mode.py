@@ -10,7 +10,7 @@ branch that it is on. `ordering` is the order in which a large and sparse implic
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import ChainMap, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
@@ -52,7 +52,7 @@ class LoweredMode:
         self._places = {argument: i for i, argument in enumerate(self.arguments)}
         self._sizes = tuple(symbol(f"s{i}") for i in range(len(self.states)))
         self._given = self._places | {s: len(self.arguments) + i for i, s in enumerate(self._sizes)}
-        self._slopes = [Gradient((residual,), self.arguments) for residual in self.residuals]
+        self._slopes = [Gradient((residual,), self._places) for residual in self.residuals]
 
     def place(self, expressions) -> tuple[sp.Basic, ...]:
         """Expressions of the file's names over numbered symbols."""
@@ -111,7 +111,7 @@ class LoweredMode:
         """Whether a surface is affine in time and the states, also where the modes of parts choose what it is."""
         if residual.has(below):
             residual = _every_choice(residual)
-            slopes = Gradient((residual,), self.arguments)
+            slopes = Gradient((residual,), self._places)
         own = residual.free_symbols & self._places.keys()
         if slopes.statements or any(slope.free_symbols & own for slope in slopes.sparse[0].values()):
             return False
@@ -175,8 +175,8 @@ def changed_by(edge: Edge, mode: Mode) -> tuple[int, ...]:
     """The states that an edge's reset changes, by their numbers in the target; all of another mode's."""
     if edge.target_states != mode.states:
         return tuple(range(len(edge.target_states)))
-    pairs = zip(map(symbol, mode.states), edge.reset, strict=True)
-    return tuple(i for i, (x, r) in enumerate(pairs) if r is not x and r != x)
+    symbols = mode.vector_field
+    return tuple(i for i, (x, r) in enumerate(zip(symbols, edge.reset, strict=True)) if r is not x and r != x)
 
 
 def _edge(edge: Edge, mode: Mode, indices: dict[str, int]) -> lowered.EdgeProgram:
@@ -310,7 +310,7 @@ class Terms:
 
     def __init__(self, expressions: Sequence[sp.Expr], sizes: Mapping[sp.Symbol, sp.Expr]) -> None:
         common, small = shared(expressions, "e_")
-        self._cut, self._sizes = Cut("e"), dict(sizes)
+        self._cut, self._sizes = Cut("e"), ChainMap[sp.Symbol, sp.Expr]({}, sizes)
         self._known: dict[sp.Basic, sp.Expr] = {}
         for name, expr in common:
             self._cut.define(name, expr)

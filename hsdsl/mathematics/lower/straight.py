@@ -15,13 +15,13 @@ are divided by their norms before.
 
 from __future__ import annotations
 
+import re
 import textwrap
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from heapq import heapify, heappop, heappush
-from itertools import accumulate, combinations
+from itertools import accumulate, chain, combinations
 
 import sympy as sp
 
@@ -44,6 +44,7 @@ class _Shared:
         self._letter = letter
         self._uses: Counter[sp.Basic] = Counter()
         self._operands: dict[sp.Basic, tuple[sp.Basic, ...]] = {}
+        self._sums: dict[frozenset, sp.Basic] = {}  # the first of those that are alike up to signs
         self._written: dict[sp.Basic, sp.Basic] = {}
         self.statements: list[Statement] = []
         given = tuple(expressions)
@@ -61,6 +62,8 @@ class _Shared:
         self._uses[expr] += 1
         if self._uses[expr] == 1:
             self._operands[expr] = _operands(expr)
+            if expr.is_Add:
+                self._sums.setdefault(_unsigned(expr), expr)
             for part in self._operands[expr]:
                 self._count(part)
 
@@ -68,8 +71,9 @@ class _Shared:
         """The expression or its negative: of products the positive one, of sums the one that came first."""
         if expr.is_Mul:
             return -expr if expr.args[0].is_Number and expr.args[0] < 0 else expr
-        if expr.is_Add and expr not in self._operands and (negative := -expr) in self._operands:
-            return negative
+        if expr.is_Add and expr not in self._operands and _unsigned(expr) in self._sums:
+            negative = -expr  # which takes SymPy long
+            return negative if negative in self._operands else expr
         return expr
 
     def _pair(self, operation: type) -> None:
@@ -110,6 +114,17 @@ class _Shared:
         if tuple(parts) == expr.args:
             return expr
         return sp.Pow(*parts, evaluate=False) if expr.is_Pow else expr.func(*parts)
+
+
+def _unsigned(expr: sp.Add) -> frozenset:
+    """What a sum and its negative have in common, and few others."""
+    return frozenset(_factors(part) for part in expr.args)
+
+
+def _factors(term: sp.Basic) -> tuple[sp.Basic, ...]:
+    if term.is_Mul:
+        return term.args[term.args[0].is_Number :]
+    return (abs(term) if term.is_Number else term,)
 
 
 def _is_quotient(expr: sp.Basic) -> bool:
@@ -280,16 +295,17 @@ class Gradient:
     """First derivatives of expressions, and the statements that they are written with.
 
     For each expression, ``sparse`` has its derivatives by those arguments where they are not zero, in the arguments'
-    order, and ``rows`` those by all arguments. ``statements`` are the names in them, in the order of computation; none
-    where the expressions are small. With ``whole`` unknowns of linear equations, and their derivatives, are left to a
-    later cut to solve.
+    order (their numbers, where they are a mapping), and ``rows`` those by all arguments. ``statements`` are the names
+    in them, in the order of computation; none where the expressions are small. With ``whole`` unknowns of linear
+    equations, and their derivatives, are left to a later cut to solve.
     """
 
     def __init__(
-        self, expressions: Iterable[sp.Expr], arguments: Sequence[sp.Symbol], letter: str = "g", whole: bool = False
+        self, expressions: Iterable[sp.Expr], arguments: Iterable[sp.Symbol], letter: str = "g", whole: bool = False
     ) -> None:
         self._arguments = arguments
-        self._order = {argument: i for i, argument in enumerate(arguments)}
+        given_order = isinstance(arguments, Mapping)
+        self._order = arguments if given_order else {argument: i for i, argument in enumerate(arguments)}
         given = tuple(expressions)
         self._cut = Cut(letter, whole=whole)
         small = [self._cut.down(e) for e in given]
@@ -371,31 +387,89 @@ class Definition:
 
 def text_of(definition: Definition) -> str:
     """Print one routine as a Python function."""
-    body = _body(definition.results, tuple(definition.statements))
+    results, statements = tuple(map(sp.sympify, definition.results)), tuple(definition.statements)
+    shape = _Shape((*results, *(part for statement in statements for part in statement)))
+    body = shape.text(len(results), lambda: _body(results, statements))
     if definition.places is None:
         return f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n{body}"
-    parts = _parts(*map(sp.sympify, definition.results), *(expr for _, expr in definition.statements))
-    places = sorted((definition.places[symbol], symbol.name) for symbol in parts & definition.places.keys())
+    used = shape.symbols.keys() & definition.places.keys()
+    places = sorted((definition.places[symbol], symbol.name) for symbol in used)
     named = "".join(f"    {name} = given[{i}]\n" for i, name in places)
     return f"def {definition.name}(*given):\n{named}{body}"
 
 
-def _parts(*expressions: sp.Basic) -> set[sp.Basic]:
-    """Expressions and all their parts, each visited once."""
-    found, waiting = set[sp.Basic](), list(expressions)
-    while waiting:
-        if (expr := waiting.pop()) not in found:
-            found.add(expr)
-            waiting += expr.args
-    return found
-
-
-@lru_cache(maxsize=4096)  # the modes of a large model have most of their routines in common
 def _body(results: tuple, statements: tuple[Statement, ...]) -> str:
-    printer = KernelPrinter()
     statements, results = written_out(results, statements)
-    lines = [f"    {symbol.name} = {printer.doprint(expr)}\n" for symbol, expr in statements]
-    return "".join([*lines, f"    return ({''.join(printer.doprint(expr) + ', ' for expr in results)})\n"])
+    lines = [f"    {symbol.name} = {_printed(expr)}\n" for symbol, expr in statements]
+    return "".join([*lines, f"    return ({''.join(_printed(expr) + ', ' for expr in results)})\n"])
+
+
+def _printed(expr: sp.Basic) -> str:
+    return expr.name if expr.is_Symbol else _Shape((expr,)).text(None, lambda: KernelPrinter().doprint(expr))
+
+
+_NUMBERED = re.compile(r"([a-z_]+)\d+")
+_WORD = re.compile(r"(?<!\w)([a-z_]+\d+)(?!\w)")
+_MOST_SHAPES = 1 << 14
+_texts: dict[tuple, tuple[list[str], list[int]]] = {}
+
+
+class _Shape:
+    """Expressions up to the numbers in the names of their symbols: what equal ones are written as is made once.
+
+    The parts of a large model, and its modes, have the same routines over other symbols. SymPy and the printer put
+    operands in an order of their names. So the names of a letter count by their order, and another letter is another
+    shape; names that are made in between have letters of their own. Every part of an expression is visited once.
+    ``symbols`` has the symbols with their places among the parts.
+    """
+
+    def __init__(self, expressions: Iterable[sp.Basic]) -> None:
+        self._nodes: list[object] = []
+        self._numbers: dict[sp.Basic, int] = {}
+        self.symbols: dict[sp.Basic, int] = {}
+        ends = list(map(self._visit, expressions))
+        self._names: list[str] = []
+        ranks = Counter[str]()
+        for symbol in sorted(self.symbols, key=lambda s: s.name):
+            if found := _NUMBERED.fullmatch(symbol.name):
+                self._nodes[self.symbols[symbol]] = found[1], ranks[found[1]], symbol.is_real
+                ranks[found[1]] += 1
+                self._names.append(symbol.name)
+        self._key = (*ends, None, *self._nodes)
+
+    def _visit(self, whole: sp.Basic) -> int:
+        numbers, nodes, waiting = self._numbers, self._nodes, [whole]
+        while waiting:
+            expr = waiting[-1]
+            if expr in numbers:
+                waiting.pop()
+            elif expr.args and (missing := [part for part in expr.args if part not in numbers]):
+                waiting += missing
+            else:
+                numbers[expr] = len(nodes)
+                if expr.is_Symbol:
+                    self.symbols[expr] = len(nodes)
+                nodes.append((expr.func, *map(numbers.__getitem__, expr.args)) if expr.args else expr)
+        return numbers[whole]
+
+    def text(self, kind: object, write: Callable[[], str]) -> str:
+        """The text of a ``kind`` that is written of the expressions."""
+        key = (kind, *self._key)
+        if key not in _texts:
+            places = {name: i for i, name in enumerate(self._names)}
+            pieces = _WORD.split(write())
+            texts, used = pieces[:1], list[int]()
+            for word, text in zip(pieces[1::2], pieces[2::2], strict=True):
+                if word in places:
+                    used.append(places[word])
+                    texts.append(text)
+                else:
+                    texts[-1] += word + text
+            if len(_texts) >= _MOST_SHAPES:
+                _texts.clear()
+            _texts[key] = texts, used
+        texts, used = _texts[key]
+        return "".join(chain(texts[:1], *zip((self._names[i] for i in used), texts[1:], strict=True)))
 
 
 def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[list[Statement], tuple]:

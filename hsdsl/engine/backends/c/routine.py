@@ -48,6 +48,59 @@ static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict 
 }}
 """
 
+_SHAPE = """\
+HS_APART
+static int NAME(const int *of, const hs_real *restrict p, hs_real t, const hs_real *restrict x,
+    hs_real *restrict out) {{
+  int bad = 0;
+  (void)p, (void)t, (void)x, (void)out;
+{body}
+  return bad;
+}}
+"""
+_CALL = """\
+static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
+  static const int of[] = {{{of}}};
+  return {kind}(of, p, t, x, out);
+}}
+"""
+_OWN_NAME = re.compile(r"\b(?:[a-z]\d+|given\[\d+\])")
+
+
+def shape_of(text: str, data: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:
+    """The text of a routine without the numbers of its operands, and these in C, ``x[0]`` or ``p[0]``.
+
+    Routines of parts that are alike have one shape. None is one that takes all states.
+    """
+    if not text.startswith("(*given)"):
+        return text, ()
+    operands: dict[str, int] = {}
+
+    def slot(found: re.Match[str]) -> str:
+        name = found[0]
+        if name.startswith("given"):
+            return "given"
+        operand = f"x[{name[1:]}]" if name[0] == "x" else data.get(name)
+        if operand is None:  # a name of the routine's own
+            return name
+        return f"{operand[0]}_{operands.setdefault(operand, len(operands))}"
+
+    return _OWN_NAME.sub(slot, text), tuple(operands)
+
+
+def shape_function(shape: str, operands: Sequence[str]) -> str:
+    """The function ``NAME`` of the routines of one shape, of where their operands are."""
+    lines = [line for line in shape.splitlines(keepends=True) if not line.endswith(" = given\n")]
+    definition = ast.parse(dedent(f"    def routine{''.join(lines)}")).body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    names = {f"{operand[0]}_{i}": f"{operand[0]}[of[{i}]]" for i, operand in enumerate(operands)}
+    return _SHAPE.format(body=function_body(definition, names | {"t": "t"}))
+
+
+def call_of_shape(name: str, kind: str, operands: Sequence[str]) -> str:
+    """A routine as a call of the function of its shape."""
+    return _CALL.format(name=name, kind=kind, of=", ".join(operand[2:-1] for operand in operands))
+
 
 def routine_function(name: str, text: str, data: Mapping[str, str], apart: bool = False) -> str:
     """A routine, its text being that of a Python function from its arguments on; ``data`` names what it closes over.

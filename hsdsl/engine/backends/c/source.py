@@ -7,12 +7,20 @@ from __future__ import annotations
 
 import ast
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import count
 from textwrap import dedent
 
 from hsdsl.base.graphs import Elimination, Variation
-from hsdsl.engine.backends.c.routine import function_body, routine_function
+from hsdsl.engine.backends.c.routine import (
+    LEAST_LIKE,
+    call_of_shape,
+    function_body,
+    routine_function,
+    shape_function,
+    shape_of,
+)
 from hsdsl.engine.backends.c.series import flow_lines, is_large, line_count, piecewise, read_by_surfaces, surface_lines
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program, Queue, Routines, Tape
 
@@ -191,6 +199,8 @@ class _Writer:
         self._names: dict[str, str] = {}
         self._tables: dict[tuple[str, str], str] = {}
         self._count = count()
+        texts = (text for mode in program.flows for _, text in _DEFINITION.findall(mode.routines.source))
+        self._alike = Counter(shape_of(text, self.data)[0] for text in dict.fromkeys(texts))
         self.read: dict[object, set[int]] = {}  # by the operations of flows, the lines that surfaces read
         for tape in (mode.tape for mode in program.flows if mode.tape):
             self.read.setdefault(_flow_of(tape), set()).update(read_by_surfaces(tape))
@@ -334,8 +344,16 @@ class _Writer:
         key = f"{text} # apart" if apart else text
         if key not in self.functions:
             self._names[key] = name = f"routine_{len(self.functions)}"
-            self.functions[key] = routine_function(name, text, self.data, apart)
+            self.functions[key] = self._like_others(name, text) or routine_function(name, text, self.data, apart)
         return self._names[key]
+
+    def _like_others(self, name: str, text: str) -> str | None:
+        """A routine that calls the one of its shape with its own operands; None where few are alike."""
+        shape, operands = shape_of(text, self.data)
+        if not operands or self._alike[shape] < LEAST_LIKE:
+            return None
+        kind = self.shared("shape", shape_function(shape, operands))
+        return call_of_shape(name, kind, operands)
 
 
 def _flow_of(tape: Tape) -> object:

@@ -41,7 +41,8 @@ def composed(board: Board, outputs: tuple[Any | None, ...], scene: tuple[Any, ..
     numbers = numbered([one.part for one in instances])
     states = (*(one.full(state) for one in instances for state in one.states), *timers, *numbers)
     broadcast = Broadcast(board, [t for t in transitions if t.listens])
-    edges = [_edge(broadcast, states, t) for t in transitions if not t.listens]
+    kept = {state: symbol(state) for state in states}
+    edges = [_edge(broadcast, kept, t) for t in transitions if not t.listens]
     flow += [*[(ONE, "1")] * len(timers), *[(ZERO, "0")] * len(numbers)]
     exprs, texts = zip(*flow, strict=True) if flow else ((), ())
     whole = Mode(MODE, states, exprs, texts, tuple(walls), tuple(edges), outputs, scene=scene)
@@ -97,17 +98,18 @@ def _walls(board: Board, one: Instance) -> Iterator[Surface]:
                 yield _surface(board, one, k, found)
 
 
-def _edge(broadcast: Broadcast, states: tuple[str, ...], made: PartTransition) -> Edge:
-    one, values = made.one, broadcast.changes(made)
+def _edge(broadcast: Broadcast, kept: dict[str, Any], made: PartTransition) -> Edge:
+    """The edge of a transition; ``kept`` has the symbols of all states."""
+    one = made.one
     return Edge(
         name=one.full(made.name),
         source=MODE,
         target=FINAL if one.part.final[made.target] else MODE,
         surface=_surface(broadcast.board, one, made.source, made.surface) if made.surface else NOWHERE,
         condition=made.condition,
-        target_states=states,
-        reset=tuple(values[s] if s in values else symbol(s) for s in states),
-        reset_texts=tuple(made.texts.get(s, s) for s in states),
+        target_states=tuple(kept),
+        reset=tuple((kept | broadcast.changes(made)).values()),
+        reset_texts=tuple((dict(zip(kept, kept, strict=True)) | made.texts).values()),
         priority=made.priority,
         condition_text=made.condition_text,
         event=made.rising,

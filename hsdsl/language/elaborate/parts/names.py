@@ -8,9 +8,10 @@ refused with the way it took. In initial values, names of states are those of ot
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import cached_property, lru_cache
 from typing import Any
 
 from hsdsl.base.names import SINCE, counted, did_you_mean, shown
@@ -48,11 +49,16 @@ class Board:
     _broken: set[tuple[str, Any, str]] = field(default_factory=set)
     _read_beyond: set[tuple[str, str]] = field(default_factory=set)  # (name of several, attribute)
 
-    @property
+    @cached_property
     def constants(self) -> frozenset[Any]:
-        """The symbols of all parameters."""
+        """The symbols of all parameters, which are known before anything chooses by them."""
         names = (*self.parameters, *(n for n, kind in self.symbols.names.items() if kind == "parameters"))
         return frozenset(map(symbol, names))
+
+    @cached_property
+    def states(self) -> frozenset[str]:
+        """The states of all instances and modes, by their full names."""
+        return frozenset(name for name, kind in self.symbols.names.items() if kind == "states")
 
     def evaluated(
         self, key: tuple[Any, ...], scalar: Scalar, names: Names, label: str, partial: bool = False
@@ -254,11 +260,32 @@ class Board:
         return Value(expr, size=size, depth=depth, bits=max(value.bits for value in values))
 
 
+class AllBut(Set[str]):
+    """Some names without a few: of many sets of nearly all names none is written out."""
+
+    def __init__(self, every: frozenset[str], without: frozenset[str]) -> None:
+        self._every, self._without = every, without
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._every and name not in self._without
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name in self._every if name not in self._without)
+
+    def __len__(self) -> int:
+        return len(self._every) - len(self._without)
+
+    @classmethod
+    def _from_iterable(cls, it: Any) -> Any:
+        return frozenset(it)
+
+
 def unknowns_of(mode: PartModeDocument) -> list[str]:
     """The names that the equations of a mode solve for."""
     return [] if mode.solve is None else list(map(str, mode.solve.unknowns))
 
 
+@lru_cache(maxsize=4096)
 def whole_value(number: int) -> Value:
     """The value of a whole number."""
     return resolved_expression(str(number), Scope({}))
@@ -280,14 +307,13 @@ class Names(Mapping[str, Meaning]):
     solving: bool = False
 
     @property
-    def states(self) -> frozenset[str]:
+    def states(self) -> Set[str]:
         """The states that may be used here, by their full names."""
-        every = frozenset(name for name, kind in self.board.symbols.names.items() if kind == "states")
         one = self.instance
         if one is None or self.mode is None:
-            return every
+            return self.board.states
         own = one.part.states[one.part.modes.index(self.mode)]
-        return every - {one.full(name) for name in one.states} | frozenset(own)
+        return AllBut(self.board.states, frozenset(map(one.full, one.states)).difference(own))
 
     @property
     def scope(self) -> Scope:
@@ -330,8 +356,8 @@ class Names(Mapping[str, Meaning]):
             if self.solving:
                 return placeholders(one.kind.modes[mode].solve, f"{mode} of {one.name}")[name]  # pyright: ignore[reportArgumentType]
             return self.board.solution(one, mode, name)
-        lets = {str(key): scalar for key, scalar in one.kind.modes[mode].let.items()}  # pyright: ignore[reportArgumentType]
-        shared = {str(key): scalar for key, scalar in one.kind.let.items()}
+        lets: Mapping[str, Scalar] = one.kind.modes[mode].let  # pyright: ignore[reportArgumentType, reportAssignmentType]
+        shared: Mapping[str, Scalar] = one.kind.let  # pyright: ignore[reportAssignmentType]
         if name in lets or name in shared:
             scalar = lets.get(name) or shared[name]
             key = (one.name, mode, name, self.solving)
@@ -340,7 +366,7 @@ class Names(Mapping[str, Meaning]):
             full = one.full(name)
             return Value(symbol(full), uses=frozenset((full,)))
         if name in one.kind.inputs:
-            given = {str(key): scalar for key, scalar in one.given.inputs.items()}
+            given: Mapping[str, Scalar] = one.given.inputs  # pyright: ignore[reportAssignmentType]
             if name not in given:
                 return None  # reported with the instance
             names = Names(self.board, index=one.index)
