@@ -24,6 +24,7 @@ from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 NUMBERS = multiprecision(60)  # of random points: units of states, guards and time may be far apart
 NAN = NUMBERS.functions["nan"]
 ROUNDED = NUMBERS.functions["ldexp"](1, -NUMBERS.bits // 2)  # of its terms: what is smaller counts as zero
+_CALLED = {"absolute": "abs", "minimum": "min", "maximum": "max"}  # among the functions of numbers
 NEXT = NUMBERS.functions["ldexp"](1, -NUMBERS.bits // 4)  # of an argument: what a function changes by tells its slope
 MOST_ROUNDS = 200  # of Newton's method: where units are far apart it halves the way first
 MOST_NODES = 2_000  # of what a guard, its reset and their flows are written with: beyond, no motion is derived
@@ -242,9 +243,10 @@ def _evaluated(expr: sp.Basic, numbers: Sequence[Number]) -> Number:
     try:
         if expr.is_Rational:
             return NUMBERS.constant(Fraction(int(expr.p), int(expr.q)))
-        if expr.is_Pow:
-            return NUMBERS.functions["pow"](*numbers)
-        made = getattr(expr.func, "fold", expr.func)(*map(as_float, numbers)) if numbers else expr
+        name = "pow" if expr.is_Pow else expr.func.__name__
+        if numbers and (function := NUMBERS.functions.get(_CALLED.get(name, name))):
+            return function(*numbers)
+        made = expr.func(*map(as_float, numbers)) if numbers else expr
         found = made.evalf(NUMBERS.digits) if isinstance(made, sp.Expr) else made
         if not found.is_Number or not found.is_real:
             return NAN
