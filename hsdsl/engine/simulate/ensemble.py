@@ -70,9 +70,9 @@ class Kept:
     def told(self) -> None:
         """Put into words what the compiled loop has said by numbers."""
         self.stop[:] = np.array([*structures.STOPPED, "interrupted"], LONGEST)[self.reason]
-        for notices in np.unique(self.notices).tolist():
-            codes = codes_of(kind for bit, kind in KINDS_OF_NOTICES if notices >> bit & 1)
-            self.noted[self.notices == notices] = codes
+        kinds, which = np.unique(self.notices, return_inverse=True)
+        texts = [codes_of(kind for bit, kind in KINDS_OF_NOTICES if seen >> bit & 1) for seen in kinds.tolist()]
+        self.noted = np.array(texts, object)[which]
 
     def logged(self) -> Logged:
         """Every transition, in the order of the instances."""
@@ -189,11 +189,11 @@ def _row(array: Any, row: int) -> int:
     return array.ctypes.data + row * array.strides[0] if len(array) else array.ctypes.data
 
 
-def _settings(problem: Problem, instances: Instances) -> tuple[Array, ...]:
+def _settings(problem: Problem, instances: Instances) -> tuple[Array, Any, Array]:
     """The settings of all instances as ``hs_settings``, and the columns they point into."""
     states, given = problem.program.all_states, instances.settings
-    base = np.frombuffer(task_settings(problem.settings, states), SETTINGS)
-    table = np.repeat(base, instances.count)
+    base = task_settings(problem.settings, states)
+    table = np.frombuffer(bytearray(base) * instances.count, SETTINGS)
     for name in ("until", "relaxation", "max_transitions"):
         table[name] = np.minimum(given[name], MOST_TRANSITIONS) if name == "max_transitions" else given[name]
     if problem.settings.tolerance is not None:

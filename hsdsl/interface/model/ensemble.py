@@ -143,6 +143,8 @@ class PreparedEnsemble:
 
         def placed(array: Array, missing: Any) -> Array:
             """Put an array in its place among all instances."""
+            if len(array) == self.table.count:
+                return array.reshape((*shape, *array.shape[1:]))
             full = np.full((self.table.count, *array.shape[1:]), missing, dtype=array.dtype)
             full[self.places] = array
             return full.reshape((*shape, *array.shape[1:]))
