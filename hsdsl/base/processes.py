@@ -110,11 +110,12 @@ def in_processes(
                 worker.give(waiting.pop())
             for here in wait([*workers], INTERVAL):
                 worker = workers[here]  # pyright: ignore[reportArgumentType]
-                yield worker.index, worker.answer()
+                index, answer = worker.index, worker.answer()
                 if waiting and worker.alive:
-                    worker.give(waiting.pop())
+                    worker.give(waiting.pop())  # it works on while the answer is taken
                 else:
                     workers.pop(worker.here).end()
+                yield index, answer
             for worker in [worker for worker in workers.values() if worker.late(limit)]:
                 yield worker.index, Lost(HANGS)
                 workers.pop(worker.here).end()

@@ -13,7 +13,7 @@ from hsdsl.analysis.sweep import Recording, dataset, load, variation
 from hsdsl.analysis.sweep.dataset import damaged
 from hsdsl.base.errors import UsageError
 
-pytest.importorskip("pyarrow")
+parquet = pytest.importorskip("pyarrow.parquet")
 
 TEXT = """
 hsdsl: 1
@@ -180,8 +180,8 @@ def test_damaged_files_are_made_again(model, tmp_path):
     found = model.sweep(**arguments)
     whole, paths = found.table(), found.chunks
     paths[0].write_bytes(paths[0].read_bytes()[:-20])
-    content = bytearray(paths[1].read_bytes())
-    content[content.index(b"PAR1") + 60] ^= 0xFF
+    content, column = bytearray(paths[1].read_bytes()), parquet.ParquetFile(paths[1]).metadata.row_group(0).column(0)
+    content[column.data_page_offset + column.total_compressed_size - 1] ^= 0xFF  # the last byte of a page
     paths[1].write_bytes(content)
     paths[2].write_bytes(b"")
     other = model.sweep(**arguments | {"out": tmp_path / "other", "parameters": {"g": 10}})

@@ -291,10 +291,10 @@ def schema(manifest: Manifest) -> Any:
     return arrow.schema(columns, metadata={TAG: manifest.tag.encode()})
 
 
-def table(manifest: Manifest, first: int, ensemble: Ensemble) -> Any:
-    """The rows of an ensemble, the first of which has the number ``first``."""
+def table(manifest: Manifest, first: int, varied: Mapping[str, Array], ensemble: Ensemble) -> Any:
+    """The rows of an ensemble, the first of which has the number ``first``, and the values that vary."""
     arrow, columns = library(), schema(manifest)
-    values = dict(_columns(manifest, first, ensemble))
+    values = {column_of(name): column for name, column in varied.items()} | dict(_columns(manifest, first, ensemble))
     arrays = [
         _lists(arrow, values[field.name], field.type) if field.name.partition(".")[0] in LISTS
         else arrow.array(values[field.name], type=field.type, from_pandas=True)
@@ -320,7 +320,6 @@ def refused(manifest: Manifest, first: int, last: int, why: str) -> Any:
 def _columns(manifest: Manifest, first: int, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
     count = ensemble.stop.size
     yield "row", np.arange(first, first + count)
-    yield from ((column_of(name), column) for name, column in manifest.variation.values(first, first + count).items())
     yield "stop", ensemble.stop
     yield from _words(manifest, ensemble)
     yield "time", ensemble.time

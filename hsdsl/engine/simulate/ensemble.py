@@ -70,9 +70,8 @@ class Kept:
     def told(self) -> None:
         """Put into words what the compiled loop has said by numbers."""
         self.stop[:] = np.array([*structures.STOPPED, "interrupted"], LONGEST)[self.reason]
-        kinds, which = np.unique(self.notices, return_inverse=True)
-        texts = [codes_of(kind for bit, kind in KINDS_OF_NOTICES if seen >> bit & 1) for seen in kinds.tolist()]
-        self.noted = np.array(texts, object)[which]
+        for seen in set(self.notices[self.notices != 0].tolist()):
+            self.noted[self.notices == seen] = codes_of(kind for bit, kind in KINDS_OF_NOTICES if seen >> bit & 1)
 
     def logged(self) -> Logged:
         """Every transition, in the order of the instances."""
@@ -199,10 +198,9 @@ def _settings(problem: Problem, instances: Instances) -> tuple[Array, Any, Array
     if problem.settings.tolerance is not None:
         table["largest"] = table["until"] * LARGEST_SHARE
         table["step"] = table["largest"] / FIRST_PART
-    scale = np.zeros((instances.count, len(states)))
+    scale = np.zeros((instances.count if given["scale"] else 0, len(states)))
     for name, column in given["scale"].items():
         scale[:, states.index(name)] = column
-    if given["scale"]:
         table["scale"] = _rows(scale)
     return table, base, scale
 

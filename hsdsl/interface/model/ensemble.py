@@ -221,7 +221,7 @@ def prepare_ensemble(request: EnsembleRequest) -> PreparedEnsemble:
     check_alone(base.program.modes[base.mode], start.T)
     options = pipeline.resolve(call.get("settings"), {key: call.get(key) for key in KEYS})
     settings = setting_columns(options, table)
-    places = np.setdiff1d(np.arange(table.count), list(table.refused))
+    places = np.delete(np.arange(table.count), list(table.refused))
     if np.any(np.broadcast_to(settings[options.size], table.count)[places] != getattr(base.settings, options.size)):
         raise UsageError(f"{options.size} differs between the instances of an ensemble", "give it as a number")
     until = np.full(table.count, math.nan)

@@ -195,6 +195,7 @@ def _begun(
 
 PROBES, BYTES, MOST_ROWS = 16, 64e6, 100_000
 SECONDS, LEAST_SECONDS = 2.0, 0.1  # of a chunk
+PROBED, GROWTH = 0.004, 8  # seconds that tell how long a row takes, and by how much more rows are tried for them
 CHUNKS_A_CORE = 16  # so that no core waits long for the last chunk
 
 
@@ -219,8 +220,9 @@ class ChunkWork:
 
         A row that stops all others from being run is found by halves, and is refused by itself.
         """
+        varied = self.manifest.variation.values(first, last)
         try:
-            return table(self.manifest, first, self._ensemble(first, last))
+            return table(self.manifest, first, varied, self._ensemble(varied))
         except UsageError as error:
             if last - first == 1:
                 why = error.why if isinstance(error, NothingToRunError) else str(error)
@@ -228,10 +230,10 @@ class ChunkWork:
         middle = (first + last) // 2
         return library().concat_tables([self.rows(first, middle), self.rows(middle, last)])
 
-    def _ensemble(self, first: int, last: int) -> Any:
+    def _ensemble(self, varied: Mapping[str, Any]) -> Any:
         call: dict[str, Any] = dict(self.manifest.arguments)
         groups = {group: dict(call.pop(group, {})) for group in ("parameters", "initial")}
-        for name, values in self.manifest.variation.values(first, last).items():
+        for name, values in varied.items():
             groups["initial" if name.startswith(INITIAL) else "parameters"][name.removeprefix(INITIAL)] = values
         kept = self.manifest.recording
         found = run_ensemble(self.model, call | groups, kept.samples, 0, self.threads, None, kept.transitions)
@@ -247,7 +249,7 @@ class ChunkWork:
         refusals: list[UsageError] = []
         for k in rows:
             try:
-                self._ensemble(k, k + 1)
+                self._ensemble(self.manifest.variation.values(k, k + 1))
                 return
             except UsageError as error:
                 refusals.append(error)
@@ -263,13 +265,21 @@ def chunk_size(work: ChunkWork, processes: int) -> int:
     rows = work.manifest.variation.rows
     work.check(np.unique(np.linspace(0, rows - 1, min(rows, PROBES)).astype(int)).tolist())
     first, shared = rows // 2, math.ceil(rows / (CHUNKS_A_CORE * processes))
-    work.rows(first, first + 1)  # what is imported and compiled only once does not count
-    count, seconds, size = 1, 0.0, 0.0
-    while seconds < LEAST_SECONDS and 2 * count <= rows - first:
-        count *= 2
-        began = time.perf_counter()
+
+    def timed(count: int) -> tuple[float, float]:
+        """Seconds of the processor for so many rows, and bytes of one."""
+        began = time.process_time()
         size = work.rows(first, first + count).nbytes / count
-        seconds = time.perf_counter() - began
-    pace = count / max(seconds, 1e-6)
+        return time.process_time() - began, size
+
+    timed(1)  # what is imported and compiled only once does not count
+    alone, size = timed(1)
+    count, seconds = 1, 0.0
+    while seconds < PROBED and count < rows - first:
+        count = min(GROWTH * count, rows - first)
+        seconds, size = timed(count)
+        seconds -= alone  # so that what a chunk takes besides its rows does not count
+    pace = max(1, count - 1) / max(seconds, 1e-6)
     shared = max(shared, min(LEAST_SECONDS * pace, rows / processes))
-    return max(1, int(min(BYTES / max(1.0, size), SECONDS * pace, shared, MOST_ROWS)))
+    most = max(1, int(min(BYTES / max(1.0, size), SECONDS * pace, shared, MOST_ROWS)))
+    return -(-rows // (processes * -(-rows // (most * processes))))  # as many for every process
