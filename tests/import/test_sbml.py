@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import random
 from collections.abc import Mapping
-from math import cosh, exp
+from importlib.util import find_spec
+from math import cosh, exp, gamma
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,8 @@ import hsdsl
 from hsdsl.base import limits
 from hsdsl.interface.cli.verbs import obey
 from hsdsl.interface.imports.sbml import imported
+from hsdsl.interface.imports.sbml.formulas import TAKEN
+from hsdsl.interface.imports.sbml.readable import readable
 from hsdsl.language.source.xml import read_xml
 
 MATH = '<math xmlns="http://www.w3.org/1998/Math/MathML">{}</math>'
@@ -24,7 +28,7 @@ SPECIES = (
 
 TAGS: dict[type[ast.AST], str] = {
     **{ast.Add: "plus", ast.Sub: "minus", ast.USub: "minus", ast.Mult: "times", ast.Div: "divide", ast.Pow: "power"},
-    **{ast.Lt: "lt", ast.GtE: "geq", ast.Gt: "gt", ast.And: "and", ast.Not: "not"},
+    **{ast.Lt: "lt", ast.GtE: "geq", ast.Gt: "gt", ast.And: "and", ast.Or: "or", ast.Not: "not"},
 }
 SYMBOLS = {"time": "symbols/time", "delay": "symbols/delay", "rateOf": "symbols/rateOf"}
 OWN = ("twice", "clipped")  # functions of the files
@@ -243,7 +247,6 @@ def test_units_are_kept() -> None:
     ("formula", "feature"),
     [
         ("delay(x, 1)", "delay equations"),
-        ("factorial(x)", "factorial"),
         ("INF", "infinity"),
         ("x*nowhere", "a name that is nowhere: nowhere"),
         ("twice(x)", "a function that is nowhere: twice"),
@@ -260,10 +263,122 @@ def test_what_has_no_words_is_refused_with_its_place(formula: str, feature: str)
 
 
 def test_required_packages_are_refused() -> None:
-    """Submodels change what a model means."""
-    text = model(Parameters=parameter("x", 1)).replace('version="2"', 'version="2" xmlns:comp="c" comp:required="true"')
-    with pytest.raises(hsdsl.ModelError, match=r"the package 'comp' \(have its submodels written out"):
+    """What a package adds may change what a model means."""
+    text = model(Parameters=parameter("x", 1)).replace('version="2"', 'version="2" xmlns:p="c" p:required="true"')
+    with pytest.raises(hsdsl.ModelError, match=r"a model cannot have the package 'p'"):
         of(text)
+
+
+COMP = """<sbml xmlns="http://www.sbml.org/sbml/level3/version1/core" level="3" version="1"
+ xmlns:comp="http://www.sbml.org/sbml/level3/version1/comp/version1" comp:required="true">
+<model id="whole"><comp:listOfSubmodels><comp:submodel comp:id="a" comp:modelRef="part"/>
+<comp:submodel comp:id="b" comp:modelRef="part"/></comp:listOfSubmodels></model>
+<comp:listOfModelDefinitions><comp:modelDefinition id="part"><listOfParameters>
+<parameter id="x" value="1" constant="false"/></listOfParameters><listOfRules>{}</listOfRules></comp:modelDefinition>
+</comp:listOfModelDefinitions></sbml>"""
+
+
+def test_submodels_are_written_out_by_libsbml() -> None:
+    text = COMP.format(rate("x", "2*x"))
+    if find_spec("libsbml") is None:
+        with pytest.raises(hsdsl.ModelError, match=r"the package 'comp' \(pip install python-libsbml"):
+            of(text)
+        return
+    final = hsdsl.loads(of(text, "1")).simulate(engine="python").final.state
+    assert final == pytest.approx({"a__x": exp(2), "b__x": exp(2)})
+
+
+@pytest.mark.parametrize(
+    "name", [*sorted(TAKEN), "null", "Null", "yes", "on", "lambda", "E", "S", "__", "title", "INF", "Inf", "NaN"]
+)
+def test_every_name_of_a_file_is_kept_or_renamed(name: str) -> None:
+    """As a state, a constant, a function, an argument and an event."""
+    twice = "<lambda><bvar><ci>{0}</ci></bvar><apply><plus/><ci>{0}</ci><ci>{0}</ci></apply></lambda>"
+    functions = '<functionDefinition id="{}">{}</functionDefinition>'
+    head = functions.format("own", MATH.format(twice.format(name)))
+    law = MATH.format(f"<apply><ci>own</ci><ci>{name}</ci></apply>")
+    text = model(
+        FunctionDefinitions=head,
+        Parameters=parameter("x", 0) + parameter(name, 2),
+        Rules=f'<rateRule variable="x">{law}</rateRule>' + rate(name, "1"),
+    )
+    assert hsdsl.loads(of(text, outputs={name: "value"})).simulate(engine="python").final.outputs == pytest.approx(
+        {f"out_{name}": 4}
+    )
+    called = MATH.format(f"<apply><ci>{name}</ci><cn>1</cn></apply>")
+    text = model(
+        FunctionDefinitions=functions.format(name, MATH.format(twice.format("s"))),
+        Parameters=parameter("x", 0),
+        Rules=f'<rateRule variable="x">{called}</rateRule>',
+    )
+    assert hsdsl.loads(of(text)).simulate(engine="python").final.state == pytest.approx({"x": 4})
+    named = event("x >= 1", {"x": "5"}).replace("<event ", f'<event id="{name}" ')
+    text = model(Parameters=parameter("x", 0), Rules=rate("x", "1"), Events=named)
+    assert hsdsl.loads(of(text)).simulate(engine="python").final.state["x"] == pytest.approx(6)
+
+
+FORMULAS = {
+    "((1)*R3 + (-1)*R4)": "R3 - R4",
+    "((-1)*r)/c": "-r/c",
+    "(((a + b) + c)*2)": "(a + b + c)*2",
+    "(a - (b + c))/(d*e)": "(a - (b + c))/(d*e)",
+    "(a/(b/c))": "a/(b/c)",
+    "((-2)**2)*(x**(-1))": "(-2)**2*x**(-1)",
+    "(-(2**2))": "-2**2",
+    "((a**b)**c) - (a**(b**c))": "(a**b)**c - a**b**c",
+    "(-2)*x - (-3)*y": "-2*x + 3*y",
+    "(x > 0 or x < 0) and ((y >= (1)) and z < 2)": "(x > 0 or x < 0) and y >= 1 and z < 2",
+    "not ((x) > 0 and y > 0)": "not (x > 0 and y > 0)",
+    "select((x), ((a)*(1)), (1/(b)))": "select(x, a, 1/b)",
+}
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_formulas_have_no_more_parentheses_than_they_need(text: str) -> None:
+    assert readable(text) == FORMULAS[text]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_readable_formulas_have_the_same_value_to_the_last_bit(seed: int) -> None:
+    rng = random.Random(f"formulas {seed}")
+
+    def made(depth: int) -> str:
+        if depth == 0:
+            return rng.choice(["0.1", "0.3", "1", "7", "1.7"])
+        a, b = made(depth - 1), made(depth - 1)
+        return rng.choice([f"({a} + {b})", f"({a} - {b})", f"({a}*{b})", f"({a}/({b} + 9))", f"(-{a})", f"(({a})**2)"])
+
+    for depth in (1, 2, 3, 4, 5):
+        text = made(depth)
+        assert eval(readable(text)) == eval(text), text  # Python's precedence is the language's
+
+
+def test_faults_are_in_the_file_that_was_imported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A constant without a value, and a rule that gives a name two values by the way round a kink."""
+    file = tmp_path / "wrong.xml"
+    rules = "\n" + assigned("y", "x/(2 - 2)") + "\n" + rate("x", "1")
+    file.write_text(model(Parameters=parameter("x", 1) + parameter("y", 1), Rules=rules))
+    assert obey(["import", str(file), "--until", "1"]) == 1
+    said = capsys.readouterr().err
+    assert f"{file}:2:" in said and "y: " in said and "<text>" not in said and "assignmentRule" in said
+
+
+def test_factorials_and_values_that_are_infinite() -> None:
+    rules = rate("x", "factorial(3)") + rate("y", "0*y + factorial(c)")
+    names = parameter("x", 0) + parameter("y", 0) + parameter("c", 2.5, True)
+    bound = '<parameter id="b" value="INF" constant="true"/>'
+    text = of(model(Parameters=names + bound, Rules=rules, Events=event("x > b or x >= 6", {"x": "100"})), "1.5")
+    final = hsdsl.loads(text).simulate(engine="python").final.state
+    assert "# Left out, since every number is finite here: b = inf." in text and "or" not in text.split("event:")[1]
+    assert (final["x"], final["y"]) == pytest.approx((103, 1.5 * gamma(3.5)), rel=1e-13)
+
+
+def test_names_terms_and_notes_become_comments() -> None:
+    note = '<notes><body xmlns="http://www.w3.org/1999/xhtml"><p>From the\n paper</p></body></notes>'
+    k = parameter("k", 3, True).replace("/>", f' name="growth" sboTerm="SBO:0000009">{note}</parameter>')
+    text = of(model(Parameters=k + parameter("x", 1), Rules=rate("x", "k*x")))
+    assert "  k: 3  # growth; SBO:0000009; From the paper\n" in text
+    assert hsdsl.loads(text).simulate(engine="python").stop.reason == "until"
 
 
 def test_functions_that_double_are_bounded() -> None:

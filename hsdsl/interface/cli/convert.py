@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from hsdsl.base.errors import UsageError
+from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import counted
 from hsdsl.export import TARGETS, Modes, check_folder, check_scheme, files_of, source_of, write
 from hsdsl.export import check_target as check_known
@@ -26,6 +26,9 @@ from hsdsl.interface.cli.options import (
     names_of,
     option,
 )
+
+if TYPE_CHECKING:
+    from hsdsl.language.system import HybridSystem
 
 TO = f"The target: {', '.join(TARGETS)}."
 FOLDER = "The folder for the files; left out, a target with one file of text prints it."
@@ -107,10 +110,8 @@ def import_(
         if out is not None and out.exists() and not force:
             raise UsageError(f"--out {out}: the file is there already", "--force replaces it")
         from hsdsl.base.atomic import replacing
-        from hsdsl.interface.model import loads
 
-        text = _imported(file, cfg, until, urgent)
-        system = loads(text).system
+        text, system = _imported(file, cfg, until, urgent)
         if out is None:
             print(text, end="")
             return
@@ -123,18 +124,24 @@ def import_(
             say(f"wrote {out}: {counted(len(system.modes), 'mode')}, {counted(edges, 'transition')}")
 
 
-def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool) -> str:
-    """The text of the model in a file of one of the formats."""
+def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool) -> tuple[str, HybridSystem]:
+    """The text of the model in a file of one of the formats, and its mathematics."""
     from hsdsl.interface.imports import sbml, spaceex
+    from hsdsl.interface.model import loads
     from hsdsl.language.files import read_bytes
     from hsdsl.language.source.xml import read_xml
 
     root = read_xml(str(file), read_bytes(file), sbml.DEEPEST)
     if not sbml.is_sbml(root):
-        return spaceex.imported(file, cfg, until, urgent)
+        text = spaceex.imported(file, cfg, until, urgent)
+        return text, loads(text).system
     if cfg is not None or urgent:
         raise UsageError(f"{'--cfg' if cfg else '--urgent'} is for models of SpaceEx, and {file} is one of SBML")
-    return sbml.imported(root, until)
+    text = sbml.imported(root, until)
+    try:
+        return text, loads(text).system
+    except ModelError as error:
+        raise sbml.placed(error, text, root) from None
 
 
 NOTHING = (

@@ -133,9 +133,9 @@ class ExpressionResolver:
 
 
 def _tree(text: str, expected: Expected, scope: Scope) -> Tree:
-    word = text.strip().lower()
-    if word in _NOT_FINITE and word.lstrip("+-") not in scope.values:
-        message, hint = f"`{text.strip()}` is not a finite number", "every number is finite here"
+    word = text.strip()
+    if word.lower() in _NOT_FINITE and word.lstrip("+-") not in scope.values:
+        message, hint = f"`{word}` is not a finite number", "every number is finite here"
         raise ExpressionError("HS118", message, 0, len(text), hint)
     return parse(text, expected)
 

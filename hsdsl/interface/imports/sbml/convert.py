@@ -1,26 +1,22 @@
-"""Models of SBML as documents of the language, and their text: one mode, whose events are those of the file.
+"""Models of SBML as documents of the language: one mode, whose events are those of the file.
 
 Amounts of species are states where their compartment varies, concentrations where it does not. A condition inside a
-formula becomes a state that is 0 or 1, which two events switch. The text is YAML for people, with units and remarks.
+formula becomes a state that is 0 or 1, which two events switch.
 """
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
-from hsdsl import __version__
-from hsdsl.base.names import visible
 from hsdsl.interface.imports.sbml.document import Event, Node, NotExpressible, Quantity, Reference, SbmlModel, Species
-from hsdsl.interface.imports.sbml.formulas import Facts, Writer, argument, literal
-from hsdsl.language.source.xml import Element
+from hsdsl.interface.imports.sbml.formulas import FACTORIAL, Facts, Writer, argument, literal
 
 NOTHING = "a value that nothing gives"
+ENDLESS = "infinity or not-a-number as a value"
 FIRST = 10**8  # the priority of what switches a condition inside a formula
 MOST_LISTED = 3  # lines of constraints
 LONGEST = 100_000  # characters of an initial value that is written out
@@ -62,8 +58,8 @@ class Converter(Facts):
     def named(self, name: str, node: Node | None = None) -> str:
         """A name in a formula."""
         element = node.element if node else self.quantities[name].element if name in self.quantities else None
-        if name in self.unset:
-            raise NotExpressible(NOTHING, element)
+        if name in self.unset or name in self.endless:
+            raise NotExpressible(NOTHING if name in self.unset else ENDLESS, element)
         if name not in self.quantities and name not in self.reactions:
             raise NotExpressible(f"a name that is nowhere: {name}", element)
         if name in self.references and self.is_number(name):
@@ -180,7 +176,7 @@ class Converter(Facts):
             return value
         volume = self.volume(name)
         if not quantity.by_concentration:
-            return f"{value}/{self.initial_name(volume)}" if volume else value
+            return f"{value}/{self.initial_name(volume)}" if volume and value != "0" else value
         return value if volume else f"{value}*{self.initial_name(quantity.compartment)}"
 
     def own_start(self, name: str) -> str:
@@ -200,7 +196,8 @@ class Converter(Facts):
         let = {self.spelled(name): f"{self.own(name)}/{self.named(self.volume(name) or '')}" for name in held}
         let |= {self.spelled(name): self.running.number(node) for name, node in self.model.assigned.items()}
         let |= {self.spelled(name): self.law(name, self.running) for name in self.reactions}
-        recorded = {f"out_{name}": self.output(name, kind) for name, kind in outputs.items()}
+        finite = {name: kind for name, kind in outputs.items() if name not in self.endless}
+        recorded = {f"out_{name}": self.output(name, kind) for name, kind in finite.items()}
         equations = [f"{self.running.number(equation)} == 0" for equation in self.model.equations]
         flow = {self.own(name): self.flow(name, self.running) for name in states}
         transitions = [self.event(event) for event in self.model.events]
@@ -214,6 +211,8 @@ class Converter(Facts):
         solve = {"solve": {"unknowns": list(map(self.spelled, self.unknowns)), "equations": equations}}
         mode = {"flow": flow | dict.fromkeys(chosen, "0"), "transitions": [*switches, *transitions]}
         assumptions = list(self.assumptions())
+        if re.search(r"\bfactorial\(", str((parameters, functions, let, mode, equations, initial, recorded))):
+            functions["factorial"] = FACTORIAL
         return {
             "hsdsl": "1",
             **({"assumptions": assumptions} if assumptions else {}),
@@ -281,7 +280,7 @@ class Converter(Facts):
                 feature = "values of the time of the trigger in a volume of the time of execution"
                 raise NotExpressible(feature, event.element)
             transition["delay"] = self.running.number(self.whole(event.delay))
-        elif event.at_trigger and self.depends_on_others(event):
+        elif event.at_trigger and self.reads_changes(event):
             transition["delay"] = "0"  # its values are those of its trigger, before what other events do then
         if not event.persistent:
             transition["persistent"] = False
@@ -308,12 +307,13 @@ class Converter(Facts):
                 f"{first} and {other} have one priority: where SBML chooses at random, the first in the file goes first"
             )
 
-    def depends_on_others(self, event: Event) -> bool:
-        """Whether what an event assigns uses what another event changes."""
+    def reads_changes(self, event: Event) -> bool:
+        """Whether what an event assigns uses what changes at that instant: by others, or by itself, set off again."""
         used = set[str]().union(*(self.deep(self.whole(node)) for _, node in event.changes))
         used |= {self.volume(name) or "" for name in used if name in self.species}
-        others = (name for other in self.model.events if other is not event for name, _ in other.changes)
-        return any(name in used for name in others)
+        others = {name for other in self.model.events if other is not event for name, _ in other.changes}
+        again = others & self.deep(self.whole(event.trigger))
+        return bool(used & (others | {name for name, _ in event.changes if again}))
 
     def assigned_value(self, name: str, text: str) -> str:
         """What an event assigns to the state of a quantity; an amount is that in the compartment before."""
@@ -334,126 +334,3 @@ class Converter(Facts):
         for name in let:
             visit(name)
         return order
-
-
-_PLAIN = re.compile(r"[A-Za-z0-9_.(-][\w .()*/+<>=-]*")
-_BASE = {
-    **{kind: kind for kind in ("ampere", "coulomb", "farad", "gram", "henry", "hertz", "joule", "kelvin", "kilogram")},
-    **{kind: kind for kind in ("mole", "newton", "ohm", "pascal", "radian", "siemens", "tesla", "volt", "watt")},
-    **{"metre": "m", "meter": "m", "litre": "L", "liter": "L", "second": "s", "dimensionless": "1"},
-}
-_SHORT = {"mole": "mol", "gram": "g", "kilogram": "kg", "kelvin": "K", "volt": "V", "ampere": "A", "joule": "J"}
-_SCALES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", -2: "c", -1: "d", 3: "k", 6: "M"}
-_OLD = {"substance": "mol", "volume": "L", "area": "m**2", "length": "m", "time": "s"}  # of Level 2
-
-
-def written(converter: Converter, document: dict[str, Any], path: str) -> str:
-    """The model's text."""
-    renamed = [f"{old} -> {new}" for old, new in converter.spelling.items() if old != new]
-    notes = [f"Imported by hsdsl {__version__} from SBML."]
-    notes += [f"Renamed, since the language has words of that spelling: {', '.join(renamed)}."] if renamed else []
-    units = _units(converter)
-    lines = ["hsdsl: 1", f"title: {_quoted(converter.model.name)}", f"source: {_quoted(Path(path).name)}", ""]
-    lines += [f"# {visible(note)}" for note in notes]
-    for key, value in document.items():
-        if key != "hsdsl" and value:
-            lines += [*_entry(key, value), ""]
-        if key == "outputs" and units:
-            lines += [*_entry("units", units), ""]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _entry(key: str, value: Any) -> list[str]:
-    if not isinstance(value, dict | list):
-        return [f"{_text(key)}: {str(value).lower() if isinstance(value, bool) else _text(str(value))}"]
-    if not value:
-        return [f"{_text(key)}: {{}}"]
-    return [f"{_text(key)}:", *(f"  {line}" for line in _lines(value))]
-
-
-def _lines(value: Any) -> Iterable[str]:
-    if isinstance(value, dict):
-        for key, inner in value.items():  # pyright: ignore[reportUnknownVariableType]
-            yield from _entry(str(key), inner)  # pyright: ignore[reportUnknownArgumentType]
-        return
-    for item in value:
-        first, *rest = _lines(item) if isinstance(item, dict | list) else [_text(str(item))]
-        yield f"- {first}"
-        yield from (f"  {line}" for line in rest)
-
-
-def _text(text: str) -> str:
-    """An expression or a name as YAML."""
-    return text if _PLAIN.fullmatch(text) and text.lower() != "null" and not text.startswith("- ") else _quoted(text)
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(visible(text), ensure_ascii=False)
-
-
-def _units(converter: Converter) -> dict[str, str]:
-    """The units of states and parameters that the file gives, where the language has them."""
-    model, found = converter.model, dict[str, str | None]()
-    attributes = model.element.attributes
-
-    def meant(unit: str) -> str | None:
-        return _unit(unit, model.units, model.level)
-
-    for name, one in converter.quantities.items():
-        if isinstance(one, Species):
-            amount = meant(one.unit or attributes.get("substanceUnits", "substance"))
-            volume = converter.volume(name)
-            size = None if volume is None else meant(_size(converter, volume))
-            unit = amount if volume is None else f"{_factor(amount)}/{_factor(size)}" if amount and size else None
-        else:
-            unit = meant(_size(converter, name) if one.kind == "compartment" else one.unit)
-        if not converter.held_amount(name) and (converter.is_state(name) or converter.is_parameter(name)):
-            found[converter.spelled(name)] = unit
-    known = {name: unit for name, unit in found.items() if unit}
-    time = meant(attributes.get("timeUnits", "time"))
-    return {**({"t": time} if time else {}), **known} if known else {}
-
-
-def _size(converter: Converter, compartment: str) -> str:
-    given = converter.quantities[compartment].unit
-    words = {3.0: "volume", 2.0: "area", 1.0: "length"}
-    word = words.get(converter.model.dimensions.get(compartment, 3.0), "")
-    return given or converter.model.element.attributes.get(f"{word}Units", word)
-
-
-def _factor(unit: str | None) -> str:
-    return f"({unit})" if unit and re.search(r"[*/]", unit) else unit or ""
-
-
-def _unit(unit: str, definitions: dict[str, Element], level: int) -> str | None:
-    """A unit in the language; None where it is not known."""
-    if unit in definitions:
-        parts = [part for list_ in definitions[unit].all("listOfUnits") for part in list_.all("unit")]
-        texts = [_part(part) for part in parts]
-        return "*".join(text for text in texts if text) or None if all(texts) else None
-    if unit in _BASE:
-        return _SHORT.get(unit, _BASE[unit])
-    return _OLD.get(unit) if level < 3 else None
-
-
-def _part(element: Element) -> str | None:
-    """One factor of a unit: (multiplier * 10**scale * kind)**exponent."""
-    given = element.attributes
-    kind = _BASE.get(given.get("kind", ""))
-    try:
-        exponent, scale = float(given.get("exponent", "1")), int(given.get("scale", "0"))
-        multiplier = float(given.get("multiplier", "1"))
-    except ValueError:
-        return None
-    if kind is None or not exponent.is_integer() or not multiplier > 0:
-        return None
-    name = _SHORT.get(kind, kind)
-    if scale in _SCALES and name not in ("1", "kg"):
-        name, scale = f"{_SCALES[scale]}{name}", 0
-    size = multiplier * 10.0**scale
-    name = name if size == 1 else f"({size!r}*{name})"
-    return name if exponent == 1 else f"{name}**{_exponent(int(exponent))}"
-
-
-def _exponent(exponent: int) -> str:
-    return f"({exponent})" if exponent < 0 else str(exponent)

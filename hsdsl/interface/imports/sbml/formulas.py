@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -22,6 +23,14 @@ from hsdsl.interface.imports.sbml.document import (
 )
 from hsdsl.language.expression.scope import RESERVED
 
+_LANCZOS = (676.5203681218851, -1259.1392167224028, 771.3234287776531, -176.6150291621406)
+_FURTHER = (12.507343278686905, -0.13857109526572012, 9.984369578019572e-06, 1.5056327351493116e-07)
+FACTORIAL = {  # of any number from 0 on (Lanczos 1964, doi:10.1137/0701008, with g = 7), to 14 digits
+    "of": ["n"],
+    "is": "sqrt(2*pi)*(n + 7.5)**(n + 0.5)*exp(-n - 7.5)*(0.9999999999998099 + "
+    + " + ".join(f"({c})/(n + {k})" for k, c in enumerate((*_LANCZOS, *_FURTHER), 1))
+    + ")",
+}
 AVOGADRO = "6.02214179e23"  # the value that SBML Level 3 gives it
 _SAME = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "abs", "exp", "floor")
 _ARCS = ("sin", "cos", "tan", "sinh", "cosh", "tanh")
@@ -33,6 +42,10 @@ _FUNCTIONS = {
     "ceiling": "(-floor(-{}))",
     **{f"{name}{kind}": f"(1/{other}{kind}({{}}))" for name, other in _INVERSES.items() for kind in ("", "h")},
     **{f"arc{name}{kind}": f"a{other}{kind}(1/{{}})" for name, other in _INVERSES.items() for kind in ("", "h")},
+}
+_MEANT = {
+    **{"gt": operator.gt, "geq": operator.ge, "lt": operator.lt, "leq": operator.le, "eq": operator.eq},
+    "neq": operator.ne,
 }
 _COMPARISONS = {"gt": ">", "geq": ">=", "lt": "<", "leq": "<=", "eq": "==", "neq": "!="}
 _LOGICAL = ("and", "or", "not", "xor", "implies")
@@ -142,8 +155,10 @@ class Writer:
 
 
 def _joined(word: str, texts: list[str]) -> str:
-    if not texts:
-        return "true"
+    neutral, decides = ("true", "false") if word == "and" else ("false", "true")
+    texts = [text for text in texts if text != neutral]
+    if not texts or decides in texts:
+        return decides if texts else neutral
     return texts[0] if len(texts) == 1 else f"({f' {word} '.join(texts)})"
 
 
@@ -215,9 +230,9 @@ def _remainder(writer: Writer, node: Node) -> str:
 
 def _factorial(writer: Writer, node: Node) -> str:
     given = _one(node)
-    if given.kind != "number" or "/" in given.value or not 0 <= float(given.value) <= 100:
-        raise NotExpressible("factorial of what is not a number", node.element)
-    return str(math.factorial(round(float(given.value))))
+    if given.kind == "number" and given.value.isdigit() and int(given.value) <= 18:
+        return str(math.factorial(int(given.value)))
+    return f"factorial({writer.number(given)})"
 
 
 def _call(writer: Writer, node: Node) -> str:
@@ -259,7 +274,9 @@ _SPECIAL: dict[str, Callable[[Writer, Node], str]] = {
 }
 
 
-TAKEN = frozenset((*RESERVED, SINCE, "index", "sum", "count", "mode"))
+TAKEN = frozenset(  # other spellings of `true` stand for it in YAML; `factorial` is defined where it is used
+    (*RESERVED, SINCE, "index", "sum", "count", "mode", "True", "TRUE", "False", "FALSE", "factorial")
+)
 
 
 class Facts:
@@ -269,25 +286,52 @@ class Facts:
         self.model = model
         self.reactions: dict[str, Reaction] = model.reactions
         self.quantities: dict[str, Quantity] = model.quantities
+        self.endless = self._endless()
         self.functions = {name: known for name, known in model.functions.items() if self._is_plain(known)}
-        self._write_out({name: known for name, known in model.functions.items() if name not in self.functions})
+        self._functions = {name: known for name, known in model.functions.items() if name not in self.functions}
+        self._write_out()
 
-    def _write_out(self, functions: dict[str, Lambda]) -> None:
+    def _write_out(self) -> None:
         """Put the bodies of functions that are no arithmetic of their arguments in place of their calls."""
         model = self.model
         for table in (model.starts, model.assigned, model.rates):
-            table.update({name: written_out(node, functions) for name, node in table.items()})
-        model.equations = [written_out(node, functions) for node in model.equations]
-        self.laws = {
-            name: written_out(reaction.law, functions)
-            for name, reaction in self.reactions.items()
-            if reaction.law is not None
-        }
-        self._functions = functions
+            table.update({name: self.whole(node) for name, node in table.items()})
+        model.equations = list(map(self.whole, model.equations))
+        laws = {name: reaction.law for name, reaction in self.reactions.items()}
+        self.laws = {name: self.whole(law) for name, law in laws.items() if law is not None}
 
     def whole(self, node: Node) -> Node:
-        """A formula of an event with such functions written out."""
-        return written_out(node, self._functions)
+        """A formula with such functions written out, and comparisons with what is infinite decided."""
+        return written_out(node, self._functions).mapped(self._decided)
+
+    def _endless(self) -> dict[str, float]:
+        """Constants whose value the file gives as infinity or not-a-number."""
+        model, found = self.model, dict[str, float]()
+        for name, one in self.quantities.items():
+            start = model.starts.get(name)
+            value = one.value if start is None else self._extent(start)
+            given = start is not None or not math.isnan(one.value) or "NaN" in one.element.attributes.values()
+            changes = name in model.assigned or name in model.rates or name in self.event_assigned
+            if value is not None and not math.isfinite(value) and given and not changes:
+                found[name] = value
+                model.starts.pop(name, None)
+        return found
+
+    def _extent(self, node: Node) -> float | None:
+        """The value of a formula that is infinite or not-a-number by itself."""
+        if node.kind == "minus" and len(node.arguments) == 1:
+            inner = self._extent(node.arguments[0])
+            return None if inner is None else -inner
+        return {"infinity": math.inf, "notanumber": math.nan}.get(node.kind)
+
+    def _decided(self, node: Node) -> Node:
+        if node.kind not in _COMPARISONS or len(node.arguments) != 2:
+            return node
+        a, b = (self.endless.get(part.name) if part.kind == "name" else self._extent(part) for part in node.arguments)
+        if a is None and b is None:
+            return node
+        holds = _MEANT[node.kind](a or 0.0, b or 0.0)  # any number is between the infinities as 0 is
+        return Node("true" if holds else "false", node.element)
 
     @cached_property
     def spelling(self) -> dict[str, str]:
@@ -450,7 +494,9 @@ class Facts:
 
     def is_parameter(self, name: str) -> bool:
         """Whether a quantity is the same in the whole run, and a name of the model."""
-        if self.is_state(name) or name in self.unset or (name in self.references and self.is_number(name)):
+        if self.is_state(name) or name in self.unset or name in self.endless:
+            return False
+        if name in self.references and self.is_number(name):
             return False
         return name not in self.model.assigned and name not in self.unknowns
 
