@@ -12,20 +12,15 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
-from hsdsl.base.defaults import DEFAULT_TOLERANCE, DEFAULTS
+from hsdsl.base.defaults import COMPLETIONS, DEFAULT_TOLERANCE, DEFAULTS, SCHEMES, SETTINGS
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import closest, did_you_mean
 from hsdsl.base.numbers import decimals
 from hsdsl.base.parts import for_all, numbered
 from hsdsl.engine.integrators import AUTO, METHODS, Method
-from hsdsl.engine.simulate import SCHEMES
 from hsdsl.mathematics.program import Program
 
-KEYS = (
-    "until", "scheme", "method", "step", "tolerance", "relaxation", "scale", "samples", "max_transitions", "completion",
-)  # fmt: skip
-NUMERICAL = ("scheme", "method", "step", "tolerance", "relaxation", "samples")  # how; the others say what is run
-COMPLETIONS = ("contact", "auto", "none")
+KEYS = tuple(SETTINGS)
 ARGUMENTS = (*KEYS, "parameters", "initial", "settings", "engine", "precision")  # of a single run
 OWN_FORMULA = ("paoli-schatzman",)
 SCALE = "scale."  # and a state: its given size

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 from typer import Argument, Context, Option
 
 from hsdsl.analysis.metrics.table import CURVE_METRICS
+from hsdsl.base.defaults import COMPLETIONS, SCHEMES, SETTINGS
 from hsdsl.base.errors import CODES, WARNINGS, ModelError, UsageError
 from hsdsl.base.limits import DEFAULT, NUMBERS, Limits, applied
 from hsdsl.base.names import did_you_mean, without_memory
@@ -157,13 +158,13 @@ def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | 
     return Option(*names, metavar=metavar, help=help, autocompletion=complete)
 
 
-Scheme = Literal["relaxed", "located", "paoli-schatzman"]
-Completion = Literal["contact", "auto", "none"]
 Engine = Literal["auto", "c", "python"]
 Format = Literal["text", "json", "sarif", "github"]
 if TYPE_CHECKING:
-    Method = Metric = str
+    Scheme = Completion = Method = Metric = str
 else:
+    Scheme = StrEnum("Scheme", {name: name for name in SCHEMES})
+    Completion = StrEnum("Completion", {name: name for name in COMPLETIONS})
     Metric = StrEnum("Metric", {name: name for name in CURVE_METRICS})
     Method = StrEnum("Method", {name: name for name in ("auto", *METHODS)})
 
@@ -180,7 +181,14 @@ SET = (
 )
 AS_RUN = "Override a parameter, an initial value or a setting, as `hsdsl run` does. May be repeated."
 PAIR = "Draw one state or output against another, in one of the pictures. May be repeated."
-Until = Annotated[str | None, option("T", "End of the run.")]
+
+
+def setting(name: str) -> Any:
+    """The option of a setting of an experiment."""
+    return option(SETTINGS[name].metavar, SETTINGS[name].about)
+
+
+Until = Annotated[str | None, setting("until")]
 EngineName = Annotated[Engine, option("ENGINE", "auto, c or python.")]
 Phases = Annotated[list[str] | None, option("X,Y", PAIR, "--phase")]
 AllowPath = Annotated[list[Path] | None, option("FOLDER", FOLDER)]
@@ -193,7 +201,6 @@ def overriding(help: str) -> Any:
 
 
 WRT = "Parameters by name and initial states as initial.NAME, with commas between them."
-COMPLETES = "Where transitions accumulate: contact follows guards, auto slides on surfaces of two modes, too; or none."
 
 
 class Experiment(NamedTuple):
@@ -201,17 +208,17 @@ class Experiment(NamedTuple):
 
     overrides: Annotated[list[str] | None, overriding(SET)] = None
     until: Until = None
-    scheme: Annotated[Scheme | None, option("S", "relaxed, located or paoli-schatzman.")] = None
-    method: Annotated[Method | None, option("M", "A method's name, such as dopri5 or taylor, or auto.")] = None
-    step: Annotated[str | None, option("H", "Fixed step size; excludes --tolerance.")] = None
-    tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the states' scales.")] = None
-    relaxation: Annotated[str | None, option("EPS", "The paper's epsilon: depth of the strips, and a time.")] = None
-    completion: Annotated[Completion | None, option("C", COMPLETES)] = None
+    scheme: Annotated[Scheme | None, setting("scheme")] = None
+    method: Annotated[Method | None, setting("method")] = None
+    step: Annotated[str | None, setting("step")] = None
+    tolerance: Annotated[str | None, setting("tolerance")] = None
+    relaxation: Annotated[str | None, setting("relaxation")] = None
+    completion: Annotated[Completion | None, setting("completion")] = None
 
     def settings(self, **more: Any) -> dict[str, Any]:
         """Arguments of `Model.simulate`."""
         given = self._asdict()
-        return values_of(given.pop("overrides")) | with_method(given) | more
+        return values_of(given.pop("overrides")) | as_texts(given) | more
 
 
 class Located(NamedTuple):
@@ -225,7 +232,7 @@ class Located(NamedTuple):
         """Arguments of the model's method; a method or tolerance of ``--set`` counts as one of the call."""
         given, own = values_of(overrides), self._asdict()
         own |= {name: given["settings"].pop(name, None) for name in ("method", "tolerance") if own[name] is None}
-        return given | with_method(own) | more
+        return given | as_texts(own) | more
 
 
 class Answer(NamedTuple):
@@ -272,6 +279,6 @@ def values_of(overrides: list[str] | None) -> dict[str, Any]:
     return dict(zip(("parameters", "initial", "settings"), split(overrides), strict=True))
 
 
-def with_method(settings: dict[str, Any]) -> dict[str, Any]:
-    """Write the method as its name."""
-    return settings | {"method": settings["method"] and str(settings["method"])}
+def as_texts(settings: dict[str, Any]) -> dict[str, Any]:
+    """Settings with each word of a list as plain text."""
+    return {name: value and str(value) for name, value in settings.items()}

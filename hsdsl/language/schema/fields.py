@@ -20,6 +20,7 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
+from hsdsl.base.defaults import COMPLETIONS, SCHEMES
 from hsdsl.base.names import WORDS, did_you_mean, is_identifier, shown
 from hsdsl.language.expression.scope import RESERVED
 from hsdsl.language.source.nodes import ABSENT, Key, Scalar, is_empty
@@ -238,25 +239,23 @@ Whole = Annotated[int, PlainValidator(_whole), WithJsonSchema({"type": "integer"
 Priority = Annotated[int | Scalar, PlainValidator(_priority), WithJsonSchema({"type": ["integer", "string"]})]
 Word = Annotated[Scalar | None, PlainValidator(_identifier), WithJsonSchema({"type": "string"})]
 Version = Annotated[Scalar, PlainValidator(_version), WithJsonSchema({"const": 1})]
-Scheme = Annotated[
-    Scalar | None,
-    PlainValidator(choice("relaxed", "located", "paoli-schatzman")),
-    WithJsonSchema({"type": "string", "enum": ["relaxed", "located", "paoli-schatzman"]}),
-]
-Completion = Annotated[
-    Scalar | None,
-    PlainValidator(choice("contact", "auto", "none")),
-    WithJsonSchema({"type": "string", "enum": ["contact", "auto", "none"]}),
-]
+
+
+def _words(*words: str) -> WithJsonSchema:
+    return WithJsonSchema({"type": "string", "enum": list(words)})
+
+
+Scheme = Annotated[Scalar | None, PlainValidator(choice(*SCHEMES)), _words(*SCHEMES)]
+Completion = Annotated[Scalar | None, PlainValidator(choice(*COMPLETIONS)), _words(*COMPLETIONS)]
 Hold = Annotated[
     Literal["zero", "linear"],
     PlainValidator(lambda value: choice("zero", "linear")(value).value),
-    WithJsonSchema({"type": "string", "enum": ["zero", "linear"]}),
+    _words("zero", "linear"),
 ]
 ValuesOf = Annotated[
     Literal["trigger", "execution"],
     PlainValidator(lambda value: choice("trigger", "execution")(value).value),
-    WithJsonSchema({"type": "string", "enum": ["trigger", "execution"]}),
+    _words("trigger", "execution"),
 ]
 
 Name = Annotated[Key, PlainValidator(_name), WithJsonSchema({"type": "string"})]

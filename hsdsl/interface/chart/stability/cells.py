@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 
 from hsdsl.analysis.exact import reference
+from hsdsl.base.defaults import NUMERICAL
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Array, Execution
 from hsdsl.engine.integrators import METHODS, ButcherTableau
-from hsdsl.engine.preparation.options import NUMERICAL
 from hsdsl.interface.chart.outcome import WITHIN, outcome, spans
 from hsdsl.interface.chart.peers import prepare
 from hsdsl.interface.chart.scene import NotFinite, Refused, Result, Scene, Tool
