@@ -125,7 +125,6 @@ def keep(kind: str, key: str, suffix: str, write: Callable[[Path], None]) -> Pat
 
 
 def entries(kind: str) -> int:
-    """How many entries of a kind there are."""
     with suppress(OSError):
         return sum(path.is_dir() for path in (folder() / kind).iterdir())
     return 0

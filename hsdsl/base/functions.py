@@ -131,7 +131,6 @@ class sinh(sp.sinh):
     is_real = is_finite = True
 
     def fdiff(self, argindex=1):
-        """Cosh."""
         return cosh(self.args[0])
 
     def _eval_is_unknown(self):
@@ -146,7 +145,6 @@ class cosh(sp.cosh):
     is_real = is_finite = is_positive = True
 
     def fdiff(self, argindex=1):
-        """Sinh."""
         return sinh(self.args[0])
 
 
@@ -156,7 +154,6 @@ class tanh(sp.tanh):
     is_real = is_finite = True
 
     def fdiff(self, argindex=1):
-        """1 - tanh**2."""
         return 1 - tanh(self.args[0]) ** 2
 
     def _eval_is_unknown(self):

@@ -25,12 +25,10 @@ class Automaton:
 
     @property
     def modes(self) -> list[tuple[str, Any]]:
-        """Its modes by name."""
         return [(str(name), mode) for name, mode in self.document.modes.items()]
 
     @property
     def parameters(self) -> Pairs:
-        """Its parameters."""
         return [(str(name), _value(entry)) for name, entry in self.document.parameters.items()]
 
     @property

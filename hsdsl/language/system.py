@@ -192,7 +192,6 @@ class Shape:
 
     @property
     def numbers(self) -> int:
-        """How many numbers it has."""
         return 2 * self.points + len(SIZES[self.kind])
 
 
@@ -410,7 +409,6 @@ class HybridSystem:
 
     @property
     def edges(self) -> tuple[Edge, ...]:
-        """The edges of all modes."""
         return tuple(edge for mode in self.modes for edge in mode.edges)
 
     @property

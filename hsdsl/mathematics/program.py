@@ -259,7 +259,6 @@ class ModeProgram:
 
     @cached_property
     def deciding(self) -> tuple[int, ...]:
-        """The states that are not idle."""
         return tuple(i for i in range(len(self.states)) if i not in self.idle)
 
     @property
@@ -378,12 +377,10 @@ class Program:
 
     @cached_property
     def mode_names(self) -> tuple[str, ...]:
-        """The names of the modes."""
         return tuple(mode.name for mode in self.modes)
 
     @cached_property
     def edges(self) -> tuple[EdgeProgram, ...]:
-        """The edges of all modes."""
         return tuple(edge for mode in self.modes for edge in mode.edges)
 
     @property

@@ -233,7 +233,6 @@ class Objective:
         return self._at(x)[2]
 
     def run(self, x: Array) -> Sensitivity:
-        """The run."""
         return self._at(x)[3]
 
     def _at(self, x: Array) -> tuple[bytes, Array, Array, Sensitivity]:

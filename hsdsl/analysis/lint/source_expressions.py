@@ -253,7 +253,6 @@ class _Names:
         }
 
     def used(self, expression: SourceExpression) -> Iterator[Definition]:
-        """The definitions that an expression names."""
         everywhere = expression.role in ("output", "scene") and expression.mode is None  # every mode reads it
         inner = self.own.values() if everywhere else [self.own.get(expression.mode or "", {})]
         for name in expression.names:

@@ -147,7 +147,6 @@ class Subject:
         return found
 
     def mode(self, name: str) -> ModePart:
-        """The mode of a name."""
         return next(part for part in self.modes if part.mode.name == name)
 
     def setting(self, name: str) -> Number:

@@ -55,7 +55,6 @@ class CurveDistance:
 
     @property
     def middle(self) -> float:
-        """Middle of the interval."""
         return self.interval.middle
 
     @property

@@ -292,7 +292,6 @@ def coordinates(space: Space, place: SpacePoint) -> tuple[int, Array]:
 
 
 def answer(space: Space, found: SearchResult, hops: int) -> PointDistance:
-    """The answer to a search for one distance."""
     lower, upper = float(np.max(np.minimum(found.lower, found.cut))), float(np.max(found.upper))
     if lower == upper == np.inf and not found.local:
         return PointDistance(INFINITE, (), "certified: no path of passages connects the two")

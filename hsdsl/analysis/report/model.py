@@ -159,7 +159,6 @@ class Mathematics:
         self.printer = _Printer(alike)
 
     def name(self, name: str) -> str:
-        """A name."""
         return self.printer.doprint(symbol(name))
 
     def equation(self, left: str, text: str) -> str:
@@ -184,7 +183,6 @@ class Mathematics:
         return _formula(f"{self.printer.doprint(left)}{middle}{self.printer.doprint(right)}")
 
     def condition(self, text: str) -> str:
-        """A condition."""
         return self._formula("", text, lambda: plain.condition(text, self.functions))
 
     def _formula(self, left: str, text: str, read: Callable[[], Any]) -> str:

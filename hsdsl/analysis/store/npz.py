@@ -190,7 +190,6 @@ def _fits(value: Any, kind: Any) -> bool:
 
 
 def numbers(value: Any) -> Iterator[Any]:
-    """All multiprecision numbers in a value of mappings and lists."""
     if decimals.is_multiprecision(value):
         yield value
     elif isinstance(value, Mapping):

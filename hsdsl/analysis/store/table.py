@@ -117,7 +117,6 @@ def versions() -> dict[str, str]:
 
 
 def sidecar_of(table: Path) -> Path:
-    """Name the sidecar of a table."""
     return table.with_name(table.name + ".json")
 
 

@@ -107,7 +107,6 @@ class Unit:
 
 
 def unit_of(source: Source, modes: Modes = "local") -> Unit:
-    """The unit of a source."""
     return Unit(drivable(source), modes)
 
 

@@ -47,7 +47,6 @@ def _start(problem: Problem, data: dict[str, str]) -> str:
 
 
 def model_text(source: Source, table: ButcherTableau) -> str:
-    """All of it."""
     program = source.problem.program
     fixed = fixed_parameters(program)
     parts = [

@@ -135,7 +135,6 @@ def _state(system: HybridSystem, math: Mathematics, name: str) -> str:
 
 
 def _texts(mode: Mode, written: ModeDocument) -> list[str]:
-    """What is written in a mode."""
     found = [*mode.flow_texts, *(wall.text for wall in mode.walls)]
     for edge in mode.edges:
         if not edge.of_event:

@@ -39,7 +39,6 @@ class Mathematics:
         self.printer = _Printer({symbol(name): form for name, form in self.names.items()})
 
     def name(self, name: str) -> str:
-        """A name."""
         return self.names[name]
 
     def symbol(self, name: str) -> str:

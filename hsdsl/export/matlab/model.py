@@ -42,7 +42,6 @@ class ModelText:
     handles: dict[str, list[str]] = field(default_factory=dict[str, list[str]])
 
     def text(self) -> str:
-        """All of it."""
         source, problem = self.source, self.source.problem
         program = problem.program
         for number, mode in enumerate(program.modes, start=1):

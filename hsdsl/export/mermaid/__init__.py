@@ -17,7 +17,6 @@ _OUTER = re.compile(r"(?<![^\W_])_|_(?![^\W_])")  # underscores that are not ins
 
 
 def files(source: Source) -> dict[str, bytes]:
-    """One diagram."""
     return {f"{source.name}.mmd": diagram(source).encode()}
 
 

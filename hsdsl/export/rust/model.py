@@ -39,7 +39,6 @@ def _escape(sign: str) -> str:
 
 
 def array(items: Iterable[str]) -> str:
-    """An array."""
     return f"[{', '.join(items)}]"
 
 

@@ -223,7 +223,6 @@ class Tool:
 
     @property
     def label(self) -> str:
-        """Name, scheme and method."""
         return " ".join(filter(None, (self.name, self.scheme, self.method)))
 
 

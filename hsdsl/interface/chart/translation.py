@@ -37,7 +37,6 @@ class PlainEdge:
 
     @property
     def conditional(self) -> bool:
-        """Whether it has an `if`."""
         return self.condition != sp.true
 
 
@@ -63,7 +62,6 @@ class PlainModel:
 
     @property
     def conditional(self) -> bool:
-        """Whether any edge has an `if`."""
         return any(edge.conditional for mode in self.modes for edge in mode.edges)
 
 

@@ -23,12 +23,10 @@ class Visible:
         self.plain = plain
 
     def write(self, text: str) -> int:
-        """Write a text."""
         self.plain.write(visible_lines(text))
         return len(text)
 
     def writelines(self, texts: Iterable[str]) -> None:
-        """Write texts."""
         for text in texts:
             self.write(text)
 

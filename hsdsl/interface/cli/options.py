@@ -196,7 +196,6 @@ Limit = Annotated[list[str] | None, option("NAME=NUMBER", LIMIT)]
 
 
 def overriding(help: str) -> Any:
-    """The option ``--set``."""
     return option("NAME=VALUE", help, "--set", complete=override_names)
 
 

@@ -191,7 +191,6 @@ def _side_by_side(number: str, name: str) -> str | None:
 
 
 def _another_unit_of_time(number: str, name: str) -> str | None:
-    """What a number of one unit of time is in another."""
     size = TABLES["seconds"].get(name.rstrip("s") if len(name) > 3 else name)
     if size is None or not _PLAIN_NUMBER.fullmatch(number):
         return None

@@ -137,11 +137,9 @@ class _ProductMode:
         self._done: dict[Any, Any] = {}
 
     def here(self, expression: Any) -> Any:
-        """What an expression is in this product mode."""
         return None if expression is None else replaced(expression, self._known, self._done)
 
     def mode(self) -> Mode:
-        """The mode."""
         rows = zip(self.whole.states, self.whole.flow, self.whole.flow_texts, strict=True)
         kept = [(name, self.here(flow), text) for name, flow, text in rows if name in self.own]
         walls, edges = list(filter(None, map(self._surface, self.whole.walls))), list[Edge]()

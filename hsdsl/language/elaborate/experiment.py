@@ -194,7 +194,6 @@ class _Checker:
         self.parameters = [name for name, kind in symbols.names.items() if kind == "parameters"]
 
     def reference(self, document: ReferenceDocument) -> Reference:
-        """One reference."""
         return Reference(
             settings=self.settings(document.settings),
             source=self.symbols.text(document.source),

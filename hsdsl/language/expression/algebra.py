@@ -102,7 +102,6 @@ def by_constants(expr: Any, constants: frozenset[Any]) -> Any:
 
 
 def truth_of(condition: Any) -> Any:
-    """The truth of a condition."""
     match condition:
         case sp.And():
             return sp.Mul(*map(truth_of, condition.args))

@@ -205,7 +205,6 @@ class Key(str):
 
     @classmethod
     def at(cls, text: str, place: SourceRange) -> Key:
-        """A key with its place."""
         key = cls(text)
         key.place = place
         return key

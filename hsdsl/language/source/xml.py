@@ -65,7 +65,6 @@ class Element:
         return self.file.fault(code, message, self.line, self.column, hint, len(self.tag) + 1)
 
     def all(self, tag: str) -> list[Element]:
-        """The elements in it with a tag."""
         return [child for child in self.children if child.tag == tag]
 
     def passage_of(self, tag: str) -> Passage | None:

@@ -38,7 +38,6 @@ Row = Sequence[Sized]
 
 @lru_cache(maxsize=16)  # of a large mode once, not for each of its edges
 def symbols(states: tuple[str, ...]) -> tuple[sp.Symbol, ...]:
-    """The symbols of states."""
     return tuple(map(symbol, states))
 
 

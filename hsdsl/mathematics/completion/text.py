@@ -321,7 +321,6 @@ class Insertions:
         self.insert(at, "".join(f"\n{' ' * column}{line}" for line in block.splitlines()))
 
     def insert(self, index: int, text: str) -> None:
-        """Insert at an index of the text."""
         self._insertions.setdefault(index, []).append(text)
 
 

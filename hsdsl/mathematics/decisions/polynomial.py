@@ -102,12 +102,10 @@ class Polynomial:
 
 
 def number(value: Fraction | int) -> Polynomial:
-    """A number as a polynomial."""
     return Polynomial({UNIT: Fraction(value)} if value else {})
 
 
 def alone(atom: Atom) -> Polynomial:
-    """An atom as a polynomial."""
     return Polynomial({((atom, 1),): Fraction(1)})
 
 

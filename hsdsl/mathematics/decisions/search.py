@@ -54,12 +54,10 @@ def at_most_zero(expr: Any) -> Constraint:
 
 
 def negative(expr: Any) -> Constraint:
-    """The expression is negative."""
     return Constraint(expr, "< 0")
 
 
 def positive(expr: Any) -> Constraint:
-    """The expression is positive."""
     return Constraint(-expr, "< 0")
 
 
@@ -262,7 +260,6 @@ def parts_of(expr: Any) -> int:
 
 
 def at_point(expr: Any, point: Mapping[Any, float]) -> float:
-    """One expression at one point."""
     symbols = list(point)
     return float(StraightLine([expr], symbols).at(np.array([[float(point[s]) for s in symbols]]))[0, 0])
 

@@ -128,7 +128,6 @@ def _name(part: Any) -> str:
 
 
 def divisors(expr: Any) -> Iterator[Any]:
-    """What is divided by."""
     for part in parts(expr):
         if part.is_Pow and part.exp.is_Rational and part.exp < 0 and not part.base.is_number:
             yield part.base

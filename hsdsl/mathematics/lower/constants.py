@@ -30,7 +30,6 @@ class Names:
 
 
 def number(system: HybridSystem, switches: tuple[sp.Symbol, ...] = ()) -> Names:
-    """The numbered symbols for the names of a system."""
     parameters = tuple(symbol(f"p{i}") for i in range(len(system.parameters)))
     shared: dict[sp.Symbol, sp.Expr] = dict(zip(system.parameter_symbols, parameters, strict=True))
     data, starts = list(parameters), list[sp.Symbol]()

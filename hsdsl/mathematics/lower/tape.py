@@ -248,7 +248,6 @@ class _Writer:
         return z
 
     def reciprocal(self, u: int) -> int:
-        """1/u."""
         return self._operation("under", u, constant=_ONE)
 
     def algebraic(self, name: str, u: int, sign: int, offset: int, root: bool, scale: int = 1) -> int:

@@ -37,7 +37,6 @@ MOST_PAIRS = 100  # that are followed: each takes a hundred times as long as to 
 
 
 def guard_never_crossed(subject: Subject) -> Iterator[Finding]:
-    """Find guards that no flow crosses."""
     for _, edge in subject.edges:
         found = uncrossed(subject.dynamics, edge.edge)
         if found is None or entered_beyond(subject.dynamics, edge.edge):

@@ -108,7 +108,6 @@ def _truth(relation: Any) -> bool | None:
 
 
 def empty_section(subject: Subject) -> Iterator[Finding]:
-    """Find empty sections."""
     yield from _empty(subject.root, _SECTIONS)
     for part in subject.modes:
         yield from _empty(subject.node("modes", str(part.key)), _SECTIONS_OF_A_MODE)
@@ -124,7 +123,6 @@ def _empty(mapping: Node | None, keys: tuple[str, ...]) -> Iterator[Finding]:
 
 
 def after_the_end(subject: Subject) -> Iterator[Finding]:
-    """Find transitions and walls of final modes."""
     for part in subject.modes:
         if part.mode.final:
             things = [(item.document.when, "transition never fires") for item in part.edges]

@@ -49,7 +49,6 @@ class Config:
 
     @property
     def least(self):
-        """The least one."""
         return max(self.tolerance or 0.0, 2.0**-26.5) * self.largest
 
 

@@ -203,7 +203,6 @@ class Axis:
 
     @property
     def label(self) -> str:
-        """Its name with its unit."""
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def onto(self, arguments: Mapping[str, Any], value: float) -> dict[str, Any]:

@@ -35,7 +35,6 @@ class Memory:
 
 
 def new_values(edge: Edge, timed: bool) -> dict[Any, Any]:
-    """The new value of each symbol that an edge changes."""
     return edge.changes if edge.stays or not timed else edge.changes | {symbol(SINCE): ZERO}
 
 

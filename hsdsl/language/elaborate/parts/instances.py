@@ -56,7 +56,6 @@ class Instance:
 
     @cached_property
     def modes(self) -> list[tuple[str, PartModeDocument]]:
-        """Its modes by name."""
         return [(str(name), mode) for name, mode in self.kind.modes.items()]
 
     def full(self, name: str) -> str:
