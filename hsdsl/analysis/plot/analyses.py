@@ -18,6 +18,7 @@ from hsdsl.analysis.plot.style import (
     INK,
     PALETTE,
     curve,
+    empty,
     label,
     legend_below,
     time_label,
@@ -50,9 +51,7 @@ def plot_over_time(times: Array, bounds: dict[str, tuple[Array, Array]], title: 
 
     ``times`` do not decrease; two equal ones mark a jump.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    figure = empty(9.0, 3.6)
     axis = figure.add_subplot()
     finite = [v[np.isfinite(v)] for pair in bounds.values() for v in pair]
     top = max((float(v.max()) for v in finite if len(v)), default=1.0) or 1.0
@@ -74,9 +73,7 @@ def measured(
     run: Execution, times: Array, columns: Mapping[str, Array], units: Mapping[str, str], values: str = ""
 ) -> Figure:
     """Draw measurements and the run fitted to them, a panel for each column; ``values`` are what was fitted."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9, 1.3 + 2.4 * len(columns)), layout="constrained")
+    figure = empty(9, 1.3 + 2.4 * len(columns))
     axes = figure.subplots(len(columns), 1, squeeze=False, sharex=True)[:, 0]
     drawn = curves(run)
     for axis, (name, column) in zip(axes, columns.items(), strict=True):
@@ -102,9 +99,7 @@ def plot_nearby(points: Sequence[tuple[float, float, tuple[str, ...]]], title: s
     A run that ends elsewhere has no finite distance.
     """
     sequences = list(dict.fromkeys(made for *_, made in points))
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7, 5), layout="constrained")
+    figure = empty(7, 5)
     axis = figure.subplots()
     for k, sequence in enumerate(sequences):
         mine = [(r, d) for r, d, made in points if made == sequence and 0 < d < np.inf]
@@ -145,9 +140,7 @@ def plot_branch(
 
     Stable orbits are solid, others dashed. A point that ends a stable or unstable piece has None.
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8, 5), layout="constrained")
+    figure = empty(8, 5)
     axis = figure.subplots()
     pieces = [(a, b) for a, b in pairwise(points)]
     for stable, part in groupby(pieces, key=lambda piece: _stable(piece[0][2], piece[1][2])):
@@ -177,9 +170,7 @@ def plot_orbit(
     run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str, units: Mapping[str, str]
 ) -> Figure:
     """Draw a run over one period; jumps are dotted."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(10, 4.6), layout="constrained")
+    figure = empty(10, 4.6)
     left, right = figure.subplots(1, 2)
     _draw_run(left, run, states, period)
     across, up = (states[0], states[1]) if len(states) > 1 else ("t", states[0])
@@ -329,9 +320,7 @@ def plot_map(x: Axis, y: Axis, of: Quantity, title: str) -> Figure:
 
 
 def _empty() -> tuple[Figure, Axes]:
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(8, 5), layout="constrained")
+    figure = empty(8, 5)
     return figure, figure.subplots()
 
 
@@ -399,11 +388,9 @@ def plot_path(space: Space, pieces: Sequence[PathPiece], title: str) -> Figure:
     written.
     """
     modes = _visited(space, pieces)
-    from matplotlib.figure import Figure
-
     columns = min(3, len(modes))
     rows = -(-len(modes) // columns)
-    figure = Figure(figsize=(1.5 + 4.2 * columns, 0.6 + 3.8 * rows), layout="constrained")
+    figure = empty(1.5 + 4.2 * columns, 0.6 + 3.8 * rows)
     axes = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
     for axis, mode in zip(axes, modes, strict=False):
         _panel(axis, space, mode, pieces)

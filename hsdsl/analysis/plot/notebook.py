@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.analysis.plot.curves import View
-from hsdsl.analysis.plot.style import ALARM, INK, styled, write_figure
+from hsdsl.analysis.plot.style import ALARM, INK, empty, styled, write_figure
 from hsdsl.analysis.report import words
 from hsdsl.analysis.report.summary import html
 from hsdsl.base.errors import WARNINGS
@@ -83,13 +83,11 @@ def _range(values: Any) -> str:
 
 def _curves(ensemble: Ensemble) -> Figure:
     """Final states over the one name that varies; runs that failed are crosses."""
-    from matplotlib.figure import Figure
-
     ((name, values),) = ensemble.varied.items()
     x, failed = np.asarray(values, dtype=float).ravel(), ensemble.failed.ravel()
     states = {name: ensemble.state[name] for name in without_memory(ensemble.state)[:PANELS]}
     states = states or {"transitions": ensemble.transitions}
-    figure = Figure(figsize=(8, 1.9 * len(states) + 0.6), layout="constrained")
+    figure = empty(8, 1.9 * len(states) + 0.6)
     axes = figure.subplots(len(states), 1, squeeze=False, sharex=True)[:, 0]
     for axis, (state, ends) in zip(axes, states.items(), strict=True):
         y = ends.ravel().astype(float)
@@ -106,11 +104,9 @@ def _curves(ensemble: Ensemble) -> Figure:
 
 def _map(ensemble: Ensemble) -> Figure:
     """The number of transitions over the two names that vary; runs that failed are crosses."""
-    from matplotlib.figure import Figure
-
     (x, y) = (np.broadcast_to(values, ensemble.shape).ravel() for values in ensemble.varied.values())
     failed = ensemble.failed.ravel()
-    figure = Figure(figsize=(7, 4.6), layout="constrained")
+    figure = empty(7, 4.6)
     axis = figure.subplots()
     size = float(np.clip(2e4 / len(x), 1.0, 60.0))
     shades: dict[str, Any] = {

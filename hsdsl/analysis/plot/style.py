@@ -125,6 +125,13 @@ def legend_below(figure: FigureBase, handles: Sequence[Any], width: float) -> in
     return -(-len(handles) // columns)
 
 
+def empty(width: float, height: float) -> Figure:
+    """A figure of so many inches."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
 @contextmanager
 def styled() -> Generator[None]:
     """Draw with our settings in the block, and no other thread meanwhile."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.plot.style import FAINT, PALETTE, to_file
+from hsdsl.analysis.plot.style import FAINT, PALETTE, empty, to_file
 from hsdsl.interface.chart.rows import Row
 
 if TYPE_CHECKING:
@@ -41,9 +41,7 @@ def plot_work_precision(charted: Sequence[tuple[str, Sequence[Row]]]) -> Figure:
     columns = [_panels(name, rows) for name, rows in charted]
     looks = _looks([row for _, rows in charted for row in rows])
     places, down, across = _places(columns)
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(4.6 * across + 2.4, 3.7 * down + 0.3), layout="constrained")
+    figure = empty(4.6 * across + 2.4, 3.7 * down + 0.3)
     axes = figure.subplots(down, across, squeeze=False)
     for place, axis in np.ndenumerate(axes):
         if place in places:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
+import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.progress import Show, Text, running
 from hsdsl.interface.cli.console import progress, say, write_table
@@ -109,7 +110,6 @@ def _charted(
 
 def _scene(text: str, sampling: dict[str, Any], show: Show | None) -> Any:
     from hsdsl.interface.chart import Scene
-    from hsdsl.interface.model import load
 
     path, colon, block = text.rpartition(":")
     if not (colon and block.isdecimal()):
@@ -119,7 +119,7 @@ def _scene(text: str, sampling: dict[str, Any], show: Show | None) -> Any:
         if show:
             show(lambda: f"{text}: exact execution in many digits {far()}")
 
-    return Scene.of(load(path), block=int(block), **sampling, watch=partial(running, named))
+    return Scene.of(hsdsl.load(path), block=int(block), **sampling, watch=partial(running, named))
 
 
 def _report(charted: list[tuple[str, list[Row]]], out: Path | None, plot: Path | None, answer: Answer) -> None:
@@ -175,7 +175,6 @@ def stability(
     with answer.reporting():
         from hsdsl.interface.chart import PEERS
         from hsdsl.interface.chart.stability import stability_map
-        from hsdsl.interface.model import load
 
         check_target(out, "--out", (".csv",))
         check_target(plot, "--plot")
@@ -196,7 +195,7 @@ def stability(
 
             given: dict[str, Any] = {"with_rho": rho, "processes": processes, "patience": patience, "watch": watch}
             given |= {} if map is None else {"map": map}
-            found = stability_map(load(model), **options, **given)
+            found = stability_map(hsdsl.load(model), **options, **given)
         _report_map(found, out, plot, answer)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Exit, Option
 
+import hsdsl
 from hsdsl import __version__
 from hsdsl.base.errors import Diagnostic, ModelError, UsageError
 from hsdsl.base.names import counted, did_you_mean, visible
@@ -38,9 +39,7 @@ def validate(models: Models, *, format: Formatted = "text", answer: Answer) -> N
 
 
 def _size(path: Path) -> tuple[dict[str, Any], str]:
-    from hsdsl.interface.model import load
-
-    model = load(path)
+    model = hsdsl.load(path)
     model.resolve()
     modes, parts = written_modes(model.system.modes), len(model.system.parts)
     edges = sum(len(written_edges(mode.edges)) for mode in modes)

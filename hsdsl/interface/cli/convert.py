@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
+import hsdsl
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import counted
 from hsdsl.export import TARGETS, Modes, check_folder, check_scheme, files_of, source_of, write
@@ -49,13 +50,11 @@ def export(
 ) -> None:
     """Export a model with its settings: code for other tools, or a document."""
     with answer.reporting():
-        from hsdsl.interface.model import load
-
         check_known(to)
         if out is not None:
             check_folder(out, force)
         settings = experiment.settings()
-        loaded = load(model)
+        loaded = hsdsl.load(model)
         check_scheme(loaded, to, settings)
         source = source_of(loaded if outputs is None else loaded.only(names_of(outputs)), settings)
         files = files_of(source, to, mode)
@@ -162,12 +161,11 @@ def complete(
     """
     with answer.reporting():
         from hsdsl.base.atomic import replacing
-        from hsdsl.interface.model import load
 
         check_target(out, "--out", (".yaml", ".yml"))
         if out is not None and out.exists() and model.exists() and out.samefile(model):
             raise UsageError(f"--out {out}: this is the model itself", "choose another name")
-        text = load(model).completed()
+        text = hsdsl.load(model).completed()
         if text is None:
             raise UsageError(NOTHING)
         if out is not None:

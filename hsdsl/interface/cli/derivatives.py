@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Argument, Exit, Option
 
+import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.decimals import number_of
 from hsdsl.base.progress import counted_runs
@@ -43,10 +44,9 @@ def sensitivity(
         if plot is not None and not stability:
             raise UsageError("--plot draws the distances of runs from nearby", "add --stability")
         from hsdsl.analysis.sensitivity.result import ALWAYS, as_json, summary
-        from hsdsl.interface.model import load
 
         call = located.settings(overrides, until=until, precision=precision)
-        loaded = load(model)
+        loaded = hsdsl.load(model)
         found = loaded.sensitivity(wrt, **call)
         parts = (part,) if part else ALWAYS
         nearby = _nearby(loaded, wrt, call, answer.hidden) if stability else None
@@ -91,10 +91,8 @@ def orbit(
     """Find a periodic orbit near the model's run, with its Floquet multipliers."""
     with answer.reporting():
         check_target(plot, "--plot")
-        from hsdsl.interface.model import load
-
         call = located.settings(overrides, until=until, laps=laps, period=period)
-        loaded = load(model)
+        loaded = hsdsl.load(model)
         with progress(answer.hidden) as show:
             if follow is None:
                 found = loaded.orbit(section, progress=counted_runs(show), **call)
@@ -137,12 +135,10 @@ def fit(
     """Fit parameters and initial states to measurements."""
     with answer.reporting():
         check_target(plot, "--plot")
-        from hsdsl.interface.model import load
-
         with progress(answer.hidden) as show:
             watch = show and partial(_show_fit, show)
             columns = {"sigma": _by_column("--sigma", sigma), "weights": _by_column("--weight", weight)}
-            found = load(model).fit(data, wrt, progress=watch, **columns, **located.settings(overrides))
+            found = hsdsl.load(model).fit(data, wrt, progress=watch, **columns, **located.settings(overrides))
         draw(found, plot)
         answer.give(found.as_json, lambda: found.summary)
     if not found.success:

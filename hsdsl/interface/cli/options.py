@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from typer import Argument, Context, Option
 
+import hsdsl
 from hsdsl.analysis.metrics.table import CURVE_METRICS
 from hsdsl.base.defaults import COMPLETIONS, SCHEMES, SETTINGS
 from hsdsl.base.errors import CODES, WARNINGS, ModelError, UsageError
@@ -49,9 +50,8 @@ def override_names(ctx: Context, incomplete: str) -> list[str]:
 
 def _names(path: Path) -> Iterator[str]:
     from hsdsl.engine.preparation.options import KEYS
-    from hsdsl.interface.model import load
 
-    program = load(path).program
+    program = hsdsl.load(path).program
     states = without_memory(program.modes[program.initial_mode].states)
     yield from program.parameters
     yield from ("initial.mode", *(f"initial.{state}" for state in states))

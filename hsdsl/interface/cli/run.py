@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Exit, Option
 
+import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
 from hsdsl.base.names import visible
@@ -71,9 +72,7 @@ def run(
     """Simulate a model and summarise what happened."""
     with answer.reporting():
         _check_files(out, plot, animate, outputs)
-        from hsdsl.interface.model import load
-
-        loaded = load(model)
+        loaded = hsdsl.load(model)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
         shown = {"columns": names, "phases": pairs_of(phase, loaded.columns)}

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
+import hsdsl
 from hsdsl.analysis.metrics.table import CURVE_METRICS, POINT_METRICS
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.interface.cli.console import Text, print_json, progress, say
@@ -59,7 +60,7 @@ def plot(
         check_target(out, "--out", (*PICTURES, ".html"))
         if labels and len(labels) != len(runs):
             raise UsageError(f"--label: expected {len(runs)}, one for each run, got {len(labels)}")
-        loaded = None if model is None else _loaded(model)
+        loaded = None if model is None else hsdsl.load(model)
         columns = None if outputs is None else names_of(outputs)
         used = None if columns is None else [*columns, *(name for pair in phase or () for name in names_of(pair))]
         executions = [drawn(path, loaded, used) for path in runs]
@@ -81,12 +82,6 @@ def plot(
             print_json({"files": [str(out)], "runs": options["labels"]})
         elif not answer.quiet:
             say(f"wrote {out}")
-
-
-def _loaded(path: Path) -> Any:
-    from hsdsl.interface.model import load
-
-    return load(path)
 
 
 def _look(model: Any, runs: list[Any]) -> dict[str, Any]:
@@ -153,9 +148,7 @@ def distance(
 
 
 def _example(path: Path) -> str:
-    from hsdsl.interface.model import load
-
-    program = load(path).program
+    program = hsdsl.load(path).program
     mode = program.modes[program.initial_mode]
     two = (f'"{mode.name} {" ".join(f"{state}={number}" for state in mode.states)}"' for number in (0, 1))
     return "for example: hsdsl distance {} --from {} --to {}".format(path, *two)
@@ -164,10 +157,8 @@ def _example(path: Path) -> str:
 def _between_points(
     path: Path, points: tuple[str, str], metric: str | None, plot: Path | None, json: bool, options: dict[str, Any]
 ) -> None:
-    from hsdsl.interface.model import load
-
     name = metric or ("quotient" if options["relaxation"] is None else "relaxed")
-    result = load(path).distance(*points, metric=name, plot=plot, **options)
+    result = hsdsl.load(path).distance(*points, metric=name, plot=plot, **options)
     if plot is not None:
         say(f"wrote {plot}")
     if not json:
@@ -231,9 +222,7 @@ def run_of(path: Path, parameters: dict[str, Any]) -> tuple[Execution, Model | P
         return run, neighbour if not Path(run.model).exists() and neighbour.exists() else None
     if path.suffix.lower() in (".csv", ".parquet"):
         raise UsageError(f"{path} is a table: expected a run", "save runs with --out RUN.npz, which loses nothing")
-    from hsdsl.interface.model import load as load_model
-
-    model = load_model(path)  # read once: it may come through a pipe
+    model = hsdsl.load(path)  # read once: it may come through a pipe
     return model.simulate(parameters=parameters), model
 
 
@@ -255,6 +244,4 @@ def drawn(path: Path, model: Model | None, columns: list[str] | None) -> Executi
 
 
 def _recorded(path: str, other: Model | Path | None) -> Model:
-    from hsdsl.interface.model import load
-
-    return load(other if isinstance(other, Path) else path)
+    return hsdsl.load(other if isinstance(other, Path) else path)

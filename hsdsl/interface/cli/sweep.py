@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from typer import Argument, Exit
 
+import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
 from hsdsl.interface.cli.console import progress, say
@@ -79,8 +80,6 @@ def _check(model: Path | None, vary: list[str] | None, out: Path | None, show: P
 
 
 def _run(model: Path, vary: list[str], out: Path, settings: dict[str, Any], quiet: bool) -> Any:
-    from hsdsl.interface.model import load
-
     pace = Pace()
     with progress(quiet) as shown:
 
@@ -90,7 +89,7 @@ def _run(model: Path, vary: list[str], out: Path, settings: dict[str, Any], quie
                 shown(pace.text)
 
         try:
-            return load(model).sweep(vary, out, progress=watch, **settings)
+            return hsdsl.load(model).sweep(vary, out, progress=watch, **settings)
         except KeyboardInterrupt:
             rows = f"{pace.done:,} of {pace.rows:,} rows are in {out}" if pace.rows else "nothing was run"
     say(f"interrupted: {rows}; the same command goes on")
