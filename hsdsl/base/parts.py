@@ -11,7 +11,7 @@ import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from hsdsl.base.names import did_you_mean
 
@@ -105,8 +105,7 @@ def meant_alone(name: str, known: Iterable[str]) -> str | None:
     return meant(name, names) if "[" in name else did_you_mean(name, names)
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(NamedTuple):
     """Where parts are among the states of their system, as numbers and letters for other languages.
 
     Attributes

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -19,8 +19,7 @@ BUSY = 10  # times the limit by the clock, on a machine that others use too
 HANGS, CRASHES = "hangs", "crashes"
 
 
-@dataclass(frozen=True)
-class Lost:
+class Lost(NamedTuple):
     """No answer: the process took longer than its limit (``hangs``) or died (``crashes``)."""
 
     word: str

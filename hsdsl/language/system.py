@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import sympy as sp
 
@@ -272,8 +272,7 @@ class Mode:
         )
 
 
-@dataclass(frozen=True)
-class Definition:
+class Definition(NamedTuple):
     """A name that was substituted: an input that is an expression, or a `let`, of one mode where ``mode`` is given."""
 
     name: str
@@ -281,8 +280,7 @@ class Definition:
     mode: str | None = None
 
 
-@dataclass(frozen=True)
-class FunctionText:
+class FunctionText(NamedTuple):
     """A function of the file as it was written; its calls are written out everywhere."""
 
     name: str
@@ -354,8 +352,7 @@ class KnownTransition:
     after: dict[str, str] = field(default_factory=dict[str, str])
 
 
-@dataclass(frozen=True)
-class KnownState:
+class KnownState(NamedTuple):
     """States and outputs known exactly at a time; numbers are texts of expressions of parameters."""
 
     time: str

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -29,8 +28,7 @@ from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, SampledInput, 
 from hsdsl.mathematics.decisions.dynamics import Dynamics
 
 
-@dataclass(frozen=True)
-class EdgePart:
+class EdgePart(NamedTuple):
     """A transition as mathematics and as written, its position in its mode, and its path in the file."""
 
     edge: Edge

@@ -84,7 +84,7 @@ class Unit:
         """In the units of the file, as ``mV/ms``, or in base units, as ``1000 kg*m/s**2``."""
         if 0 < len(self.names) <= _MOST_NAMES:
             return _quotient(self.names)
-        parts = [(_BASE.get(name, name.strip("[]")), power) for name, power in sorted(self.powers, key=_order)]
+        parts = [(BASE.get(name, name.strip("[]")), power) for name, power in sorted(self.powers, key=_order)]
         whole, size = _quotient(parts), f"{self.factor:.6g}"
         if abs(self.factor - 1) <= 1e-9:
             return whole
@@ -118,8 +118,8 @@ def _order(item: tuple[str, Fraction]) -> tuple[bool, str]:
 ONE = Unit()
 _ELSEWHERE = {ord(sign): f"**{digit}" for digit, sign in zip("123456789", "¹²³⁴⁵⁶⁷⁸⁹", strict=True)}
 _ELSEWHERE |= str.maketrans({"⁻": "**-", "^": "**", "·": "*", "⋅": "*", "µ": "u"})
-_BASE = {"[length]": "m", "[mass]": "kg", "[time]": "s", "[current]": "A"}
-_BASE |= {"[temperature]": "K", "[substance]": "mol", "[luminosity]": "cd"}
+BASE = {"[length]": "m", "[mass]": "kg", "[time]": "s", "[current]": "A"}
+BASE |= {"[temperature]": "K", "[substance]": "mol", "[luminosity]": "cd"}
 
 
 def _plain(power: Fraction) -> str:

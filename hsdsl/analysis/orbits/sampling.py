@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ from hsdsl.engine.execution import Array
 FALLS, STAYS = 0.4, 0.1  # exponents of the radius: from the one on distances fall, up to the other they stay
 
 
-@dataclass(frozen=True)
-class Nearby:
+class Nearby(NamedTuple):
     """A nearby run: the shift of each name at a radius, its distance as an interval, and its transitions."""
 
     radius: float

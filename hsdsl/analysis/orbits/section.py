@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -218,8 +219,7 @@ EPSILON = float(np.finfo(float).eps)
 COARSER = 1e-10  # a tolerance for runs that show how good others are, which keep 1e-13 where none is given
 
 
-@dataclass(frozen=True)
-class Closed:
+class Closed(NamedTuple):
     """A fixed point: where, at which phase, the last passage, and how far from closing it is relative to the sizes.
 
     It closes but for shifts along its ``symmetry``. ``sizes`` are the scales of the states.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,8 +25,7 @@ SEVERAL = "several modes"
 ROUND_OFF = 1e-12  # of the size of a state
 
 
-@dataclass(frozen=True)
-class GuardLine:
+class GuardLine(NamedTuple):
     """A guard that is a level of one state: in ``mode`` something fires where ``state`` reaches ``value``.
 
     A guard that moves has its values at times in ``moving``, and not-a-number for ``value``.

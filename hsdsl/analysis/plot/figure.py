@@ -5,9 +5,8 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil, sqrt
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -64,8 +63,7 @@ SMALLEST, LARGEST = 3.6, 5.2  # of a phase plot
 LONGEST = 40  # letters of a name in the legend
 
 
-@dataclass(frozen=True)
-class Plan:
+class Plan(NamedTuple):
     """The rows and columns of panels and of phase plots, and the inches that they take."""
 
     across: int

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible
@@ -58,8 +58,7 @@ def _included(names: Iterable[str], including: Mapping[str, str]) -> dict[str, s
     return found
 
 
-@dataclass(frozen=True)
-class Sizes:
+class Sizes(NamedTuple):
     """What a program takes, in bytes; tests hold it against what a compiler and a run report."""
 
     code: int

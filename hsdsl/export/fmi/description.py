@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 from hsdsl import __version__
 from hsdsl.analysis.lint import units
-from hsdsl.analysis.lint.units import UnknownUnit, read
+from hsdsl.analysis.lint.units import BASE, UnknownUnit, read
 from hsdsl.base.names import visible
 from hsdsl.export.fmi.archive import token_of
 from hsdsl.export.fmi.variables import Unit, Variable, dependencies, initial_dependencies
@@ -116,15 +116,6 @@ def structure(
 
 
 Element = ElementTree.Element
-_BASE = {
-    "[mass]": "kg",
-    "[length]": "m",
-    "[time]": "s",
-    "[current]": "A",
-    "[temperature]": "K",
-    "[substance]": "mol",
-    "[luminosity]": "cd",
-}
 
 
 def element(parent: Element | None, tag: str, **attributes: str | float | bool | None) -> Element:
@@ -162,9 +153,9 @@ def define_units(root: Element, names: Iterable[str | None]) -> None:
 
 def _define(unit: Element, meaning: units.Unit) -> None:
     powers = dict(meaning.powers)
-    if powers.keys() - _BASE.keys() or any(power.denominator != 1 for power in powers.values()):
+    if powers.keys() - BASE.keys() or any(power.denominator != 1 for power in powers.values()):
         return
-    base = {_BASE[name]: str(power) for name, power in powers.items()}
+    base = {BASE[name]: str(power) for name, power in powers.items()}
     factor = None if meaning.factor == 1 else meaning.factor
     element(unit, "BaseUnit", **base, factor=factor)
 

@@ -69,11 +69,22 @@ def files(source: Source) -> dict[str, bytes]:
     parts = {path.relative_to(CRATE).as_posix(): path.read_text(encoding="utf-8") for path in CRATE.rglob("*.*")}
     c = {f"c/{path}": content.decode() for path, content in c_sources(source, True, "given.h").items()}
     own = f"{name}_{_digest(c)}"
-    names = {"prefix": own, "exact": ",\n    ".join(f'"{flag}"' for flag in EXACT_FLAGS)}
-    texts = {path: filled(text, **names) for path, text in parts.items() if path.endswith((".rs", ".c"))} | c
+    fixed = ", ".join(name for name in source.problem.program.parameters if name in structural(source.problem))
+    settings = source.problem.settings
+    assert settings.method is not None
+    names = {
+        "prefix": own,
+        "exact": ",\n    ".join(f'"{flag}"' for flag in EXACT_FLAGS),
+        "name": name,
+        "comment": _comment("#", source),
+        "heading": "".join(f"    {line}\n" for line in source.heading),
+        "scheme": settings.scheme,
+        "method": settings.method.name,
+        "size": source.size,
+        "kept": f"\nFixed, since times of inputs depend on them:\n\n    {fixed}\n" if fixed else "",
+    }
+    texts = {path: filled(text, **names) for path, text in parts.items()} | c
     texts["c/prefix.h"] = _prefixes(texts, own)
-    texts["Cargo.toml"] = _manifest(source, name)
-    texts["README.md"] = _readme(source)
     texts["src/model.rs"] = model_text(source)
     texts["tests/expected/mod.rs"] = expected_text(source)
     return {name: texts[name].encode() for name in sorted(texts)}
@@ -102,34 +113,3 @@ def _functions(before: str, texts: Iterable[str], family: str = "hs") -> set[str
 
 def _comment(mark: str, source: Source) -> str:
     return "".join(f"{mark} {line}\n" for line in source.heading)
-
-
-def _manifest(source: Source, name: str) -> str:
-    return (
-        f'{_comment("#", source)}\n[package]\nname = "{name}"\nversion = "0.1.0"\nedition = "2018"\n'
-        'rust-version = "1.56"\npublish = false\n\n[lib]\nname = "hybrid"\n\n'
-        '[features]\ndefault = ["std"]\nstd = []\n\n[workspace]\n'
-    )
-
-
-def _readme(source: Source) -> str:
-    settings = source.problem.settings
-    assert settings.method is not None
-    heading = "".join(f"    {line}\n" for line in source.heading)
-    decide = structural(source.problem)
-    fixed = ", ".join(name for name in source.problem.program.parameters if name in decide)
-    kept = f"\nFixed, since times of inputs depend on them:\n\n    {fixed}\n" if fixed else ""
-    return (
-        f"A hybrid system in Rust\n=======================\n\n{heading}\n"
-        f"It runs the scheme {settings.scheme} with {settings.method.name}, {source.size}.\n\n"
-        "    cargo test                        compare with the transitions of hsdsl\n"
-        "    cargo run --example transitions   print the run as JSON\n\n"
-        "`hybrid::simulate` runs from parameters, settings, a mode and a state; a `Sink` takes rows and transitions.\n"
-        "The loop is that of hsdsl, in C, below `c`. `build.rs` needs a compiler with the options of gcc, which `CC`\n"
-        "names (else `cc`), and `ar` (or what `AR` names); for another target `CC_x86_64_unknown_linux_gnu` and the\n"
-        "like come first. There are no other dependencies.\n\n"
-        "The crate is `no_std`, and memory is given by the caller. The feature `std`, on by default, allocates where\n"
-        "a chain of transitions enters more than 64 modes at an instant. Without it such a run ends with\n"
-        "`Interrupted`.\n"
-        f"{kept}"
-    )

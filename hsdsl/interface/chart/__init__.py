@@ -18,7 +18,6 @@ warm and in turns, and compares each result with the model's exact execution.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from math import nan
 
 from hsdsl.interface.chart.outcome import Judgement, judge, rho
@@ -84,7 +83,7 @@ def work_precision(
         if with_rho and result.execution is not None:
             watch(f"rho of {attempt.tool.label} {attempt.setting}")
             with Deadline(patience):  # the search itself looks at the time between its parts only
-                judgement = replace(judgement, rho=rho(scene, result.execution, patience / 2))
+                judgement = judgement._replace(rho=rho(scene, result.execution, patience / 2))
         return judgement
 
     done = race(attempts, judged, rounds, patience, watch)

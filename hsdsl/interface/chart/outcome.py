@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, nan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +17,7 @@ FINER = 8  # points of the exact curve from sample to sample
 SAME_END = 1e-9  # of the run: ends nearer than this are one
 
 
-@dataclass(frozen=True)
-class Tolerance:
+class Tolerance(NamedTuple):
     """How near a right result comes: ``state``, a share of each state's span, and ``time``, a share of the run.
 
     A sample is right where the exact execution has its values at some time that near.
@@ -145,8 +145,7 @@ def _difference(
 OUT_OF_SCALE = 0.1  # of the span of the states: a larger error is a wrong result
 
 
-@dataclass(frozen=True)
-class Judgement:
+class Judgement(NamedTuple):
     """``verdict`` is ``right``, ``wrong`` (another execution) or ``failed`` (no end); ``why`` is the reason.
 
     ``error`` is the largest difference of any state over the samples clear of jumps at which both have it, NaN where

@@ -5,9 +5,8 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 from hsdsl.analysis.report.words import aligned
 from hsdsl.interface.chart.outcome import Judgement
@@ -20,8 +19,7 @@ COLUMNS: tuple[str, ...] = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Row:
+class Row(NamedTuple):
     """One run of one tool: its settings, its times and its errors."""
 
     model: str

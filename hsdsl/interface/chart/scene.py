@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -213,8 +213,7 @@ class Result:
         return self.count()
 
 
-@dataclass(frozen=True)
-class Tool:
+class Tool(NamedTuple):
     """A tool by its name; ours have a scheme and a method."""
 
     name: str
@@ -226,8 +225,7 @@ class Tool:
         return " ".join(filter(None, (self.name, self.scheme, self.method)))
 
 
-@dataclass(frozen=True)
-class Attempt:
+class Attempt(NamedTuple):
     """One tool at one setting; ``run`` runs it from the start and samples it."""
 
     tool: Tool

@@ -10,12 +10,11 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from math import nan
 from statistics import median
 from threading import Event, Lock, Thread, main_thread
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from hsdsl.interface.chart.scene import Attempt, Result
 
@@ -23,8 +22,7 @@ Judged = TypeVar("Judged")
 ENOUGH = 0.02  # seconds of an attempt in one turn: a shorter one is repeated
 
 
-@dataclass(frozen=True)
-class Timed:
+class Timed(NamedTuple):
     """Seconds of single runs: one number a turn (the mean of its repeats), and of the first, cold one."""
 
     turns: tuple[float, ...]

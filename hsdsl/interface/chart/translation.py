@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -22,8 +21,7 @@ from hsdsl.language.system import TIME, Edge, Mode
 from hsdsl.mathematics.lower.printer import KernelPrinter
 
 
-@dataclass(frozen=True)
-class PlainEdge:
+class PlainEdge(NamedTuple):
     """An edge: it fires when ``guard`` rises through zero and ``condition`` holds there.
 
     ``condition`` is `sympy.true` where there is none; ``reset`` gives the target's states.
@@ -40,8 +38,7 @@ class PlainEdge:
         return self.condition != sp.true
 
 
-@dataclass(frozen=True)
-class PlainMode:
+class PlainMode(NamedTuple):
     """A mode over the symbols ``x0, x1, ...`` and ``t``, numbers instead of parameters."""
 
     name: str
@@ -52,8 +49,7 @@ class PlainMode:
     final: bool
 
 
-@dataclass(frozen=True)
-class PlainModel:
+class PlainModel(NamedTuple):
     """A scene's model for another tool: no sampled inputs; walls are left out, for no tool knows them."""
 
     modes: tuple[PlainMode, ...]

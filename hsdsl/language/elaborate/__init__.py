@@ -18,8 +18,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from hsdsl.base import limits
 from hsdsl.base.errors import TOO_LONG, Diagnostic, Findings, ModelError, UsageError
@@ -53,8 +53,7 @@ from hsdsl.language.system import HybridSystem, switch_parameter
 __all__ = ["Elaboration", "drivable", "elaborate", "elaborate_files", "parameter_expression"]
 
 
-@dataclass(frozen=True)
-class Elaboration:
+class Elaboration(NamedTuple):
     """A hybrid system and the document it was made from, where every part of it has its place.
 
     The parts correspond by their order: ``system.modes[i].edges[k]`` is the k-th of the transitions of the i-th of

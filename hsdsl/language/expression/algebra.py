@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
@@ -199,8 +198,7 @@ def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
 _MOST_TRIES = 3  # points at which a matrix must be singular to count as singular everywhere
 
 
-@dataclass(frozen=True)
-class Solved:
+class Solved(NamedTuple):
     """The expression of each unknown, the states that the equations use, and how many nodes they have."""
 
     values: dict[Any, Any]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import sympy as sp
 
@@ -174,8 +174,7 @@ def reached(left: Any, right: Any) -> Any:
     return Reached(left, right, left - right, False, "", "").holds({})
 
 
-@dataclass(frozen=True)
-class Joined:
+class Joined(NamedTuple):
     """Parts joined by `and` or by `or`."""
 
     word: Literal["and", "or"]

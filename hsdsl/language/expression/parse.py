@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 from hsdsl.base.names import LOOKALIKES, normalised, shown
 from hsdsl.language.expression.timebox import deep_stack
@@ -205,8 +205,7 @@ _MEMBER = re.compile(r"(\[[^\[\]\n]{1,100}\])?\.([^\W\d]\w*)")  # of an instance
 _GROUPED = re.compile(r"[0-9]+(_[0-9]+)+")
 
 
-@dataclass(frozen=True, slots=True)
-class Token:
+class Token(NamedTuple):
     """A number, a name, an operator, or the end."""
 
     kind: Literal["number", "name", "operator", "end"]

@@ -138,7 +138,7 @@ _NUMBER = re.compile(
 )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class SourceRange:
     """The range of a node in its text: 0-based index, line and column of its first character and behind its last."""
 

@@ -12,7 +12,8 @@ Q f - Q u (w Q f)/(w Q u). This is exact in symbols, so what is at rest has the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -28,8 +29,7 @@ from hsdsl.mathematics.program import HELD, LOOKED_AT
 _NAN = symbol("nan")
 
 
-@dataclass(frozen=True)
-class Overlay:
+class Overlay(NamedTuple):
     """A mode's motions along its guards, by the numbers of contacts.
 
     ``mode`` has the states and walls of the mode, its edges, and then ends of `if`. ``flags`` are `HELD` for contacts

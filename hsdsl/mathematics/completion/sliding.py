@@ -11,7 +11,8 @@ takes it onto the surface along the difference of the flows: errors of steps do 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -28,8 +29,7 @@ JUMP = sp.Rational(1, 2**26)  # of the size of a surface: the root of the round-
 JUMPING = (floor, sign, below, atan2)
 
 
-@dataclass(frozen=True)
-class Sliding:
+class Sliding(NamedTuple):
     """Sliding between two modes: ``mode`` slides, ``entries`` are the edges of both modes into it."""
 
     mode: Mode

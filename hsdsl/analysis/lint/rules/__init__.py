@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.rules import experiment, guards, regularity, shape, units
@@ -21,8 +20,7 @@ FAMILIES = {
 Check = Callable[[Subject], Iterable[Finding]]
 
 
-@dataclass(frozen=True)
-class Rule:
+class Rule(NamedTuple):
     """A rule: its name, its check, and the severity of its findings.
 
     A warning is a probable mistake. A note is a remark: notes alone leave the exit code at 0. Rules about comments

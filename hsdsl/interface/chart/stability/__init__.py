@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,8 +36,7 @@ Progress = Callable[[int, int], None]
 PLANE = "h,relaxation"  # that of the paper's Fig. 14
 
 
-@dataclass(frozen=True)
-class Panel:
+class Panel(NamedTuple):
     """A tool's outcomes; ``cells[j][i]`` is at value j of y and value i of x.
 
     ``limit`` has the largest stable step at each value of y, or is None where none is known.
@@ -48,8 +47,7 @@ class Panel:
     limit: tuple[float | None, ...] | None
 
 
-@dataclass(frozen=True)
-class StabilityMap:
+class StabilityMap(NamedTuple):
     """A plane of outcomes for each tool."""
 
     name: str

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from math import inf, isfinite, nan
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,8 +42,7 @@ PEER_TOLERANCE = 1e-6
 RAN_AWAY = ("not_finite", "left_domain")
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """What came of a run: a word of :data:`WORDS`, ``rho`` (at most) or NaN, the error of samples, and why.
 
     Of converged runs samples near jumps of the reference do not count; of others times that are near are compared.
@@ -122,9 +121,9 @@ class Bench:
         run = self.model.simulate(scheme=tool.scheme or None, method=tool.method or None, **given)
         cell = _cell(scene, scene.result(run), run.stop.reason)
         if cell.word in (CONVERGED, INACCURATE) and not _same_transitions(scene, run):
-            cell = replace(cell, word=OTHER, why="other transitions")
+            cell = cell._replace(word=OTHER, why="other transitions")
         if self.with_rho and cell.word in (CONVERGED, INACCURATE) and len(run.times) <= MOST_ROWS:
-            cell = replace(cell, rho=self._rho(scene, run))
+            cell = cell._replace(rho=self._rho(scene, run))
         return cell
 
     def _rho(self, scene: Scene, run: Execution) -> float:
