@@ -213,7 +213,8 @@ class Result:
         return self.count()
 
 
-class Tool(NamedTuple):
+@dataclass(frozen=True)
+class Tool:
     """A tool by its name; ours have a scheme and a method."""
 
     name: str
