@@ -192,13 +192,9 @@ class AutomatonSubject(Subject):
         return set().union(*map(_names_in, exprs)) - {TIME.name} - known
 
     def _input(self, name: str) -> SampledInput:
-        start = dict(self._whole_initial).get(name)
+        start = dict(self.reading.system.initial.values).get(name)
         hold = "zero" if name in numbered(self.reading.system.parts) else "linear"
         return SampledInput(name, hold, (Fraction(0),), (Fraction(1) if start is None else start,))
-
-    @property
-    def _whole_initial(self) -> tuple[tuple[str, Any], ...]:
-        return self.reading.system.initial.values
 
     def _mode(self, k: int) -> Mode:
         known = {symbol(self.part.name): whole(k + 1)} if self.part.is_numbered else {}

@@ -90,22 +90,18 @@ def rho(
     """
     cells = merged(a, b)
     if relaxation is not None:
-        _check_depth(cells, relaxation)
+        deepest = float(max(np.max(curve.depth) for curve in (cells.a, cells.b)))
+        if deepest > relaxation * (1 + 1e-9):
+            raise UsageError(
+                f"a strip of these runs is {deepest:.3g} deep, and the relaxed space's strips only {relaxation:.3g}",
+                f"relaxation {deepest:.3g}",
+            )
     name = "quotient" if relaxation is None else "relaxed"
     if cells.same:
         return no_distance(cells, name)
     on = OnSpace(metric, relaxation is not None)
     found = Supremum(cells, on, gap, cells.rounding, metric.evaluations, metric.budget)
     return curve_distance(found, cells, name, gap, metric.budget, metric.status)
-
-
-def _check_depth(cells: Cells, relaxation: float) -> None:
-    deepest = float(max(np.max(curve.depth) for curve in (cells.a, cells.b)))
-    if deepest > relaxation * (1 + 1e-9):
-        raise UsageError(
-            f"a strip of these runs is {deepest:.3g} deep, and the relaxed space's strips only {relaxation:.3g}",
-            f"relaxation {deepest:.3g}",
-        )
 
 
 def merged(a: Execution, b: Execution) -> Cells:
@@ -355,7 +351,7 @@ class Supremum:
     def _spent(self, bound: Array) -> bool:
         highest = float(np.max(bound))
         self.budget.tell(self.lower, max(highest, self.points))
-        over = self.evaluations > 0 and self.budget.spent()  # a first look is always taken
+        over = self.evaluations > 0 and self.budget.spent()  # the first pairs are always examined
         near = highest <= self.accepted(max(self.gap, ROUGH))
         if self.evaluations < self.most * (FEW if near else 1) and not over:
             return False

@@ -39,8 +39,8 @@ from hsdsl.analysis.metrics.interval import Budget
 from hsdsl.base.numbers.rational import Exact, maximise, never_negative
 
 Indices = NDArray[np.intp]
-TOLERANCE = 2e-10  # relative: bounds this near to the best path are not worth a look; the lower end allows for it
-NEAR = 1e-3  # relative: a bound so near to the best path is worth a closer look
+TOLERANCE = 2e-10  # relative: bounds this near to the best path are not examined; the lower end allows for it
+NEAR = 1e-3  # relative: a bound so near to the best path is examined more closely
 NEIGHBOURS_AT = {16, 128, 1024}  # sequences looked at: when the best path's neighbours are
 MOST_CHANGES = 20
 HOPS = 8  # more than the fewest that lead from one mode to the other
@@ -198,7 +198,7 @@ class _Search:
                     yield before + middle + after
 
     def _left(self, rows: Indices, bounds: Array) -> tuple[Indices, Array]:
-        """The pairs for which paths that are at least so long are worth a look; the lower end remembers the others."""
+        """The pairs for which paths that are at least so long are examined; the lower end remembers the others."""
         still = bounds < self.found.upper[rows] * (1 - TOLERANCE)
         self._lower(rows[~still], bounds[~still])
         return rows[still], bounds[still]
@@ -485,7 +485,7 @@ def _worth_returning(f: Passage, g: Passage) -> bool:
 
 
 def _seen_longer(short: Array, long: Array) -> bool:
-    """Whether ``|short @ u| > |long @ u|`` for some u by far more than rounding; most pairs need no closer look."""
+    """Whether ``|short @ u| > |long @ u|`` for some u by far more than rounding; most pairs need no closer test."""
     excess, size = long.T @ long - short.T @ short, np.abs(np.vstack([long, short])).max(initial=0)
     return bool(np.linalg.eigvalsh(excess)[0] < -SEEN * size**2)
 

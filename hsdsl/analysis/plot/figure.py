@@ -246,7 +246,7 @@ LONGEST_LABEL = 24  # letters of a run's label
 def draw_panel(
     axis: Axes, runs: Sequence[Curves], name: str, guards: Sequence[GuardLine], view: View, room: float
 ) -> None:
-    """Draw one run with the bands of its modes and the levels of guards, or several with a look for each.
+    """Draw one run with the bands of its modes and the levels of guards, or several, each in a style of its own.
 
     The panel is about ``room`` inches wide.
     """
@@ -261,10 +261,14 @@ def draw_panel(
     axis.set_ylim(low, high)
     if len(runs) == 1:
         if len(runs[0].modes) <= MOST_BANDS:
-            draw_bands(axis, runs[0])
+            data = runs[0]
+            for mode, fill in fills(data.modes).items():
+                spans = [(begin, end - begin) for name, begin, end in data.bands if name == mode]
+                axis.broken_barh(spans, (0, 1), transform=axis.get_xaxis_transform(), zorder=0, label=mode, **fill)
         _draw_guards(axis, runs[0], [guard for guard in guards if guard.moving is None], (low, high), room)
     elif guards:
-        _draw_levels(axis, guards)
+        for level in dict.fromkeys(guard.value for guard in guards if guard.moving is None):
+            axis.axhline(level, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)
     _draw_moving(axis, runs, guards)
     for run, look in zip(runs, looks(len(runs)), strict=True):
         _draw_curve(axis, run, name, look, (start, end, low, high))
@@ -284,13 +288,6 @@ def _draw_curve(axis: Axes, run: Curves, name: str, look: Look, ends: tuple[floa
     if run.ends_badly:
         colour = ALARM if look["color"] == INK else look["color"]  # of several runs each has its own
         axis.axvline(run.span[1], color=colour, linewidth=1.2, linestyle=look["linestyle"])
-
-
-def draw_bands(axis: Axes, data: Curves) -> None:
-    """Colour the background by mode."""
-    for mode, fill in fills(data.modes).items():
-        spans = [(begin, end - begin) for name, begin, end in data.bands if name == mode]
-        axis.broken_barh(spans, (0, 1), transform=axis.get_xaxis_transform(), zorder=0, label=mode, **fill)
 
 
 def rows_of(run: Curves) -> dict[str, list[tuple[str, float, float]]]:
@@ -409,11 +406,6 @@ def _draw_moving(axis: Axes, runs: Sequence[Curves], guards: Sequence[GuardLine]
             label.set_in_layout(False)
 
 
-def _draw_levels(axis: Axes, guards: Sequence[GuardLine]) -> None:
-    for level in dict.fromkeys(guard.value for guard in guards if guard.moving is None):
-        axis.axhline(level, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)
-
-
 def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tuple[float, float], room: float) -> None:
     """Draw each level where its modes are occupied, and label it at the end; labels that would collide become one."""
     low, high = ends
@@ -455,7 +447,7 @@ LEVEL: dict[str, Any] = {"color": "#444444", "linestyle": "dotted", "linewidth":
 
 
 def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, guards: Sequence[GuardLine], view: View) -> None:
-    """Draw one run coloured by mode where it has several, or several with a look for each; guards are dotted."""
+    """Draw one run coloured by mode where it has several, or several, each in a style of its own; guards are dotted."""
     fixed = [guard for guard in guards if guard.moving is None]
     levels = [[guard.value for guard in fixed if guard.state == name] for name in pair]
     across, up = (with_guards(limits_of(runs, name), at) for name, at in zip(pair, levels, strict=True))

@@ -85,16 +85,11 @@ def readme(source: Source) -> str:
         (PARTS / "README.md.in").read_text(),
         name=source.name,
         heading=heading,
-        rows=sizes_table(),
+        rows="\n".join(
+            f"| {scheme} | {numbers} | {kind} | {size.code:,} | {size.static:,} | {size.stack:,} |"
+            for kind, table in (("", MEASURED), ("small", SMALL_MEASURED))
+            for scheme, sizes in table.items()
+            for numbers, size in zip(("64-bit", "32-bit"), sizes, strict=True)
+        ),
         small=" ".join(SMALL),
-    )
-
-
-def sizes_table() -> str:
-    """The rows of the table of sizes."""
-    return "\n".join(
-        f"| {scheme} | {numbers} | {kind} | {size.code:,} | {size.static:,} | {size.stack:,} |"
-        for kind, table in (("", MEASURED), ("small", SMALL_MEASURED))
-        for scheme, sizes in table.items()
-        for numbers, size in zip(("64-bit", "32-bit"), sizes, strict=True)
     )

@@ -280,7 +280,7 @@ def initial_dependencies(unit: Unit) -> dict[int, list[int]]:
     shown = {v.index: i for i, v in enumerate(unit.variables) if v.kind == "parameter" and v.start is not None}
     found = {i: list[int]() for i in unit.references("derivative", "output", "mode")}
     for unknown, columns in _rows(unit, problem.mode):
-        width = _first_parameter(unit, problem.mode)
+        width = len(unit.problem.program.flows[problem.mode].states) + len(unit.source.system.inputs) + 1
         needed = with_sources(program, used, own, {k - width for k in columns if k >= width})
         found[unknown] = sorted(_knowns(unit, problem.mode, columns, {shown[i] for i in needed & shown.keys()}))
     for i, variable in enumerate(unit.variables):
@@ -288,11 +288,6 @@ def initial_dependencies(unit: Unit) -> dict[int, list[int]]:
             needed = with_sources(program, used, own, {variable.index})
             found[i] = sorted(shown[k] for k in needed & shown.keys())
     return found
-
-
-def _first_parameter(unit: Unit, mode: int) -> int:
-    """The column of the first parameter."""
-    return len(unit.problem.program.flows[mode].states) + len(unit.source.system.inputs) + 1
 
 
 def _rows(unit: Unit, mode: int) -> Iterator[tuple[int, frozenset[int]]]:

@@ -84,7 +84,13 @@ def files(source: Source) -> dict[str, bytes]:
         "kept": f"\nFixed, since times of inputs depend on them:\n\n    {fixed}\n" if fixed else "",
     }
     texts = {path: filled(text, **names) for path, text in parts.items()} | c
-    texts["c/prefix.h"] = _prefixes(texts, own)
+    runtime = {path: text for path, text in texts.items() if path.startswith("c/runtime/")}
+    loop = _functions("HS_EXPORT [^;{]*?", (text for path, text in runtime.items() if path.endswith(".h")))
+    instance = _functions("", [texts["c/instance.h"]])
+    shim = _functions("", [texts["c/shim.c"]], "hybrid")
+    problem = {"hs_the_model", "hybrid_words", *re.findall(r"\bproblem_\w+", texts["c/problem.h"])}
+    named = {**dict.fromkeys(loop, f"hs_{_digest(runtime)}"), **dict.fromkeys(instance | shim | problem, own)}
+    texts["c/prefix.h"] = "".join(f"#define {name} {prefix}_{name}\n" for name, prefix in sorted(named.items()))
     texts["src/model.rs"] = model_text(source)
     texts["tests/expected/mod.rs"] = expected_text(source)
     return {name: texts[name].encode() for name in sorted(texts)}
@@ -92,17 +98,6 @@ def files(source: Source) -> dict[str, bytes]:
 
 def _digest(texts: Mapping[str, str]) -> str:
     return hashlib.sha256("\0".join(texts.values()).encode()).hexdigest()[:16]
-
-
-def _prefixes(texts: Mapping[str, str], own: str) -> str:
-    """Other names for all that is not static, so that one program can have several models, of several versions."""
-    runtime = {path: text for path, text in texts.items() if path.startswith("c/runtime/")}
-    loop = _functions("HS_EXPORT [^;{]*?", (text for path, text in runtime.items() if path.endswith(".h")))
-    instance = _functions("", [texts["c/instance.h"]])
-    shim = _functions("", [texts["c/shim.c"]], "hybrid")
-    problem = {"hs_the_model", "hybrid_words", *re.findall(r"\bproblem_\w+", texts["c/problem.h"])}
-    named = {**dict.fromkeys(loop, f"hs_{_digest(runtime)}"), **dict.fromkeys(instance | shim | problem, own)}
-    return "".join(f"#define {name} {prefix}_{name}\n" for name, prefix in sorted(named.items()))
 
 
 def _functions(before: str, texts: Iterable[str], family: str = "hs") -> set[str]:

@@ -10,7 +10,6 @@ from typing import Any
 
 from hsdsl.analysis.plot.parts import filled, inert, scripts, shared
 from hsdsl.base.names import visible
-from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel
@@ -29,7 +28,12 @@ def files(source: Source) -> dict[str, bytes]:
     """
     shown = with_scene(source)
     module = wasm_module(shown)
-    model = model_of(source, shown, _exported(source))
+    problem = source.problem.with_settings(source.problem.settings)
+    try:
+        prepared = prepare(problem, CompiledModel(problem.program))
+    except NoCompiler:
+        prepared = prepare(problem)
+    model = model_of(source, shown, visible_run(prepared.simulate(), prepared))
     return {f"{source.name}.html": page(model, module).encode()}
 
 
@@ -56,16 +60,6 @@ def with_scene(source: Source) -> Source:
         given.moved,
     )
     return replace(source, system=system, problem=problem)
-
-
-def _exported(source: Source) -> Execution:
-    """The run of the exported settings, by the compiled loop where there is a compiler."""
-    problem = source.problem.with_settings(source.problem.settings)
-    try:
-        prepared = prepare(problem, CompiledModel(problem.program))
-    except NoCompiler:
-        prepared = prepare(problem)
-    return visible_run(prepared.simulate(), prepared)
 
 
 def page(model: dict[str, Any], module: bytes) -> str:

@@ -287,18 +287,14 @@ def _inputs(program: Program) -> str:
     for i, given in enumerate(program.inputs):
         kind = f"{int(given.hold == 'linear')}, {int(given.sloped)}"
         if given.times is None or given.values is None:
-            count = _sample_count(program, i)
+            body = constant_bodies(program)[f"input_{i}"]
+            count = sum(line.lstrip().startswith("out[") for line in body.splitlines()) // 2
             rows.append(f"{{{count}, {kind}, 0, 0, file_input_{i}}}")
             continue
         times, values = (map(FLOAT64.constant, column) for column in (given.times, given.values))
         parts += [_numbers(f"input_times_{i}", times), _numbers(f"input_values_{i}", values)]
         rows.append(f"{{{len(given.times)}, {kind}, input_times_{i}, input_values_{i}, 0}}")
     return "".join(parts) + array("static const page_input", "page_inputs", rows or ["{0, 0, 0, 0, 0, 0}"])
-
-
-def _sample_count(program: Program, i: int) -> int:
-    body = constant_bodies(program)[f"input_{i}"]
-    return sum(line.lstrip().startswith("out[") for line in body.splitlines()) // 2
 
 
 def _switches(problem: Problem) -> str:

@@ -83,29 +83,22 @@ def chart(
             **{"states": names_of(states), "samples": samples, "clearance": clearance},
             **{"digits": digits, "until": until},
         }
-        _report(_charted(models, sampling, options, answer), out, plot, answer)
+        from hsdsl.interface.chart import work_precision
 
+        charted: list[tuple[str, list[Row]]] = []
+        with progress(answer.hidden) as show:
 
-def _charted(
-    models: list[str], sampling: dict[str, Any], options: dict[str, Any], answer: Answer
-) -> list[tuple[str, list[Row]]]:
-    """The rows of each model by its name, with what is left out on standard error."""
-    from hsdsl.interface.chart import work_precision
+            def watch(text: str) -> None:
+                if show:
+                    show(lambda: text)
 
-    charted: list[tuple[str, list[Row]]] = []
-    with progress(answer.hidden) as show:
-
-        def watch(text: str) -> None:
-            if show:
-                show(lambda: text)
-
-        for scene in [_scene(text, sampling, show) for text in models]:
-            name = scene.name
-            rows, remarks = work_precision(scene, **options, watch=lambda what, name=name: watch(f"{name}: {what}"))
-            charted.append((name, rows))
-            for remark in remarks if not answer.quiet else ():
-                say(f"left out: {remark}")
-    return charted
+            for scene in [_scene(text, sampling, show) for text in models]:
+                name = scene.name
+                rows, remarks = work_precision(scene, **options, watch=lambda what, name=name: watch(f"{name}: {what}"))
+                charted.append((name, rows))
+                for remark in remarks if not answer.quiet else ():
+                    say(f"left out: {remark}")
+        _report(charted, out, plot, answer)
 
 
 def _scene(text: str, sampling: dict[str, Any], show: Show | None) -> Any:
@@ -196,16 +189,12 @@ def stability(
             given: dict[str, Any] = {"with_rho": rho, "processes": processes, "patience": patience, "watch": watch}
             given |= {} if map is None else {"map": map}
             found = stability_map(hsdsl.load(model), **options, **given)
-        _report_map(found, out, plot, answer)
+        from hsdsl.interface.chart.stability import as_csv, as_plain, as_text
 
+        write_table(out, lambda: as_csv(found))
+        if plot is not None:
+            from hsdsl.interface.chart.stability.picture import plot_stability
 
-def _report_map(found: Any, out: Path | None, plot: Path | None, answer: Answer) -> None:
-    from hsdsl.interface.chart.stability import as_csv, as_plain, as_text
-
-    write_table(out, lambda: as_csv(found))
-    if plot is not None:
-        from hsdsl.interface.chart.stability.picture import plot_stability
-
-        plot_stability(plot, found)
-        say(f"wrote {plot}")
-    answer.give(lambda: as_plain(found), lambda: as_text(found))
+            plot_stability(plot, found)
+            say(f"wrote {plot}")
+        answer.give(lambda: as_plain(found), lambda: as_text(found))

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from typer import Exit, Option
 
+from hsdsl import __version__
 from hsdsl.interface.cli.console import print_json
 from hsdsl.interface.cli.options import Json
 
@@ -20,58 +21,42 @@ OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[
 def doctor(json: Json = False, forget: Forget = False) -> None:
     """Check this installation: its packages, its compiler and its cache."""
     from hsdsl.base import cache
-    from hsdsl.engine.runtime.library import GIVEN_UP
-
-    if forget:
-        cache.forget(GIVEN_UP)
-    installation = _installation()
-    if json:
-        print_json(installation)
-    else:
-        print(_text(installation))
-    if any(value is None for value in installation["packages"].values()):
-        raise Exit(1)
-
-
-def _installation() -> dict[str, Any]:
-    from hsdsl import __version__
     from hsdsl.engine.integrators import METHODS
-    from hsdsl.engine.simulate import SCHEMES
-
-    return {
-        "hsdsl": __version__,
-        "python": platform.python_version(),
-        "executable": sys.executable,
-        "platform": platform.platform(),
-        "packages": {name: _version(name) for name in NEEDED.split()},
-        "optional": {name: _version(name) for name in OPTIONAL},
-        **_engines(),
-        "schemes": list(SCHEMES),
-        "methods": list(METHODS),
-    }
-
-
-def _engines() -> dict[str, Any]:
-    """Try the parts of a compiled run: a compiler that compiles, and a private cache folder."""
-    from hsdsl.base import cache
     from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
     from hsdsl.engine.runtime.kernel import runtime
     from hsdsl.engine.runtime.library import GIVEN_UP
+    from hsdsl.engine.simulate import SCHEMES
 
+    if forget:
+        cache.forget(GIVEN_UP)
     compiler = failure = None
     try:
         compiler = " ".join(find_compiler().command)
         runtime()
     except NoCompiler as error:
         compiler, failure = None, str(error)
-    return {
+    installation: dict[str, Any] = {
+        "hsdsl": __version__,
+        "python": platform.python_version(),
+        "executable": sys.executable,
+        "platform": platform.platform(),
+        "packages": {name: _version(name) for name in NEEDED.split()},
+        "optional": {name: _version(name) for name in OPTIONAL},
         "engines": ["c", "python"] if compiler else ["python"],
         "compiler": compiler,
         "compiler_failure": failure,
         "cache": str(cache.folder()),
         "cache_refused": cache.private(cache.folder()),
         "given_up": cache.entries(GIVEN_UP),
+        "schemes": list(SCHEMES),
+        "methods": list(METHODS),
     }
+    if json:
+        print_json(installation)
+    else:
+        print(_text(installation))
+    if any(value is None for value in installation["packages"].values()):
+        raise Exit(1)
 
 
 def _version(name: str) -> str | None:

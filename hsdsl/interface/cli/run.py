@@ -76,7 +76,16 @@ def run(
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
         shown = {"columns": names, "phases": pairs_of(phase, loaded.columns)}
-        _check_drawn(loaded, shown["phases"], plot, animate, speed)
+        pairs = shown["phases"]
+        if pairs is not None and plot is None:
+            raise UsageError("--phase is for a picture: give --plot FILE too")
+        if speed is not None and animate is None:
+            raise UsageError("--speed is of a film: give --animate FILE too")
+        if animate is not None:
+            from hsdsl.analysis.plot.animation import check
+
+            check(animate)
+            loaded.check_scene()
         needed = names and [*names, *(name for pair in shown["phases"] or () for name in pair)]
         result: Any
         with progress(answer.hidden) as show:
@@ -96,7 +105,14 @@ def run(
                     loaded.animate(animate, speed=speed, progress=counted(show, "frames"), **settings)
                 say(f"wrote {animate}")
         else:
-            _answer_streamed(result, model, answer)
+            answer.give(
+                lambda: _streamed(result, model),
+                lambda: (
+                    f"{result.rows} of {result.steps} rows written to {visible(str(result.path))}\n"
+                    f"stop      {result.stop.reason}: {result.stop.message}\ntransitions {result.transitions}"
+                    + "".join(f"\nwarning   {visible(each.message)}" for each in result.warnings)
+                ),
+            )
     _leave(result.stop, answer)
 
 
@@ -168,18 +184,6 @@ def chosen_names(outputs: str | None, known: list[str], inputs: list[str]) -> li
     return list(names)
 
 
-def _answer_streamed(run: Streamed, model: Path, answer: Answer) -> None:
-    """Print a streamed run; its transitions are in the file, so they are only counted."""
-    answer.give(
-        lambda: _streamed(run, model),
-        lambda: (
-            f"{run.rows} of {run.steps} rows written to {visible(str(run.path))}\n"
-            f"stop      {run.stop.reason}: {run.stop.message}\ntransitions {run.transitions}"
-            + "".join(f"\nwarning   {visible(each.message)}" for each in run.warnings)
-        ),
-    )
-
-
 def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
     final = run.final
     states = [name for name, present in zip(final.states, final.present[0], strict=True) if present]
@@ -201,16 +205,3 @@ def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
         },
         "seconds": {"simulate": run.seconds},
     }
-
-
-def _check_drawn(loaded: Any, pairs: Any, plot: Path | None, animate: Path | None, speed: float | None) -> None:
-    """Refuse before the run what cannot be drawn of it."""
-    if pairs is not None and plot is None:
-        raise UsageError("--phase is for a picture: give --plot FILE too")
-    if speed is not None and animate is None:
-        raise UsageError("--speed is of a film: give --animate FILE too")
-    if animate is not None:
-        from hsdsl.analysis.plot.animation import check
-
-        check(animate)
-        loaded.check_scene()

@@ -391,7 +391,11 @@ def excluded(
         if seen > most:
             return False
         first, last = lows[-BATCH:], highs[-BATCH:]
-        left = _possible(program, relations, first, last)
+        bounds = program.over(first, last)
+        equal, strict = _kinds(relations)
+        below, above = np.asarray(bounds.low), np.asarray(bounds.high)
+        possible = np.where(strict, below < 0, below <= 0) & (~equal | (above >= 0))
+        left = np.logical_and.reduce(possible)
         first, last = first[left], last[left]
         widths = (last - first) / whole
         if len(first) and (not first.shape[1] or widths.max(axis=1).min() < _SMALLEST):
@@ -399,14 +403,6 @@ def excluded(
         halves = _halved(first, last, widths)
         lows, highs = (np.concatenate([kept[:-BATCH], new]) for kept, new in ((lows, halves[0]), (highs, halves[1])))
     return True
-
-
-def _possible(program: StraightLine, relations: tuple[Relation, ...], low: Array, high: Array) -> Array:
-    bounds = program.over(low, high)
-    equal, strict = _kinds(relations)
-    below, above = np.asarray(bounds.low), np.asarray(bounds.high)
-    possible = np.where(strict, below < 0, below <= 0) & (~equal | (above >= 0))
-    return np.logical_and.reduce(possible)
 
 
 def _kinds(relations: tuple[Relation, ...]) -> tuple[Array, Array]:

@@ -98,7 +98,11 @@ def stability_map(
     base = {"parameters": dict(parameters or {}), "initial": dict(initial or {}), "settings": dict(settings or {})}
     until = float(model.pipeline.prepare(base).settings.until)
     x, y = read_axes(model, map, until, base)
-    _check_free(base, (x, y))
+    for axis in (x, y):
+        group = "settings" if axis.name in SIZES else "initial" if axis.kind == "initial" else "parameters"
+        name = axis.kind if group == "settings" else axis.name.removeprefix("initial.")
+        if name in base[group]:
+            raise UsageError(f"--map {axis.name}: it is fixed by --set", "leave out one of the two")
     schemes, against = _named(schemes, SCHEMES, "--scheme"), _named(against, PEERS, "--against")
     methods = _named(methods, ("auto", *METHODS), "--method")
     tools = _tools(model, schemes, methods, against, {x.kind, y.kind})
@@ -123,15 +127,6 @@ def stability_map(
         Panel(tool, cells, _limit(model, base, tool, x, y)) for tool, cells in zip(tools, grids, strict=True)
     )
     return StabilityMap(os.path.basename(model.program.path).removesuffix(".yaml"), x, y, panels)
-
-
-def _check_free(base: Mapping[str, Mapping[str, Any]], axes: Sequence[Axis]) -> None:
-    """Refuse an axis that ``--set`` has fixed."""
-    for axis in axes:
-        group = "settings" if axis.name in SIZES else "initial" if axis.kind == "initial" else "parameters"
-        name = axis.kind if group == "settings" else axis.name.removeprefix("initial.")
-        if name in base[group]:
-            raise UsageError(f"--map {axis.name}: it is fixed by --set", "leave out one of the two")
 
 
 def _check_ends(model: Model, base: Mapping[str, Any], axes: Sequence[Axis]) -> None:

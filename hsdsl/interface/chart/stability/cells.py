@@ -144,21 +144,16 @@ def _cell(scene: Scene, result: Result, reason: str) -> Cell:
     if found.word == "stops":
         word = BLOWN_UP if reason in RAN_AWAY or found.error > LARGE else STUCK
     elif found.word == "right":
-        return Cell(CONVERGED, nan, _error_between_jumps(scene, result), found.transitions, found.why)
+        jumps = np.array([float(t.time) for t in scene.exact.transitions])
+        near = np.abs(scene.grid[:, None] - jumps).min(axis=1, initial=inf) <= WITHIN.time * scene.grid[-1]
+        apart = (np.abs(scene.exact_values - result.values) / spans(scene))[~near]
+        return Cell(CONVERGED, nan, float(np.fmax.reduce(apart, axis=None, initial=nan)), found.transitions, found.why)
     elif found.error > LARGE:
         word = BLOWN_UP
     else:
         others = ("transitions",) if found.transitions is not None else ("transitions", "modes")
         word = OTHER if found.other in others else INACCURATE
     return Cell(word, nan, found.error, found.transitions, found.why)
-
-
-def _error_between_jumps(scene: Scene, result: Result) -> float:
-    """The largest difference of a sample, as a share of the state's span; NaN where jumps are near all of them."""
-    jumps = np.array([float(t.time) for t in scene.exact.transitions])
-    near = np.abs(scene.grid[:, None] - jumps).min(axis=1, initial=inf) <= WITHIN.time * scene.grid[-1]
-    apart = (np.abs(scene.exact_values - result.values) / spans(scene))[~near]
-    return float(np.fmax.reduce(apart, axis=None, initial=nan))
 
 
 def _same_transitions(scene: Scene, run: Execution) -> bool:

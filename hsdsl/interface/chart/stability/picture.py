@@ -40,7 +40,8 @@ def plot_stability(found: StabilityMap) -> Figure:
     columns = min(3, len(panels))
     rows = -(-len(panels) // columns)
     figure = Figure(figsize=(max(4.2, 3.3 * columns + 0.4), 2.9 * rows + 0.9), layout="constrained")
-    measure = _measure(found)
+    cells = [cell for panel in found.panels for row in panel.cells for cell in row if cell.word == CONVERGED]
+    measure = "rho" if 2 * sum(isfinite(cell.rho) for cell in cells) > len(cells) else "error"
     shades = [s for panel in panels for row in panel.cells for cell in row if (s := _shade(cell, measure)) is not None]
     span = (min(shades), max(shades)) if shades else (0.0, 1.0)
     grid: Any = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True)
@@ -57,11 +58,6 @@ def plot_stability(found: StabilityMap) -> Figure:
     shown = f"{measure} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else ""
     _legend(figure, found, columns + (columns > 2), shown)
     return figure
-
-
-def _measure(found: StabilityMap) -> str:
-    cells = [cell for panel in found.panels for row in panel.cells for cell in row if cell.word == CONVERGED]
-    return "rho" if 2 * sum(isfinite(cell.rho) for cell in cells) > len(cells) else "error"
 
 
 def _shade(cell: Cell, measure: str) -> float | None:
