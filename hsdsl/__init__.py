@@ -20,13 +20,25 @@ from __future__ import annotations
 TYPE_CHECKING = False  # that of `typing` would have it imported before the command line expects Ctrl-C
 
 __version__ = "0.1.0"
-__all__ = ["Execution", "Limits", "Model", "ModelError", "UsageError", "__version__", "distance", "load", "loads"]
+__all__ = [
+    "Execution",
+    "Limits",
+    "Model",
+    "ModelError",
+    "UsageError",
+    "__version__",
+    "distance",
+    "load",
+    "loads",
+    "register",
+]
 
 if TYPE_CHECKING:
     from typing import Any
 
     from hsdsl.base.errors import ModelError, UsageError
     from hsdsl.base.limits import Limits
+    from hsdsl.base.plugins import register
     from hsdsl.engine.execution import Execution
     from hsdsl.interface.model import Model, distance, load, loads
 
@@ -39,6 +51,7 @@ _HOMES = {
     "distance": "hsdsl.interface.model",
     "load": "hsdsl.interface.model",
     "loads": "hsdsl.interface.model",
+    "register": "hsdsl.base.plugins",
 }
 _MODULES = {"chart": "interface", "exact": "analysis", "store": "analysis", "sweep": "analysis"}  # for users too
 

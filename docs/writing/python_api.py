@@ -78,6 +78,7 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
         ("hsdsl.analysis.metrics.points.SpacePoint", ""),
         ("hsdsl.exact.reference", ""),
     ),
+    "Plug-ins": (("hsdsl.register", ""),),
     "Errors": (
         ("hsdsl.ModelError", ""),
         ("hsdsl.base.errors.Diagnostic", ""),

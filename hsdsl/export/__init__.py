@@ -1,29 +1,39 @@
-"""Registry of export targets, each a function from a model with its settings to files.
+"""Export targets, each a function from a model with its settings to files; other packages may add targets.
 
-A target is a package of the same name with a function ``files(source)``. It returns every file by its path relative to
-the output folder, or raises `UsageError` where the target cannot keep the model: nothing is written before that.
+A target of our own is a package of the same name with a function ``files(source)``. It returns every file by its path
+relative to the output folder, or raises `UsageError` where the target cannot keep the model: nothing is written before.
 
 Targets begin with `source`: a model, its problem, and what all of them read of it. Documents share `automata`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
-from importlib import import_module
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean
+from hsdsl.base.plugins import Table, function_expected
 
 if TYPE_CHECKING:
     from hsdsl.base.atomic import New
     from hsdsl.export.source import ExportedModel, Source
 
-__all__ = ["TARGETS", "Modes", "check_folder", "check_scheme", "check_target", "files_of", "source_of", "write"]
+__all__ = [
+    "ABOUT",
+    "TARGETS",
+    "Modes",
+    "check_folder",
+    "check_scheme",
+    "check_target",
+    "files_of",
+    "source_of",
+    "write",
+]
 
-TARGETS = {
+ABOUT = {
     "c": "a program in C99 that allocates nothing",
     "fmi2": "a functional mock-up unit of FMI 2.0, for model exchange and co-simulation",
     "fmi3": "a functional mock-up unit of FMI 3.0, for model exchange and co-simulation",
@@ -34,7 +44,10 @@ TARGETS = {
     "rust": "a crate for Rust without its standard library",
     "web": "one HTML page that runs the model in a browser",
 }
-
+Files = Callable[..., dict[str, bytes]]
+TARGETS = Table[Files](
+    "targets", {name: f"hsdsl.export.{name}:files" for name in ABOUT}, function_expected("a function files(source)")
+)
 
 Modes = Literal["local", "output", "none"]  # what the number of the mode is in a functional mock-up unit
 DOCUMENTS = ("latex", "mermaid")  # targets that do not run
@@ -58,10 +71,11 @@ def files_of(source: Source, target: str, modes: Modes | None = None) -> dict[st
     check_target(target)
     if modes is not None and not target.startswith("fmi"):
         raise UsageError(f"{target} has no choice of what the mode is", "--mode belongs to --to fmi2 and --to fmi3")
-    if source.system.parts and target not in OF_PARTS:
+    make = TARGETS[target]
+    if source.system.parts and target not in OF_PARTS and not getattr(make, "keeps_parts", False):
         hint = f"--to {' or '.join(OF_PARTS)}, or write the modes of a small one out"
         raise UsageError(f"{target} has no systems of parts", hint)
-    return import_module(f"hsdsl.export.{target}").files(source, *([] if modes is None else [modes]))
+    return make(source, *([] if modes is None else [modes]))
 
 
 def check_target(target: str) -> None:

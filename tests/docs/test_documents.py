@@ -36,6 +36,7 @@ import pytest
 from typer import Context
 
 import hsdsl
+from hsdsl.base import plugins
 from hsdsl.interface.cli import main
 from hsdsl.interface.cli.verbs import VERBS, command
 
@@ -138,6 +139,9 @@ def reader(tmp_path, monkeypatch):
     monkeypatch.setenv("NO_COLOR", "1")
     monkeypatch.setenv("TERM", "dumb")
     monkeypatch.setenv("MPLBACKEND", "agg")
+    for place in plugins.TABLES.values():  # what a page registers is for that page
+        table = plugins.located(place)
+        monkeypatch.setattr(table, "_given", dict(table._given))
     yield tmp_path
     if "matplotlib.pyplot" in sys.modules:
         sys.modules["matplotlib.pyplot"].close("all")
@@ -245,8 +249,18 @@ def test_reasons_of_verdicts_on_their_page_are_those_of_the_code():
         assert any(one in code and other in code for one, other in halves), words
 
 
-def test_tutorial_and_readme_have_examples_that_run():
-    assert set(RUNNABLE) >= {"README.md", "docs/tutorial.md"}
+def test_tutorial_readme_and_how_tos_have_examples_that_run():
+    how_tos = {name for name in NAMES if name.startswith("docs/how-to/")}
+    assert set(RUNNABLE) >= {"README.md", "docs/tutorial.md", *how_tos - {"docs/how-to/model.md"}}
+
+
+PLUG_IN = {"method": "integrator", "rule": "lint-rule", "target": "export-target", "peer": "peer", "metric": "metric"}
+
+
+@pytest.mark.parametrize("module", PLUG_IN)
+def test_the_code_of_the_example_package_is_that_of_its_how_to(module):
+    code = (ROOT / "examples" / "plug-in" / "lab" / f"{module}.py").read_text(encoding="utf-8")
+    assert code in (ROOT / "docs" / "how-to" / f"{PLUG_IN[module]}.md").read_text(encoding="utf-8")
 
 
 OF_THE_PACKAGE = ("look", "check_scene", "check", "view", "sizes")  # methods that other modules call

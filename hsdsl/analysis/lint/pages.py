@@ -22,9 +22,13 @@ def pages() -> dict[str, str]:
     return {**error_pages(), **warning_pages(), **rule_pages()}
 
 
-@cache
 def rule_pages() -> dict[str, str]:
     """The pages of rules, in one file a family; the first line of a page is its title."""
+    return _own_pages() | {code: rule.page.strip() for code, rule in RULES.items() if rule.page}
+
+
+@cache
+def _own_pages() -> dict[str, str]:
     return {code: page for family in FAMILIES for code, page in _pages("analysis.lint.rules", f"{family}.md").items()}
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-from hsdsl.analysis.lint.rules import FAMILIES, RULES, family
+from hsdsl.analysis.lint.rules import FAMILIES, PLUG_INS, RULES, family
 from hsdsl.analysis.lint.subject import Subject
 from hsdsl.base.errors import Diagnostic, Span, UsageError
 from hsdsl.base.names import did_you_mean, shown
@@ -48,7 +48,7 @@ def codes_of(names: Iterable[str], where: str) -> set[str]:
     for name in filter(None, (part.strip() for part in names)):
         answering = {code for code, rule in RULES.items() if _answers(code, rule.name, name)}
         if not answering:
-            known = [*RULES, *FAMILIES, *(rule.name for rule in RULES.values())]
+            known = [*RULES, *FAMILIES, PLUG_INS, *(rule.name for rule in RULES.values())]
             hint = did_you_mean(name, known, "rules have codes such as HS401; the documentation lists them")
             raise UsageError(f"{where}: no lint rule is called '{name}'", hint)
         found |= answering
@@ -100,7 +100,7 @@ def _checked(file: Path, table: Any) -> dict[str, list[str]]:
 
 
 UNUSED, UNKNOWN = "HS490", "HS491"
-_LISTED = "codes are HS and three digits; every finding has its own"
+_LISTED = "every finding has its code: HS and three digits, or that of a plug-in"
 _COMMENT = re.compile(r"(?<![^ \t])#\s*hsdsl\s*:\s*ignore\s*(?:\[([^\]\n]*)\])?(?=[ \t]{0,9}(.{0,500}))")
 
 

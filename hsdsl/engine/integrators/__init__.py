@@ -1,4 +1,4 @@
-"""Integrators, most of them tables; METHODS has the names for models and the command line.
+"""Integrators, most of them tables; METHODS has the names for models and the command line, also those of plug-ins.
 
 A method has the properties `kind`, `implicit`, `is_series`, `adaptive`, `order`, `error_order`, `degree`, `digits`, and
 `for_tolerance`.
@@ -6,42 +6,50 @@ A method has the properties `kind`, `implicit`, `is_series`, `adaptive`, `order`
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from importlib import import_module
-from typing import TypeVar
+from typing import Any
 
+from hsdsl.base.errors import UsageError
+from hsdsl.base.plugins import Table
 from hsdsl.engine.integrators.stepper import RADAU, RadauMethod
 from hsdsl.engine.integrators.tableau import ButcherTableau
 from hsdsl.engine.integrators.taylor import TaylorMethod
 
 Method = ButcherTableau | TaylorMethod | RadauMethod
-M = TypeVar("M", bound=Method)
-MODULES: dict[str, str] = dict.fromkeys(("euler", "midpoint", "heun", "ralston", "rk4"), "classical")
+_HERE = "hsdsl.engine.integrators."
+_CLASSICAL = {name: f"{_HERE}classical:{name.upper()}" for name in ("euler", "midpoint", "heun", "ralston", "rk4")}
+_EXPLICIT = {**_CLASSICAL, "dopri5": f"{_HERE}dopri5:DOPRI5", "dop853": f"{_HERE}dop853:DOP853"}
 
 
-class _Named(Mapping[str, M]):
-    """Methods by name. A table checks itself when its module is imported, so that is done at first use."""
-
-    def __init__(self, *names: str) -> None:
-        self._names = names
-
-    def __getitem__(self, name: str) -> M:
-        if name not in self._names:
-            raise KeyError(name)
-        return getattr(import_module(f"hsdsl.engine.integrators.{MODULES.get(name, name)}"), name.upper())
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._names
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
+def _fault(name: str, value: Any) -> str | None:
+    if not isinstance(value, ButcherTableau):
+        return f"'{name}': expected a ButcherTableau, got {type(value).__name__}"
+    return None if value.name == name else f"expected the method's own name '{value.name}', got '{name}'"
 
 
-INTEGRATORS = _Named[ButcherTableau]("euler", "midpoint", "heun", "ralston", "rk4", "dopri5", "dop853")
-METHODS = _Named[Method](*INTEGRATORS, "taylor", "radau")
+def _none(_name: str, _value: Any) -> str:
+    return "methods are added to METHODS"
+
+
+# A table checks itself when its module is imported, so that is done at first use.
+INTEGRATORS = Table[ButcherTableau]("own methods", _EXPLICIT, _none)
+_SERIES = {"taylor": f"{_HERE}taylor:TAYLOR", "radau": f"{_HERE}stepper:RADAU"}
+METHODS = Table[Method]("methods", {**_EXPLICIT, **_SERIES}, _fault)
 AUTO = "dopri5"  # what `method: auto` is where nothing is known of a flow but its values
+
+
+def method_name(method: str | ButcherTableau) -> str:
+    """The name of a method; a table given in place of one is registered under its name.
+
+    Raises UsageError: another table has that name.
+    """
+    if not isinstance(method, ButcherTableau):
+        return method
+    known = METHODS.get(method.name)
+    if known is None:
+        METHODS.register(method.name, method)
+    elif vars(known) != vars(method):
+        raise UsageError(f"another method is called '{method.name}'", "give this table another name")
+    return method.name
+
 
 __all__ = ["AUTO", "INTEGRATORS", "METHODS", "RADAU", "ButcherTableau", "Method", "RadauMethod", "TaylorMethod"]

@@ -92,6 +92,9 @@ class ButcherTableau:
             if self.dense is not None:
                 self._check("dense", tuple(zip(*self.dense, strict=True)), self.dense_order, weights)
 
+    def __str__(self) -> str:
+        return self.name
+
     def places(
         self, flow: Callable[..., Sequence[Any]], t: Any, x: Sequence[Any], h: Any
     ) -> Iterator[tuple[Any, tuple[Any, ...]]]:

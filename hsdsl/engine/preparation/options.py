@@ -17,7 +17,7 @@ from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import closest, did_you_mean
 from hsdsl.base.numbers import decimals
 from hsdsl.base.parts import for_all, numbered
-from hsdsl.engine.integrators import AUTO, METHODS, Method
+from hsdsl.engine.integrators import AUTO, METHODS, Method, method_name
 from hsdsl.mathematics.program import Program
 
 KEYS = tuple(SETTINGS)
@@ -149,9 +149,10 @@ def _own_formula(scheme: str, values: Mapping[str, Option]) -> None:
 
 def _method(option: Option, size: str, size_origin: str) -> Method | None:
     """The named method; None for `auto`."""
-    if option.value == "auto":
+    name = method_name(option.value)
+    if name == "auto":
         return None
-    table = METHODS.get(option.value)
+    table = METHODS.get(name)
     if table is None:
         raise _unknown_method(option)
     if size == "step" or table.adaptive:

@@ -82,8 +82,8 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
 
 
 def _method_exists(program: Program) -> bool:
-    """Whether its method has a table; else it is refused with its place, which no kept or pickled program has."""
-    return program.method in (None, "auto", *METHODS)
+    """Whether its method is one of our own; else it may be refused with its place, which no kept program has."""
+    return program.method in (None, "auto", *METHODS.own)
 
 
 def _elaborated(files: ModelFiles) -> HybridSystem:

@@ -11,7 +11,7 @@ from typer import Argument, Option
 import hsdsl
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import counted
-from hsdsl.export import TARGETS, Modes, check_folder, check_scheme, files_of, source_of, write
+from hsdsl.export import ABOUT, Modes, check_folder, check_scheme, files_of, source_of, write
 from hsdsl.export import check_target as check_known
 from hsdsl.interface.cli.console import print_json, say
 from hsdsl.interface.cli.options import (
@@ -31,7 +31,7 @@ from hsdsl.interface.cli.options import (
 if TYPE_CHECKING:
     from hsdsl.language.system import HybridSystem
 
-TO = f"The target: {', '.join(TARGETS)}."
+TO = f"The target: {', '.join(ABOUT)}, or that of a plug-in."
 FOLDER = "The folder for the files; left out, a target with one file of text prints it."
 MODE = "What the number of the mode is in a functional mock-up unit: local, the default, an output, or left out (none)."
 KEEP = "Only these states and outputs, with what they depend on."
@@ -40,7 +40,7 @@ KEEP = "Only these states and outputs, with what they depend on."
 def export(
     model: Model,
     *,
-    to: Annotated[str, option("TARGET", TO, "--to", complete=lambda: list(TARGETS.items()))],
+    to: Annotated[str, option("TARGET", TO, "--to", complete=lambda: list(ABOUT.items()))],
     out: Annotated[Path | None, option("DIR", FOLDER)] = None,
     force: Annotated[bool, Option("--force", help="Write into a folder that is not empty.")] = False,
     experiment: Experiment,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, entry_points, version
 from typing import Annotated, Any
 
 from typer import Exit, Option
@@ -21,6 +21,7 @@ OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[
 def doctor(json: Json = False, forget: Forget = False) -> None:
     """Check this installation: its packages, its compiler and its cache."""
     from hsdsl.base import cache
+    from hsdsl.base.plugins import TABLES
     from hsdsl.engine.integrators import METHODS
     from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
     from hsdsl.engine.runtime.kernel import runtime
@@ -50,6 +51,7 @@ def doctor(json: Json = False, forget: Forget = False) -> None:
         "given_up": cache.entries(GIVEN_UP),
         "schemes": list(SCHEMES),
         "methods": list(METHODS),
+        "plug_ins": {table: sorted(entry_points(group=f"hsdsl.{table}").names) for table in TABLES},
     }
     if json:
         print_json(installation)
@@ -78,5 +80,6 @@ def _text(installation: dict[str, Any]) -> str:
         f"models that took too long to compile, and are not tried again: {installation['given_up']}",
         f"schemes: {', '.join(installation['schemes'])}",
         f"methods: {', '.join(installation['methods'])}",
+        *(f"plug-ins: {table} {', '.join(names)}" for table, names in installation["plug_ins"].items() if names),
     ]
     return "\n".join(lines)

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 from typer import Argument, Context, Option
 
 import hsdsl
-from hsdsl.analysis.metrics.table import CURVE_METRICS
 from hsdsl.base.defaults import COMPLETIONS, SCHEMES, SETTINGS
 from hsdsl.base.errors import CODES, WARNINGS, ModelError, UsageError
 from hsdsl.base.limits import DEFAULT, NUMBERS, Limits, applied
@@ -161,12 +160,10 @@ def option(metavar: str, help: str, *names: str, complete: Callable[..., Any] | 
 Engine = Literal["auto", "c", "python"]
 Format = Literal["text", "json", "sarif", "github"]
 if TYPE_CHECKING:
-    Scheme = Completion = Method = Metric = str
+    Scheme = Completion = str
 else:
     Scheme = StrEnum("Scheme", {name: name for name in SCHEMES})
     Completion = StrEnum("Completion", {name: name for name in COMPLETIONS})
-    Metric = StrEnum("Metric", {name: name for name in CURVE_METRICS})
-    Method = StrEnum("Method", {name: name for name in ("auto", *METHODS)})
 
 Model = Annotated[Path, Argument(metavar="MODEL", help="The model file.", autocompletion=model_files)]
 Models = Annotated[list[Path], Argument(metavar="MODEL...", help="Model files.", autocompletion=model_files)]
@@ -185,7 +182,8 @@ PAIR = "Draw one state or output against another, in one of the pictures. May be
 
 def setting(name: str) -> Any:
     """The option of a setting of an experiment."""
-    return option(SETTINGS[name].metavar, SETTINGS[name].about)
+    complete = (lambda: ["auto", *METHODS]) if name == "method" else None
+    return option(SETTINGS[name].metavar, SETTINGS[name].about, complete=complete)
 
 
 Until = Annotated[str | None, setting("until")]
@@ -208,7 +206,7 @@ class Experiment(NamedTuple):
     overrides: Annotated[list[str] | None, overriding(SET)] = None
     until: Until = None
     scheme: Annotated[Scheme | None, setting("scheme")] = None
-    method: Annotated[Method | None, setting("method")] = None
+    method: Annotated[str | None, setting("method")] = None
     step: Annotated[str | None, setting("step")] = None
     tolerance: Annotated[str | None, setting("tolerance")] = None
     relaxation: Annotated[str | None, setting("relaxation")] = None
@@ -223,7 +221,7 @@ class Experiment(NamedTuple):
 class Located(NamedTuple):
     """Options of runs whose derivatives are taken: an adaptive method by scheme `located`."""
 
-    method: Annotated[Method | None, option("M", "An adaptive method, or auto.")] = None
+    method: Annotated[str | None, option("M", "An adaptive method, or auto.")] = None
     tolerance: Annotated[str | None, option("TOL", "Bound on the local error, relative to the scales.")] = None
     engine: EngineName = "auto"
 
@@ -231,7 +229,7 @@ class Located(NamedTuple):
         """Arguments of the model's method; a method or tolerance of ``--set`` counts as one of the call."""
         given, own = values_of(overrides), self._asdict()
         own |= {name: given["settings"].pop(name, None) for name in ("method", "tolerance") if own[name] is None}
-        return given | as_texts(own) | more
+        return given | own | more
 
 
 class Answer(NamedTuple):

@@ -19,7 +19,6 @@ from hsdsl.interface.cli.options import (
     Answer,
     Json,
     Limit,
-    Metric,
     Phases,
     answering,
     check_target,
@@ -102,7 +101,7 @@ def _labels(runs: list[Path]) -> list[str]:
 SET_PARAMETERS = "Override a parameter. May be repeated."
 FIRST = "The model file, or a run: a saved one (.npz), or a model's own experiment."
 FROM = 'A mode and all its states: "free x=13 v=5"; values are expressions.'
-_OF_RUNS = [name for name in CURVE_METRICS if name not in POINT_METRICS]
+_OF_RUNS = [name for name in CURVE_METRICS.own if name not in POINT_METRICS]
 METRIC = f"Between states: {' or '.join(POINT_METRICS)}. Between runs: {', '.join(_OF_RUNS[:-1])} or {_OF_RUNS[-1]}."
 DEPTH = "Depth of the strips, for the relaxed metric; else the file's."
 PLOT = "Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg."
@@ -115,7 +114,7 @@ def distance(
     second: Annotated[Path | None, Argument(metavar="[B]", help="A second run.", autocompletion=model_files)] = None,
     start: Annotated[str | None, option("STATE", FROM, "--from")] = None,
     end: Annotated[str | None, option("STATE", "The other state.", "--to")] = None,
-    metric: Annotated[Metric | None, option("NAME", METRIC)] = None,
+    metric: Annotated[str | None, option("NAME", METRIC, complete=lambda: [*CURVE_METRICS])] = None,
     relaxation: Annotated[str | None, option("EPS", DEPTH)] = None,
     overrides: Annotated[list[str] | None, overriding(SET_PARAMETERS)] = None,
     coordinates: Annotated[str | None, option("A,B", "For rho-hat: the states that count as the position.")] = None,
@@ -128,7 +127,7 @@ def distance(
 ) -> None:
     """Measure the distance between two states, or two runs, in the hybrid metric."""
     with answering(json, allow_path, limit):
-        parameters, metric = _parameters(overrides), metric and str(metric)
+        parameters = _parameters(overrides)
         options = {"relaxation": relaxation, "parameters": parameters, "hops": hops, "seconds": seconds}
         check_target(plot, "--plot")
         if second is not None:

@@ -177,8 +177,5 @@ def _options(error: Any) -> set[str]:
 
 
 def _not_a_choice(error: Any, choices: Sequence[str]) -> UsageError:
-    from hsdsl.engine.preparation.options import method_meant
-
     value: str = error.message.split("'")[1]
-    hint = method_meant(value) if error.param.name == "method" else did_you_mean(value, choices)
-    return UsageError(f"there is no {error.param.name} '{value}'", hint)
+    return UsageError(f"there is no {error.param.name} '{value}'", did_you_mean(value, choices))

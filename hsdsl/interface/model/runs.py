@@ -24,6 +24,7 @@ from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
     from hsdsl.analysis.sensitivity.result import Sensitivity
+    from hsdsl.engine.integrators import ButcherTableau
     from hsdsl.interface.model.differentiate import Differentiator
     from hsdsl.language.system import HybridSystem
 
@@ -96,7 +97,7 @@ class Runs:
         until: Any = None,
         *,
         scheme: str | None = None,
-        method: str | None = None,
+        method: str | ButcherTableau | None = None,
         step: Any = None,
         tolerance: Any = None,
         relaxation: Any = None,
@@ -120,8 +121,10 @@ class Runs:
         ----------
         until : number or str, optional
             End of the run.
-        scheme, method : str, optional
-            A name of `simulate.SCHEMES`; a name of `integrators.METHODS`, or ``auto``.
+        scheme : str, optional
+            A name of `simulate.SCHEMES`.
+        method : str or ButcherTableau, optional
+            A name of `integrators.METHODS`, or ``auto``; a table counts as a method of its name from then on.
         step, tolerance : number or str, optional
             Fixed step, or bound on the local error relative to the largest size each state has had; they exclude each
             other.

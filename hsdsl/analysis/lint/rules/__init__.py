@@ -1,14 +1,20 @@
-"""The lint rules by code: name, check and severity of each; their pages are the Markdown files here, one a family."""
+"""The lint rules by code: name, check and severity of each; their pages are the Markdown files here, one a family.
+
+Other packages may add rules, with codes of their own that do not begin with HS; each brings its page.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.rules import experiment, guards, regularity, shape, units
 from hsdsl.analysis.lint.subject import Subject
+from hsdsl.base.plugins import Table
 
+PLUG_INS = "plug-ins"
 FAMILIES = {
     "names": ("HS400", "HS419"),
     "shape": ("HS420", "HS459"),
@@ -24,20 +30,30 @@ class Rule(NamedTuple):
     """A rule: its name, its check, and the severity of its findings.
 
     A warning is a probable mistake. A note is a remark: notes alone leave the exit code at 0. Rules about comments
-    have no check, because they see what the others find.
+    have no check, because they see what the others find. The page of a rule of another package is Markdown, and its
+    first line says what the rule finds.
     """
 
     name: str
     check: Check | None = None
     severity: Literal["warning", "note"] = "warning"
+    page: str = ""
 
 
 def family(code: str) -> str:
     """The family that a code belongs to."""
-    return next(name for name, (first, last) in FAMILIES.items() if first <= code <= last)
+    return next((name for name, (first, last) in FAMILIES.items() if first <= code <= last), PLUG_INS)
 
 
-RULES: dict[str, Rule] = {
+def _fault(code: str, rule: Any) -> str | None:
+    if not isinstance(rule, Rule) or rule.check is None or not rule.page.strip():
+        return f"'{code}': expected a Rule with a check and a page, got {type(rule).__name__}"
+    if not re.fullmatch(r"(?!HS)[A-Z]{2,8}\d{3,4}", code):
+        return f"expected a code such as LAB001, of letters other than HS and a number, got '{code}'"
+    return None
+
+
+_OWN: dict[str, Rule | str] = {
     "HS401": Rule("unused-parameter", shape.unused_name("parameter")),
     "HS402": Rule("unused-input", shape.unused_name("input")),
     "HS403": Rule("unused-let", shape.unused_let),
@@ -83,3 +99,4 @@ RULES: dict[str, Rule] = {
     "HS604": Rule("flow-units", units.flow_units),
     "HS605": Rule("value-units", units.value_units),
 }
+RULES = Table[Rule]("rules", _OWN, _fault)

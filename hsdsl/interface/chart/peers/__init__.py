@@ -1,4 +1,4 @@
-"""Other tools, each run in the way its own documentation shows. A peer is a module with ``prepare(scene)``.
+"""Other tools, each run in the way its own documentation shows. A peer is a function ``prepare(scene)``.
 
 ``prepare`` translates the scene once and returns ``run(tolerance) -> Result``; it raises `Refused` where the tool
 cannot run the model. Wrong results of an installed tool are charted as wrong.
@@ -7,18 +7,24 @@ cannot run the model. Wrong results of an installed tool are charted as wrong.
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 
+from hsdsl.base.plugins import Table, function_expected
 from hsdsl.interface.chart.scene import Refused, Result, Scene
 
-PEERS = {
+_MODULES = {
     "scipy": "scipy_ivp",
     "heyoka": "heyoka_taylor",
     "sksundae": "sksundae_cvode",
     "casadi": "casadi_rosenbrock",
     "diffrax": "diffrax_event",
 }
-"""By name, the module here that runs it."""
+Prepare = Callable[[Scene], Callable[[float], Result]]
+PEERS = Table[Prepare](
+    "peers",
+    {name: f"hsdsl.interface.chart.peers.{module}:prepare" for name, module in _MODULES.items()},
+    function_expected("a function prepare(scene)"),
+)
+"""By name, the function that prepares it; other packages may add peers."""
 
 
 def prepare(name: str, scene: Scene) -> Callable[[float], Result]:
@@ -27,10 +33,10 @@ def prepare(name: str, scene: Scene) -> Callable[[float], Result]:
     Raises Refused: the peer is not installed, or cannot run this model.
     """
     try:
-        peer = import_module(f"hsdsl.interface.chart.peers.{PEERS[name]}")
+        peer = PEERS[name]
     except ImportError as error:
         raise Refused(f"not installed ({error.name}); pip install 'hsdsl[peers]'") from None
-    return _guarded(peer.prepare(scene), scene)
+    return _guarded(peer(scene), scene)
 
 
 def _guarded(run: Callable[[float], Result], scene: Scene) -> Callable[[float], Result]:
