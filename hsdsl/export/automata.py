@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 from hsdsl.export.source import Source
 from hsdsl.language.elaborate import elaborate_files
@@ -16,8 +14,7 @@ from hsdsl.language.schema.documents import ModelDocument, SystemDocument
 Pairs = list[tuple[str, str]]  # names and texts of expressions
 
 
-@dataclass(frozen=True)
-class Automaton:
+class Automaton(NamedTuple):
     """An automaton of the file by its name."""
 
     name: str
@@ -58,8 +55,7 @@ def _value(entry: Any) -> str:
     return entry.value if isinstance(entry.value, str) else entry.value.value
 
 
-@dataclass(frozen=True)
-class Group:
+class Group(NamedTuple):
     """The instances of one name: ``label`` is that name, with their numbers where there are several."""
 
     name: str
@@ -84,21 +80,12 @@ class Group:
         return pairs(self.given.at_ends)
 
 
-@dataclass(frozen=True)
-class Automata:
-    """The automata and the instances of a model."""
+class Automata(NamedTuple):
+    """The automata and the names of the system of a model, in file order."""
 
     document: SystemDocument
-
-    @cached_property
-    def automata(self) -> list[Automaton]:
-        """The automata, in file order."""
-        return [Automaton(str(name), kind) for name, kind in self.document.automata.items()]
-
-    @cached_property
-    def groups(self) -> list[Group]:
-        """The names of the system, in file order."""
-        return [Group(str(name), given) for name, given in self.document.system.items()]
+    automata: list[Automaton]
+    groups: list[Group]
 
     def links(self) -> Iterator[tuple[int, int, str]]:
         """Which group another one depends on, and how: numbers of both, and a text."""
@@ -133,4 +120,5 @@ def automata_of(source: Source) -> Automata:
     """The automata of a source whose system has parts."""
     document = document_of(source)
     assert isinstance(document, SystemDocument)
-    return Automata(document)
+    automata = [Automaton(str(name), kind) for name, kind in document.automata.items()]
+    return Automata(document, automata, [Group(str(name), given) for name, given in document.system.items()])

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,8 +36,7 @@ POINTS, AROUND = 4, 2.0**-12  # where guards are compared: so many points, this 
 Slopes = dict[str, Number]
 
 
-@dataclass(frozen=True)
-class Order:
+class Order(NamedTuple):
     """One order of tied transitions: the edge that goes first, the mode and state that it leads to, and its slopes.
 
     ``slopes`` are the derivatives of these states at a fixed time, right after the instant.

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -15,8 +15,7 @@ from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.lower.straight import Definition, print_routines
 
 
-@dataclass(frozen=True)
-class Names:
+class Names(NamedTuple):
     """The numbered symbols for the file's names in generated code.
 
     ``data`` has the arguments of `bind`; ``shared`` maps parameters, sampled inputs, their slopes and switches;

@@ -35,7 +35,7 @@ def lowered_overlay(found: Overlay, names: Names) -> LoweredMode:
     """A mode with motion along its guards over numbered symbols."""
     flags = tuple(symbol(f"d{i}") for i in range(len(found.flags)))
     shared = names.shared | dict(zip(found.flags, flags, strict=True))
-    return LoweredMode(found.mode, replace(names, data=(*names.data, *flags), shared=shared))
+    return LoweredMode(found.mode, names._replace(data=(*names.data, *flags), shared=shared))
 
 
 class LoweredMode:

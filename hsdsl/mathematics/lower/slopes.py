@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -17,8 +17,7 @@ from hsdsl.mathematics.lower.switches import with_switches
 from hsdsl.mathematics.program import Routines
 
 
-@dataclass(frozen=True)
-class Slopes:
+class Slopes(NamedTuple):
     """The slopes of a mode that are not zero everywhere, of the routine ``slopes``.
 
     ``places`` has for each its row and column: rows are the flow of each state, then the outputs, columns the states,

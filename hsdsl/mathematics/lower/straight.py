@@ -19,9 +19,9 @@ import re
 import textwrap
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
 from itertools import accumulate, chain, combinations
+from typing import NamedTuple
 
 import sympy as sp
 
@@ -369,8 +369,7 @@ def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Stateme
     return list(ordered.items())
 
 
-@dataclass(frozen=True)
-class Definition:
+class Definition(NamedTuple):
     """A routine before printing: its name, arguments and tuple of results.
 
     ``statements`` are the names that the results use besides the arguments, and their expressions. With ``places``
