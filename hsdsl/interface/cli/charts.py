@@ -64,7 +64,7 @@ def chart(
     """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
     with answer.reporting():
         from hsdsl.engine.integrators import METHODS
-        from hsdsl.interface.chart import ENGINES, PEERS, SCHEMES, TOLERANCES
+        from hsdsl.interface.chart import ENGINES, PEERS, SCHEMES, TOLERANCES, work_precision
 
         check_target(out, "--out", (".csv",))
         check_target(plot, "--plot")
@@ -83,8 +83,6 @@ def chart(
             **{"states": names_of(states), "samples": samples, "clearance": clearance},
             **{"digits": digits, "until": until},
         }
-        from hsdsl.interface.chart import work_precision
-
         charted: list[tuple[str, list[Row]]] = []
         with progress(answer.hidden) as show:
 
