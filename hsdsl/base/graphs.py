@@ -44,27 +44,14 @@ def cycle(following: Mapping[T, Iterable[T]]) -> list[T] | None:
 
 @dataclass(frozen=True)
 class Elimination:
-    """Entries of the factors, row by row, rows and columns numbered in the order of elimination.
+    """Entries of the factors, row by row, rows and columns numbered in the order of elimination."""
 
-    Attributes
-    ----------
-    order : list of int
-        The unknown of each row.
-    start, column, diagonal : list of int
-        Row i has the entries from ``start[i]`` to ``start[i + 1]``, in these columns, which go up; ``diagonal[i]`` is
-        the one of its own.
-    place : list of int
-        For each entry of J the entry of the factors where it goes.
-    own : list of int
-        For each unknown which entry of J is the derivative of its flow by itself, -1 for none.
-    """
-
-    order: list[int]
-    start: list[int]
-    column: list[int]
-    diagonal: list[int]
-    place: list[int]
-    own: list[int]
+    order: list[int]  # the unknown of each row
+    start: list[int]  # row i has the entries from start[i] to start[i + 1],
+    column: list[int]  # in these columns, which go up;
+    diagonal: list[int]  # diagonal[i] is the one of its own
+    place: list[int]  # for each entry of J the entry of the factors where it goes
+    own: list[int]  # for each unknown which entry of J is the derivative of its flow by itself, -1 for none
 
     @property
     def size(self) -> int:
@@ -108,39 +95,20 @@ class Variation:
     J is f_x for x and again for each column, next to which it has how f_x S + f_p varies with x. So the factors of
     c I - h f_x serve every column: each is a right-hand side more. What does not flow has no equation.
 
-    Attributes
-    ----------
-    own : int
-        How many states x has; they are the first ones.
-    columns : list of int
-        Where each column begins, and where the last one ends: behind it states do not flow.
-    rows : list of int
-        For each state of a column, from ``columns[0]`` on, which state of x it is the derivative of.
-    entries : int
-        How many entries of J are those of f_x for x; they are the first ones.
-    links : list of int
-        The entries of J that are derivatives of a column by x.
-    linked, linking : list of int
-        For each of them which state it is the derivative of, and by which.
-    itself : list of int
-        For each state which entry of J is the derivative of its flow by itself, -1 for none.
-    groups : list of int
-        Numbers of states of x that depend on each other, where f_x is dense. Rows of one group exchange places in an
-        elimination, and no others: what no other group moves stays exactly zero.
-    elimination : Elimination, optional
-        The pattern for f_x, where it is sparse.
+    ``groups`` are numbers of states of x that depend on each other, where f_x is dense. Rows of one group exchange
+    places in an elimination, and no others: what no other group moves stays exactly zero.
     """
 
-    own: int
-    columns: list[int]
-    rows: list[int]
-    entries: int
-    links: list[int]
-    linked: list[int]
-    linking: list[int]
-    itself: list[int]
+    own: int  # how many states x has; they are the first ones
+    columns: list[int]  # where each column begins, and where the last one ends: behind it states do not flow
+    rows: list[int]  # for each state of a column, from columns[0] on, which state of x it is the derivative of
+    entries: int  # how many entries of J are those of f_x for x; they are the first ones
+    links: list[int]  # the entries of J that are derivatives of a column by x;
+    linked: list[int]  # for each of them which state it is the derivative of,
+    linking: list[int]  # and by which
+    itself: list[int]  # for each state which entry of J is the derivative of its flow by itself, -1 for none
     groups: list[int]
-    elimination: Elimination | None
+    elimination: Elimination | None  # the pattern for f_x, where it is sparse
 
 
 @lru_cache(maxsize=64)

@@ -106,21 +106,11 @@ def meant_alone(name: str, known: Iterable[str]) -> str | None:
 
 
 class Layout(NamedTuple):
-    """Where parts are among the states of their system, as numbers and letters for other languages.
+    """Where parts are among the states of their system, as numbers and letters for other languages."""
 
-    Attributes
-    ----------
-    numbers : tuple of int
-        The place of each part's number among the states, -1 for a part with one mode.
-    owners : tuple of int
-        The part that each state is of, -1 for the numbers of modes.
-    owned : tuple of str
-        For each state and each mode of its part ``1`` where the mode has it, else ``0``.
-    """
-
-    numbers: tuple[int, ...]
-    owners: tuple[int, ...]
-    owned: tuple[str, ...]
+    numbers: tuple[int, ...]  # the place of each part's number among the states, -1 for a part with one mode
+    owners: tuple[int, ...]  # the part that each state is of, -1 for the numbers of modes
+    owned: tuple[str, ...]  # for each state and each mode of its part `1` where the mode has it, else `0`
 
 
 def layout_of(parts: Sequence[Part], states: Sequence[str]) -> Layout:

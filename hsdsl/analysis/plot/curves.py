@@ -214,32 +214,18 @@ Pair = tuple[str, str]
 class View:
     """What is shown of one run, or of several in one picture.
 
-    Attributes
-    ----------
-    columns : sequence of str or None
-        The states and outputs over time, in this order; None for all but those that only tell the time.
-    phases : sequence of pairs or None
-        States or outputs against each other, across and up; None for one pair where all modes
-        have the same two that flow, clocks aside.
-    guards : sequence of GuardLine
-        Levels at which transitions fire.
-    units : mapping
-        Units of states and outputs, and of time under the name ``t``.
-    title : str or None
-        Replaces the model's title (or its path, where it has none).
-    labels : sequence of str
-        A name for each of several runs.
-    program : Program or None
-        The model, whose mode graph is in a page.
+    ``columns`` are the states and outputs over time, in this order; None for all but those that only tell the time.
+    ``phases`` are states or outputs against each other, across and up; None for one pair where all modes have the same
+    two that flow, clocks aside.
     """
 
     columns: Sequence[str] | None = None
     phases: Sequence[Pair] | None = None
-    guards: Sequence[GuardLine] = ()
-    units: Mapping[str, str] = field(default_factory=dict[str, str])
-    title: str | None = None
-    labels: Sequence[str] = ()
-    program: Program | None = None
+    guards: Sequence[GuardLine] = ()  # levels at which transitions fire
+    units: Mapping[str, str] = field(default_factory=dict[str, str])  # of states and outputs, and of time by `t`
+    title: str | None = None  # replaces the model's title (or its path, where it has none)
+    labels: Sequence[str] = ()  # a name for each of several runs
+    program: Program | None = None  # the model, whose mode graph is in a page
 
     def names(self, runs: Sequence[Execution]) -> list[str]:
         """Return the columns over time.

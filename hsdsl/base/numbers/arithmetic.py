@@ -24,33 +24,15 @@ NOTHING = 2.0**-960  # below this numbers of float64 have no digits left
 
 @dataclass(frozen=True, eq=False)
 class Arithmetic:
-    """A number type.
-
-    Attributes
-    ----------
-    name : str
-        ``float64`` or ``mpmath``.
-    digits : int or None
-        Decimal digits; None for float64.
-    bits : int
-        Of the significand.
-    unit : Number
-        The unit round-off u, 2**-bits.
-    constant : callable
-        The nearest number to an exact fraction.
-    isfinite : callable
-        Whether a number is finite.
-    functions : mapping
-        What generated code may call, by name.
-    """
+    """A number type: ``float64`` or ``mpmath``, by its ``name``."""
 
     name: str
-    digits: int | None
-    bits: int
-    unit: Number
-    constant: Callable[[Fraction], Number]
+    digits: int | None  # decimal digits; None for float64
+    bits: int  # of the significand
+    unit: Number  # the unit round-off u, 2**-bits
+    constant: Callable[[Fraction], Number]  # the nearest number to an exact fraction
     isfinite: Callable[[Number], bool]
-    functions: Mapping[str, Any]
+    functions: Mapping[str, Any]  # what generated code may call, by name
 
     @cached_property
     def zero(self) -> Number:

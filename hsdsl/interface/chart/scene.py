@@ -25,19 +25,8 @@ DIGITS = 8  # of a refined reference: each takes longer than the one before
 class Scene:
     """A model at given numbers, and its exact execution at sample times.
 
-    Attributes
-    ----------
-    grid : array, shape (samples,)
-        Equally spaced times from 0 to the exact execution's end, or as far as a run is to go.
-    clear : array of bool, shape (samples,)
-        Whether a sample is so far from every exact jump that a slightly late jump changes nothing.
-    exact_values, exact_modes : array
-        The exact execution at the samples, as in `Result`.
-    countable : (float, float)
-        The fewest and the most transitions of a right result: those near the end may be missed, and past a Zeno point
-        any number counts.
-    parameters : mapping
-        Those that differ from the model's own.
+    ``countable`` is the fewest and the most transitions of a right result: those near the end may be missed, and past a
+    Zeno point any number counts.
     """
 
     name: str
@@ -45,12 +34,12 @@ class Scene:
     initial: Mapping[str, Any]
     exact: Execution
     states: tuple[str, ...]
-    grid: Array
-    clear: Array
-    exact_values: Array
+    grid: Array  # equally spaced times from 0 to the exact execution's end, or as far as a run is to go
+    clear: Array  # whether a sample is so far from every exact jump that a slightly late jump changes nothing
+    exact_values: Array  # the exact execution at the samples, as in `Result`
     exact_modes: Array
     countable: tuple[float, float]
-    parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])
+    parameters: Mapping[str, Any] = field(default_factory=dict[str, Any])  # those that differ from the model's own
 
     @staticmethod
     def of(
@@ -177,25 +166,13 @@ class NotFinite(Refused):
 
 @dataclass(frozen=True)
 class Result:
-    """A run at the scene's sample times; modes and transitions are computed outside the clock.
+    """A run at the scene's sample times; modes and transitions are computed outside the clock."""
 
-    Attributes
-    ----------
-    values : array, shape (samples, states of the scene)
-        NaN where the run has no value (its mode lacks the state, or it ended before).
-    find_modes, count : callable
-        They give `modes` and `transitions`.
-    problem : str or None
-        Why the run did not get to its end, in the tool's words; None if it did.
-    execution : Execution or None
-        Of our own runs.
-    """
-
-    values: Array
-    find_modes: Callable[[], Array]
-    count: Callable[[], int | None]
-    problem: str | None = None
-    execution: Execution | None = None
+    values: Array  # (samples, states); NaN where the mode lacks the state, or the run ended before
+    find_modes: Callable[[], Array]  # gives `modes`
+    count: Callable[[], int | None]  # gives `transitions`
+    problem: str | None = None  # why the run did not get to its end, in the tool's words; None if it did
+    execution: Execution | None = None  # of our own runs
 
     @property
     def interrupted(self) -> bool:
