@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -53,30 +54,41 @@ class Counts(NamedTuple):
 
 
 class Gathered:
-    """Columns of a long run, as arrays; rows have as many states as the largest mode has that the run was in."""
+    """Columns of a long run, as arrays; rows have as many states as the largest mode has that the run was in.
 
-    def __init__(self, arrays: dict[str, Array], width: int) -> None:
-        if width < arrays["values"].shape[1]:
-            for name in ("values", "coefficients"):
-                arrays[name] = np.ascontiguousarray(arrays[name][..., :width])
-        self._arrays = arrays
+    The chunks that the run has written are joined on first use: to copy all of them takes longer than many a run.
+    """
+
+    def __init__(self, chunks: list[dict[str, Array]], rows: int, width: int) -> None:
+        self._chunks, self.rows, self._width = chunks, rows, width
+        self._arrays: dict[str, Array] = {}
 
     def __getitem__(self, name: str) -> Array:
+        if name not in self._arrays:
+            own = "pieces" if name == "coefficients" else name
+            with suppress(KeyError):  # another thread has joined them
+                self._arrays[name] = self._joined(name, [chunk[own] for chunk in self._chunks])
+            for chunk in self._chunks:
+                chunk.pop(own, None)
         return self._arrays[name]
 
-    @property
-    def rows(self) -> int:
-        """How many rows there are."""
-        return len(self._arrays["times"])
+    def _joined(self, name: str, parts: list[Array]) -> Array:
+        """One column; a row's piece, which led to it in the run, leaves it here."""
+        if name == "coefficients":
+            parts = [parts[0][1:], *parts[1:]]
+            parts = [*(part[:-1] for part in parts[:-1]), parts[-1]]
+        if name in ("values", "coefficients"):
+            parts = [part[..., : self._width] for part in parts]
+        return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts))
 
     @property
     def notes(self) -> int:
         """How many notes there are."""
-        return len(self._arrays["note"])
+        return len(self["note"])
 
     @cached_property
     def _record(self) -> Any:
-        of, names = self._arrays, ("times", "values", "outputs", "coefficients", "arc", *BY_TRANSITION)
+        of, names = self, ("times", "values", "outputs", "coefficients", "arc", *BY_TRANSITION)
         rows, degree, width = of["coefficients"].shape
         sizes = rows, len(of["arc"]), len(of["transition"]), width, degree, of["outputs"].shape[1]
         return structures.Record(*sizes, *(of[name].ctypes.data for name in names))

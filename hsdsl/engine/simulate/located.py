@@ -2,9 +2,9 @@
 
 A step is as long as its error allows (`Steps`). Every crossing of every surface inside it is isolated on the
 surface's own polynomial (`surfaces`); the earliest goes, at its own instant, and flow goes on from its reset
-(`transitions`). Guards may hold the state, and a Zeno tail is replaced by its limit (`contact`). A cascade at one
-instant costs no time, unless more than `FREE` transitions fall within the relaxation: then each of the others waits in
-a strip.
+(`transitions`). What rises behind it is not corrected on the surface. Guards may hold the state, and a Zeno tail is
+replaced by its limit (`contact`). A cascade at one instant costs no time, unless more than `FREE` transitions fall
+within the relaxation: then each of the others waits in a strip.
 
 A guard is only *reached* where the flow has no value beyond it, as that of an empty tank: h' = -sqrt(h) with h <= 0
 (`reaches`). The execution comes to the surface tangentially, in finite time. A step's polynomial ends there, or turns
@@ -13,9 +13,10 @@ back there as the equation does not: at its end the flow still leads towards the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
@@ -50,6 +51,7 @@ from hsdsl.engine.simulate.surfaces import (
     Crossing,
     Curves,
     Piece,
+    Rise,
     StepFailure,
     TooFast,
     at,
@@ -152,9 +154,8 @@ def follow(run: Run, here: ModeState, limit: Number) -> Event | ModeState | Stop
 def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> Event | Stop | None:
     """Say what happens first along a step: a guard, a wall with no guard on it, or nothing."""
     edges = len(here.mode.edges)
-    found = [c for k in range(len(span.curves)) if (c := first_crossing(run, here, span, k))]
-    walls = [c for c in found if c.edge >= edges]
-    guards = [c for c in found if c.edge < edges and not here.surfaces.too_late(c.edge, c.time, run.tie(c.time))]
+    found = crossings_along(run, here, span)
+    walls, guards = [c for c in found if c.edge >= edges], [c for c in found if c.edge < edges]
     wall = min(walls, key=lambda c: c.time, default=None)
     if wall and not any(c.time <= wall.time + run.tie(wall.time) for c in guards):
         standing = here.surfaces.standing(wall.time, wall.state, run.tie(wall.time))
@@ -196,22 +197,81 @@ def write(here: ModeState, span: Span, crossing: Crossing) -> None:
         here.arc.append(crossing.time, crossing.state, span.cut(crossing.theta))
 
 
-def first_crossing(run: Run, here: ModeState, span: Span, k: int) -> Crossing | None:
-    """Find the first point of a step where surface k is crossed and its condition holds."""
-    zero, unit, surfaces = run.arithmetic.zero, run.arithmetic.unit, here.surfaces
-    pieces = deflated(span.curves[k]) if k in surfaces.active else span.curves[k]
+def crossings_along(run: Run, here: ModeState, span: Span) -> list[Crossing]:
+    """The first crossing of each surface of a step, in their order.
+
+    Surfaces that rise behind the first of all are left out. There they are inside, beyond round-off and by more than
+    they rise while crossings are tied. Not those of an implicit method: to a point of its step it iterates from the
+    one before.
+    """
+    found: dict[int, Crossing] = {}
+    waiting: dict[int, tuple[Rise, Iterator[Rise]]] = {}
+
+    def keep(crossing: Crossing | None) -> None:
+        strict = crossing and crossing.edge < len(here.mode.edges)
+        if crossing and not (strict and here.surfaces.too_late(crossing.edge, crossing.time, run.tie(crossing.time))):
+            found[crossing.edge] = crossing
+
+    for k in range(len(span.curves)):
+        rises = rises_of(here, span, k, run.arithmetic.unit)
+        rise = next(rises, None)
+        if rise is None:
+            keep(reaches(run, here, span, k, pieces_of(here, span, k)))
+        elif run.control.implicit:
+            keep(first_crossing(run, here, span, k, rise, rises))
+        else:
+            waiting[k] = rise, rises
+    while waiting and not found:
+        k = min(waiting, key=lambda k: waiting[k][0][0])
+        keep(first_crossing(run, here, span, k, *waiting.pop(k)))
+    first = min(found.values(), key=lambda c: c.time, default=None)
+    behind = {k for k, (rise, _) in waiting.items() if first and is_behind(run, here, first, k, rise)}
+    for k in waiting:
+        if k not in behind:
+            keep(first_crossing(run, here, span, k, *waiting[k]))
+    return [found[k] for k in sorted(found)]
+
+
+def is_behind(run: Run, here: ModeState, first: Crossing, k: int, rise: Rise) -> bool:
+    """Whether surface k rises behind the first crossing of a step."""
+    share, _, certain = rise
+    if not certain or not share > first.theta:
+        return False
+    t, x = first.time, first.state
+    value, noise = here.kernel.surfaces(t, *x)[k], here.surfaces.roundoff_bound(k, t, x)
+    try:
+        return value < -max(noise, abs(here.kernel.rates[k](t, *x)[0]) * run.tie(t))
+    except DOMAIN_ERRORS:
+        return False
+
+
+def pieces_of(here: ModeState, span: Span, k: int) -> list[Piece]:
+    """The polynomials of surface k."""
+    return deflated(span.curves[k]) if k in here.surfaces.active else span.curves[k]
+
+
+def rises_of(here: ModeState, span: Span, k: int, unit: Number) -> Iterator[Rise]:
+    """Where surface k rises along a step, on its polynomials."""
+    surfaces, pieces = here.surfaces, pieces_of(here, span, k)
     if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
-        return reaches(run, here, span, k, pieces)
+        return
     first, last = surfaces.roundoff_bound(k, span.t, span.x), surfaces.roundoff_bound(k, span.t1, span.z)
     beyond = pieces[0].coefficients[0] > first
-    for share, slope, certain in rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit):
+    yield from rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit)
+
+
+def first_crossing(
+    run: Run, here: ModeState, span: Span, k: int, rise: Rise, further: Iterator[Rise]
+) -> Crossing | None:
+    """Find the first point of a step, from its first rise on, where surface k is crossed and its condition holds."""
+    for share, slope, certain in chain([rise], further):
         theta, time, q = settled(here, span, k, share, slope)
         holds = k >= len(here.mode.edges) or here.kernel.conditions[k](time, *q)[0]
-        if holds or (k in surfaces.active and holds_next(run, here, k, time, q)):
+        if holds or (k in here.surfaces.active and holds_next(run, here, k, time, q)):
             if not certain:
                 run.diagnostics.unsettled(here.mode.name, k, time)
-            return Crossing(k, theta, time, q, zero)
-    return reaches(run, here, span, k, pieces)
+            return Crossing(k, theta, time, q, run.arithmetic.zero)
+    return reaches(run, here, span, k, pieces_of(here, span, k))
 
 
 def with_unseen(run: Run, here: ModeState, span: Span, guards: list[Crossing]) -> list[Crossing]:

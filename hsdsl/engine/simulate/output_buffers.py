@@ -152,17 +152,12 @@ class OutputBuffers:
             return Packed(pack, self.counts, self._shape)
         chunks = [*self._full, self._written()]
         chunks[-1]["pieces"][-1] = 0.0  # nothing leaves the last row
-        self._full = []
+        rows = sum(len(chunk["times"]) for chunk in chunks)
         if len(chunks) > 1:
-            whole = {name: np.concatenate([chunk[name] for chunk in chunks]) for name in chunks[0] if name != "pieces"}
-            pieces = [chunk["pieces"][:-1] for chunk in chunks]
-            whole["coefficients"] = np.concatenate([pieces[0][1:], *pieces[1:], chunks[-1]["pieces"][-1:]])
-            self._before = min(len(whole["times"]) * 9 // 8, MOST_KEPT // self._row_bytes)
-        else:
-            whole = chunks[0]
-            whole["coefficients"] = whole.pop("pieces")[1:]
-        self._rows, self._columns = 0, {}
-        return Gathered(whole, layouts.width(layouts.of_arcs(whole["arc"]["mode"])))
+            self._before = min(rows * 9 // 8, MOST_KEPT // self._row_bytes)
+        self._full, self._rows, self._columns = [], 0, {}
+        modes = np.concatenate([chunk["arc"]["mode"] for chunk in chunks])
+        return Gathered(chunks, rows, layouts.width(layouts.of_arcs(modes)))
 
 
 def last_arc(whole: Columns, program: Program, layouts: StateLayouts) -> Arc:

@@ -26,18 +26,6 @@ typedef int hs_allowed(hs_run *run, int k, hs_real *allowed);
 /* Surface k at the share s of a step. */
 typedef int hs_value(hs_run *run, const hs_polynomial *piece, int k, hs_real s, hs_real *r);
 
-/* Where a surface rises above its level: the root before it, its slope there, by the share of the step. */
-typedef struct {
-  hs_real share, slope;
-  int certain;
-} hs_rise;
-
-/* A walk along surface k; `outside` says at first whether it begins beyond round-off, `risen` whether it ends there. */
-typedef struct {
-  int k, risen, outside, part;
-  hs_real level, at;
-} hs_walk;
-
 static const hs_found CLEAR = {HS_CLEAR, -1, 0}, NOT_FINITE = {HS_NOT_FINITE, -1, 0};
 static const hs_found TOO_WRONG = {HS_ERROR, -1, 0}, UNSOLVED = {HS_UNSOLVED, -1, 0};
 

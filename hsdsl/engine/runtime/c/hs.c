@@ -123,7 +123,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
   hs_real **const states[] = {&run->q, &run->other_end, &run->began, 0};
-  hs_real **const values[] = {&run->ends, &run->starts, &run->middle, 0};
+  hs_real **const values[] = {&run->ends, &run->starts, &run->middle, &run->ended, 0};
   take_each(store, w, states);
   run->other_k = take_stages(store, run);
   take_each(store, m, values);
@@ -132,6 +132,7 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->bernstein = numbers(store, most + 1);
   run->binomials = numbers(store, (int64_t)(most + 1) * (most + 2) / 2);
   if (store->numbers) fill_binomials(run->binomials, most);
+  run->waiting = take(store, m, sizeof(hs_riser));
   run->cuts = take(store, MOST_CUTS, sizeof(hs_cut));
   for (int i = 0; i < MOST_CUTS; i++) {
     hs_real *b = numbers(store, most + 1);

@@ -73,6 +73,7 @@ static void begin_span(hs_run *run, hs_real h, hs_time t1) {
   span->t = run->here.t;
   span->h = h;
   span->t1 = t1;
+  run->weighed = 0;
   copy(span->x, run->x, run->here.dimension);
 }
 
@@ -193,7 +194,7 @@ static hs_real longest(const hs_run *run, int n) {
 
 static int noise_at_end(hs_run *run, int k, hs_real *allowed) {
   hs_real noise;
-  if (roundoff_bound(run, k, run->span.t1, run->z, 0, &noise)) return RAISED;
+  if (bound_at(run, k, AT_END, &noise)) return RAISED;
   *allowed = 4 * noise;
   return 0;
 }
@@ -333,7 +334,7 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   const hs_real *const c = coefficients_of(&run->curves, 0, k);
   const int n = *degree_of(&run->curves, 0, k);
-  hs_real rate, share = 1.0;
+  hs_real rate, noise, share = 1.0;
   if (!may_be_reached(run, k)) return 0;
   const hs_real slope = slope_at_end(c, n);
   if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
@@ -346,9 +347,8 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
     crossing->time = span->t + share * span->h;
     at(run, &span->piece, share, crossing->state);
   } else {
-    if (!run->weighed && magnitudes_at(run, span->t, run->x, run->begun)) return RAISED;
-    run->weighed = 1;
-    if (!(fabs(run->ends[k]) <= bound_from(run, run->begun, k, span->t, run->x, 0))) return 0;
+    if (bound_at(run, k, AT_START, &noise)) return RAISED;
+    if (!(fabs(run->ends[k]) <= noise)) return 0;
   }
   const int ends = ends_at(run, k, crossing);
   if (ends != 1) return ends;
@@ -411,27 +411,101 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
   return span_point(run, best, &crossing->time, &crossing->state);
 }
 
-/* Find the first point of the step where surface k is crossed and its condition holds: 1, or 0. */
-static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
-  const hs_span *span = &run->span;
+/* Find where surface k first rises along the step: run->waiting says so; 1 where it is reached without a rise, else 0. */
+static int first_rise(hs_run *run, int k, hs_crossing *crossing) {
+  hs_riser *const waiting = &run->waiting[k];
   hs_real first, last;
+  waiting->open = 0;
   if (is_passed_by(run, k)) return reaches(run, k, crossing);
-  if (roundoff_bound(run, k, span->t, run->x, 0, &first) || roundoff_bound(run, k, span->t1, run->z, 0, &last))
-    return RAISED;
+  if (bound_at(run, k, AT_START, &first) || bound_at(run, k, AT_END, &last)) return RAISED;
   const int beyond = coefficients_of(&run->curves, 0, k)[0] > first;
-  hs_walk walk = begin_walk(k, hs_max(first, last), beyond, run->ends[k] > last);
-  hs_rise rise;
-  while (next_rise(run, &walk, &rise)) {
-    if (settled(run, k, &rise, crossing)) return RAISED;
+  waiting->walk = begin_walk(k, hs_max(first, last), beyond, run->ends[k] > last);
+  waiting->open = next_rise(run, &waiting->walk, &waiting->rise);
+  return waiting->open ? 0 : reaches(run, k, crossing);
+}
+
+/* Find the first point of the step, from its first rise on, where surface k is crossed and its condition holds: 1, or 0. */
+static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
+  hs_riser *const waiting = &run->waiting[k];
+  hs_rise *const rise = &waiting->rise;
+  waiting->open = 0;
+  do {
+    if (settled(run, k, rise, crossing)) return RAISED;
     const int holds = k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
     if (holds == RAISED) return RAISED;
     if (!holds && !(run->active_surfaces[k] && holds_next(run, k, crossing->time, crossing->state))) continue;
-    if (!rise.certain) note_unsettled(run, k, crossing->time);
+    if (!rise->certain) note_unsettled(run, k, crossing->time);
     crossing->edge = k;
     crossing->depth = 0.0;
     return 1;
-  }
+  } while (next_rise(run, &waiting->walk, rise));
   return reaches(run, k, crossing);
+}
+
+/* Keep the crossing of surface k where one was `found` that counts, else mark that it has none; return the first one. */
+static const hs_crossing *kept_crossing(hs_run *run, const hs_crossing *first, int k, int found) {
+  hs_crossing *const crossing = &run->crossings[k];
+  if (!found || (k < run->here.table->edges && too_late(run, k, crossing->time, tie(crossing->time)))) {
+    crossing->edge = -1;
+    return first;
+  }
+  return !first || crossing->time < first->time ? crossing : first;
+}
+
+/* Mark in run->beyond the surfaces that rise behind the first crossing: there they are inside, beyond round-off and by
+   more than they rise while crossings are tied. */
+static int mark_behind(hs_run *run, const hs_crossing *first) {
+  const hs_mode *mode = run->here.table;
+  const hs_real since = tie(first->time);
+  int known = 0; /* whether run->values and run->magnitudes are those at the crossing */
+  for (int k = 0; k < mode->surfaces; k++) {
+    const hs_riser *const waiting = &run->waiting[k];
+    hs_real rate;
+    run->beyond[k] = 0;
+    if (!waiting->open || !waiting->rise.certain || !(waiting->rise.share > first->theta)) continue;
+    if (!known && (mode->values(run->here.p, first->time, first->state, run->values) ||
+                   magnitudes_at(run, first->time, first->state, run->magnitudes)))
+      return RAISED;
+    known = 1;
+    if (mode->rates[k](run->here.p, first->time, first->state, &rate)) continue;
+    const hs_real noise = bound_from(run, run->magnitudes, k, first->time, first->state, 0);
+    run->beyond[k] = run->values[k] < -hs_max(noise, fabs(rate) * since);
+  }
+  return 0;
+}
+
+/* Find the first crossing of each surface of the step, to its place in run->crossings, with edge -1 where there is none.
+   Surfaces that rise behind the first of all are not looked at any closer, but of an implicit method: to a point of its
+   step it iterates from the one before. */
+static int crossings_along(hs_run *run) {
+  const hs_mode *mode = run->here.table;
+  const hs_crossing *first = 0;
+  int open = 0;
+  for (int k = 0; k < mode->surfaces; k++) {
+    int found = first_rise(run, k, &run->crossings[k]);
+    if (run->waiting[k].open && run->control.implicit) found = first_crossing(run, k, &run->crossings[k]);
+    if (found == RAISED) return RAISED;
+    first = kept_crossing(run, first, k, found);
+    open += run->waiting[k].open;
+  }
+  for (; open && !first; open--) {
+    int next = -1;
+    for (int k = 0; k < mode->surfaces; k++)
+      if (run->waiting[k].open && (next < 0 || run->waiting[k].rise.share < run->waiting[next].rise.share)) next = k;
+    const int found = first_crossing(run, next, &run->crossings[next]);
+    if (found == RAISED) return RAISED;
+    first = kept_crossing(run, first, next, found);
+  }
+  if (open && mark_behind(run, first)) return RAISED;
+  for (int k = 0; open && k < mode->surfaces; k++) {
+    if (!run->waiting[k].open) continue;
+    open--;
+    if (run->beyond[k]) continue;
+    const int found = first_crossing(run, k, &run->crossings[k]);
+    if (found == RAISED) return RAISED;
+    first = kept_crossing(run, first, k, found);
+  }
+  return 0;
 }
 
 /* Whether a crossing's state is on a surface that the state was on that it came from, or one holds it: 1, 0 or RAISED. */
@@ -536,15 +610,15 @@ static int first_event(hs_run *run) {
   const hs_mode *mode = run->here.table;
   int guards = 0, tied = 0;
   hs_crossing *wall = 0;
-  run->weighed = 0;
+  if (crossings_along(run)) return WITHOUT_VALUE;
   for (int k = 0; k < mode->surfaces; k++) {
-    hs_crossing *const crossing = &run->crossings[k < mode->edges ? guards : k];
-    const int found = first_crossing(run, k, crossing);
-    if (found == RAISED) return WITHOUT_VALUE;
-    if (!found || (k < mode->edges && too_late(run, k, crossing->time, tie(crossing->time)))) continue;
-    if (k < mode->edges)
-      guards++;
-    else if (!wall || crossing->time < wall->time)
+    hs_crossing *const crossing = &run->crossings[k];
+    if (crossing->edge < 0) continue;
+    if (k < mode->edges) {
+      const hs_crossing other = run->crossings[guards];
+      run->crossings[guards++] = *crossing;
+      *crossing = other;
+    } else if (!wall || crossing->time < wall->time)
       wall = crossing;
   }
   for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(wall->time);

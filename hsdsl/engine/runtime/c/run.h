@@ -180,6 +180,25 @@ typedef struct {
   int *degree, *certain; /* for each part and surface */
 } hs_curves;
 
+/* Where a surface rises above its level: the root before it, its slope there, by the share of the step. */
+typedef struct {
+  hs_real share, slope;
+  int certain;
+} hs_rise;
+
+/* A walk along surface k; `outside` says at first whether it begins beyond round-off, `risen` whether it ends there. */
+typedef struct {
+  int k, risen, outside, part;
+  hs_real level, at;
+} hs_walk;
+
+/* A surface that rises along the step, first at `rise`, and whether its crossing there is still to be settled. */
+typedef struct {
+  hs_walk walk;
+  hs_rise rise;
+  int open;
+} hs_riser;
+
 /* One step of the located scheme. */
 typedef struct {
   hs_time t, t1;
@@ -222,7 +241,7 @@ typedef struct {
   int expanded;        /* whether it has written them, in this mode */
   hs_radau radau;
   hs_real *values, *ahead, *magnitudes, *noise; /* one for each surface */
-  hs_real *begun; /* magnitudes at the start of the located step, where `weighed` */
+  hs_real *begun, *ended; /* magnitudes at the ends of the located step: `weighed` says at which */
   int weighed;
   int *active_surfaces, *beyond, *emerging;
   hs_real *source;      /* the flow that led to a transition, or between two states */
@@ -247,6 +266,7 @@ typedef struct {
   int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
   hs_real ratio;                     /* of the last error estimate */
   hs_curves curves;
+  hs_riser *waiting;               /* one for each surface */
   hs_cut *cuts;
   const hs_real *bernstein_of;       /* the polynomial that `bernstein` has the coefficients of, 0 for none */
   hs_real *bernstein, *binomials, *left, *rows;

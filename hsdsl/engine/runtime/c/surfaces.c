@@ -80,6 +80,19 @@ static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int e
   return 0;
 }
 
+enum { AT_START = 1, AT_END = 2 };
+
+/* The bound of surface k at the start or the end of the located step, whose magnitudes are made once. */
+static int bound_at(hs_run *run, int k, int end, hs_real *noise) {
+  const hs_time t = end == AT_END ? run->span.t1 : run->span.t;
+  const hs_real *const x = end == AT_END ? run->z : run->x;
+  hs_real *const magnitudes = end == AT_END ? run->ended : run->begun;
+  if (!(run->weighed & end) && magnitudes_at(run, t, x, magnitudes)) return RAISED;
+  run->weighed |= end;
+  *noise = bound_from(run, magnitudes, k, t, x, 0);
+  return 0;
+}
+
 /* Look at the surfaces on entry, whose values are run->ahead: mark in run->beyond those the state is beyond, and note
    those it stands on. A surface that the flow passes within the time `since` counts as stood on. So does one that the
    state was not beyond when it was reset, before it waited in a strip. Where an input `jumped`, one that run->beyond

@@ -28,7 +28,7 @@
 #define HS_LOCATED_SPACE_OF(w, m, modes, stages, extra, degree, most)                                        \
   (3 * HS_TAKEN(m, int) + 2 * HS_SPAN(w, degree) + 3 * HS_NUMBERS(w) + \
    HS_NUMBERS(2 * (w)) + \
-   HS_STAGES(w, (stages) + 1 + (extra)) + 3 * HS_NUMBERS(m) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) +                                              \
+   HS_STAGES(w, (stages) + 1 + (extra)) + 4 * HS_NUMBERS(m) + HS_TAKEN(m, hs_riser) + HS_NUMBERS(((most) + 1 + HS_TESTS) * (m)) +                                              \
    (2 + MOST_CUTS) * HS_NUMBERS((most) + 1) + HS_NUMBERS(((most) + 1) * ((most) + 2) / 2) +                        \
    HS_TAKEN(MOST_CUTS, hs_cut) + HS_TAKEN((modes) * (m), int) + HS_NUMBERS(modes) + HS_TAKEN(modes, int) +         \
    2 * HS_NUMBERS(MOST_PARTS) + HS_NUMBERS(MOST_PARTS * (m) * ((most) + 1)) + HS_NUMBERS(MOST_PARTS * (m)) +       \
