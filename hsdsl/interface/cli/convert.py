@@ -92,12 +92,19 @@ WRITTEN_TO = "The model's file (.yaml); left out, the model is printed."
 URGENT = "SpaceEx: make a transition as soon as its guard holds, where SpaceEx may wait."
 
 
+AT = (
+    "SpaceEx: a point of an initial set, centre, lower, upper or NAME=VALUE. May be repeated. Without it an initial "
+    "box is kept: a run takes its centre, a sweep draws from it."
+)
+
+
 def import_(
     file: Annotated[Path, Argument(metavar="FILE", help=FILE)],
     cfg: Annotated[Path | None, option("FILE", CFG)] = None,
     out: Annotated[Path | None, option("FILE", WRITTEN_TO)] = None,
     force: Annotated[bool, Option("--force", help="Replace a file that is there.")] = False,
     urgent: Annotated[bool, Option("--urgent", help=URGENT)] = False,
+    at: Annotated[list[str] | None, option("POINT", AT)] = None,
     until: Until = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -110,7 +117,7 @@ def import_(
             raise UsageError(f"--out {out}: the file is there already", "--force replaces it")
         from hsdsl.base.atomic import replacing
 
-        text, system = _imported(file, cfg, until, urgent)
+        text, system = _imported(file, cfg, until, urgent, at or [])
         if out is None:
             print(text, end="")
             return
@@ -123,7 +130,7 @@ def import_(
             say(f"wrote {out}: {counted(len(system.modes), 'mode')}, {counted(edges, 'transition')}")
 
 
-def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool) -> tuple[str, HybridSystem]:
+def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool, at: list[str]) -> tuple[str, HybridSystem]:
     """The text of the model in a file of one of the formats, and its mathematics."""
     from hsdsl.interface.imports import sbml, spaceex
     from hsdsl.interface.model import loads
@@ -132,10 +139,11 @@ def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool) -> 
 
     root = read_xml(str(file), read_bytes(file), sbml.DEEPEST)
     if not sbml.is_sbml(root):
-        text = spaceex.imported(file, cfg, until, urgent)
+        text = spaceex.imported(file, cfg, until, urgent, at)
         return text, loads(text).system
-    if cfg is not None or urgent:
-        raise UsageError(f"{'--cfg' if cfg else '--urgent'} is for models of SpaceEx, and {file} is one of SBML")
+    given = [name for name, value in (("--cfg", cfg), ("--urgent", urgent), ("--at", at)) if value]
+    if given:
+        raise UsageError(f"{given[0]} is for models of SpaceEx, and {file} is one of SBML")
     text = sbml.imported(root, until)
     try:
         return text, loads(text).system

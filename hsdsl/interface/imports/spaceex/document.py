@@ -8,17 +8,21 @@ component runs, where it starts, and for how long.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from hsdsl.base.errors import Diagnostic, ModelError
 from hsdsl.base.names import closest, shown
+from hsdsl.language.expression import plain
 from hsdsl.language.expression.parse import ExpressionError, Name, parse, walk
-from hsdsl.language.expression.plain import names_in, value
 from hsdsl.language.expression.scope import RESERVED
 from hsdsl.language.source.nodes import Text, decode
 from hsdsl.language.source.xml import Element, Passage, read_xml
+
+MOST_TEXTS = 100_000  # a product has the same few expressions in many places
+value, names_in = lru_cache(MOST_TEXTS)(plain.value), lru_cache(MOST_TEXTS)(plain.names_in)
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 T = TypeVar("T")
@@ -43,6 +47,7 @@ class Location:
     invariant: tuple[Relation, ...]
     flow: tuple[Relation, ...]
     element: Element
+    passing: bool  # whether time may pass: the flow is not `false`
 
 
 @dataclass(frozen=True)
@@ -121,6 +126,8 @@ def _once(found: dict[str, T], name: str, entry: T, element: Element) -> None:
 
 def _name(element: Element, attribute: str) -> str:
     name = element.attribute(attribute)
+    if element.attributes.get("type") == "label":
+        return name
     if not _NAME.fullmatch(name):
         message = f"expected a name of letters, digits and underscores, got '{shown(name)}'"
         raise ModelError([element.fault("HS331", message)])
@@ -146,13 +153,11 @@ def _param(element: Element) -> Param:
 def _location(element: Element) -> Location:
     name = element.attributes.get("name") or element.attribute("id")
     flow = element.passage_of("flow")
-    if flow is not None and flow.text.strip() == "false":
-        hint = "join its transitions with those that lead to it"
-        raise ModelError([flow.fault("HS332", "time does not pass in this location, and passes in every mode", hint)])
+    passing = flow is None or flow.text.strip(" ()\t\n") != "false"
     invariant = element.passage_of("invariant")
     if invariant is not None and invariant.text.strip() == "false":
         raise ModelError([invariant.fault("HS332", "nothing can be in a location whose invariant is `false`")])
-    return Location(name, _note(element), _checked(invariant), _checked(flow), element)
+    return Location(name, _note(element), _checked(invariant), _checked(flow) if passing else (), element, passing)
 
 
 def _checked(passage: Passage | None) -> tuple[Relation, ...]:
@@ -186,7 +191,10 @@ def _bind(element: Element) -> Bind:
     return Bind(element.attribute("component"), _name(element, "as"), values, element)
 
 
-_AND = re.compile(r"&&?|\band\b")
+_AND = re.compile(r"&&?|\band\b|[()]")
+_OF_SET = re.compile(r"[<>=]|\btrue\b")  # in parentheses that hold relations, and no expression
+_DERIVATIVE = re.compile(r"([A-Za-z_]\w*)\s*'")
+BOUNDED, DERIVED = "a derivative that is only bounded leaves the flow open", "write x' == and its derivative"
 _RELATION = re.compile(r":=|==|<=|>=|!=|<|>|=")
 _EITHER = re.compile(r"\|\|?|\bor\b|!(?!=)|\bnot\b")
 MIRRORED = {"<=": ">=", ">=": "<=", "<": ">", ">": "<", "==": "=="}
@@ -238,62 +246,90 @@ class Relation:
 
 
 def relations(passage: Passage | None) -> list[Relation]:
-    """The relations of a conjunction; none where it is empty or `true`.
+    """The relations of a conjunction, in parentheses or not; none where it is empty or `true`.
 
     Raises ModelError: an alternative, a negation, or something that is no relation.
     """
-    if passage is None or passage.text.strip() in ("", "true"):
+    if passage is None or not passage.text.strip():
         return []
     if either := _EITHER.search(passage.text):
         message = "alternatives and negations cannot be kept: a set here is a conjunction of inequalities"
         hint = "write a transition or a location for each alternative"
         raise ModelError([passage.fault("HS332", message, hint, either.start(), either.end())])
-    found: list[Relation] = []
-    start = 0
-    for end, following in [*((m.start(), m.end()) for m in _AND.finditer(passage.text)), (len(passage.text), 0)]:
-        found += _chain(passage, start, end)
-        start = following
-    return found
+    return list(_conjunction(passage, 0, len(passage.text)))
 
 
-def _chain(passage: Passage, start: int, end: int) -> list[Relation]:
+def _conjunction(passage: Passage, start: int, end: int) -> Iterator[Relation]:
+    """The relations of the parts between `and`, and of those within parentheses of their own."""
+    depth, closing, begins = 0, [start], start
+    for mark in [*_AND.finditer(passage.text, start, end), None]:
+        if mark is not None and mark.group() in "()":
+            depth += 1 if mark.group() == "(" else -1
+            closing += [mark.end()] if depth == 0 else []
+            continue
+        if mark is not None and depth:
+            continue
+        stops = mark.start() if mark else end
+        part = passage.text[begins:stops]
+        first, last = begins + len(part) - len(part.lstrip()), begins + len(part.rstrip())
+        opened = [at for at in closing if first < at]
+        if part.strip().startswith("(") and opened[:1] == [last] and _OF_SET.search(passage.text, first, last):
+            yield from _conjunction(passage, first + 1, last - 1)
+        elif part.strip() != "true":
+            yield from _chain(passage, first, last)
+        begins = mark.end() if mark else end
+
+
+def _chain(passage: Passage, start: int, end: int) -> Iterator[Relation]:
     """The relations of ``a <= b <= c``."""
-    part = passage.text[start:end]
-    start, end = start + len(part) - len(part.lstrip()), end - len(part) + len(part.rstrip())
     operators = list(_RELATION.finditer(passage.text, start, end))
-    if passage.text[start:end] == "true":
-        return []
     if not operators:
         message = f"expected a relation such as `x >= 1`, got `{shown(passage.text[start:end], 40)}`"
         raise ModelError([passage.fault("HS332", message, None, start, end)])
     cuts = [start, *(m.end() for m in operators)], [*(m.start() for m in operators), end]
-    sides = [_side(passage, a, b) for a, b in zip(*cuts, strict=True)]
-    found: list[Relation] = []
-    for operator, (left, primed), (right, wrong) in zip(operators, sides, sides[1:], strict=False):
+    sides = list(zip(*cuts, strict=True))
+    for operator, left, right in zip(operators, sides, sides[1:], strict=False):
         sign = "==" if operator.group() == "=" else operator.group()
-        if sign == "!=" or wrong:
-            sentence = "a derivative belongs on the left-hand side" if wrong else "`!=` is no closed set"
-            raise ModelError([passage.fault("HS332", sentence, None, start, end)])
-        found.append(Relation(left, sign, right, passage, start, end, primed))
-    return found
+        if sign == "!=":
+            raise ModelError([passage.fault("HS332", "`!=` is no closed set", None, start, end)])
+        yield _related(passage, left, sign, right, (start, end))
 
 
-def _side(passage: Passage, start: int, end: int) -> tuple[str, bool]:
-    """An expression as a model writes it, and whether it is a name with a prime."""
+def _related(
+    passage: Passage, left: tuple[int, int], sign: str, right: tuple[int, int], whole: tuple[int, int]
+) -> Relation:
+    """A relation, with a derivative on its left where it has one."""
+    a, b = (passage.text[slice(*side)].strip() for side in (left, right))
+    if "'" in b and "'" not in a and sign in MIRRORED:
+        left, right, sign, a, b = right, left, MIRRORED[sign], b, a
+    negative = a.startswith("-") and _DERIVATIVE.fullmatch(a[1:].strip())
+    if "'" not in a + b:
+        return Relation(_side(passage, *left), sign, _side(passage, *right), passage, *whole)
+    name = negative or _DERIVATIVE.fullmatch(a)
+    if name and "'" not in b:
+        other = _side(passage, *right)
+        sign, other = (MIRRORED[sign], f"-({other})") if negative and sign in MIRRORED else (sign, other)
+        return Relation(name[1], sign, other, passage, *whole, primed=True)
+    message = BOUNDED if sign not in ("==", ":=") else "a derivative belongs on the left-hand side"
+    raise ModelError([passage.fault("HS332", message, DERIVED, *whole)])
+
+
+def _side(passage: Passage, start: int, end: int) -> str:
+    """An expression as a model writes it."""
     raw = passage.text[start:end]
-    primed = raw.rstrip().endswith("'")
-    text = " ".join(raw.rstrip().removesuffix("'").split()).replace("^", "**")
-    text = re.sub(r"^- +", "-", text)
+    text = re.sub(r"^- +", "-", " ".join(raw.split()).replace("^", "**"))
     try:
         parse(text)
     except ExpressionError as error:
         at = start + len(raw) - len(raw.lstrip()) + error.start  # off by what blanks and `^` have changed
         raise ModelError([passage.fault(error.code, error.message, error.hint, at, end)]) from None
-    return text, primed
+    return text
 
 
 def renamed(text: str, names: Mapping[str, str]) -> str:
     """An expression with other names, and nothing else changed."""
+    if names.keys().isdisjoint(names_in(text)):
+        return text
     for node in reversed([node for node in walk(parse(text)) if isinstance(node, Name)]):
         if node.name in names:
             text = text[: node.start] + names[node.name] + text[node.end :]
@@ -302,7 +338,7 @@ def renamed(text: str, names: Mapping[str, str]) -> str:
 
 def within(text: str) -> str:
     """An expression to put in place of a name."""
-    return text if isinstance(parse(text), Name) else f"({text})"
+    return text if re.fullmatch(r"[\w.]+", text) else f"({text})"
 
 
 def checked(relation: Relation) -> Relation:
@@ -320,7 +356,7 @@ def checked(relation: Relation) -> Relation:
 
 _ENTRY = re.compile(r"[ \t]*([A-Za-z][\w-]*)[ \t]*=[ \t]*(\"[^\"]*\"|'[^']*'|[^#\n\"']*)[ \t]*(?:#[^\n]*)?(?:\n|$)")
 _BLANK = re.compile(r"[ \t]*(?:#[^\n]*)?(?:\n|$)")
-_AT = re.compile(r"\bloc\s*\(\s*([\w.]*)\s*\)\s*={1,2}\s*([A-Za-z_]\w*)\s*&*")
+_AT = re.compile(r"\bloc\s*\(\s*([\w.]*)\s*\)\s*={1,2}\s*([A-Za-z_]\w*)")
 _QUALIFIED = re.compile(r"\b[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)+")
 
 
@@ -378,7 +414,7 @@ def _meaning(entries: dict[str, Passage]) -> Configuration:
     if initially is None:
         return Configuration(found["system"], None, found["time-horizon"], others=others)
     places = tuple((m[1], m[2], m.span()) for m in _AT.finditer(initially.text))
-    bare = _AT.sub(lambda m: " " * len(m[0]), initially.text)
+    bare = _AT.sub(lambda m: "true".ljust(len(m[0])), initially.text)
     bare = re.sub(r"&&?(?=\s*$)", lambda m: " " * len(m[0]), bare)
     bare = _QUALIFIED.sub(lambda m: m[0].replace(".", DOT), bare)
     values = tuple(map(checked, relations(Passage(initially.file, bare, initially.starts))))

@@ -11,34 +11,18 @@ what differs otherwise is a comment or a refusal.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from fractions import Fraction
+from dataclasses import dataclass, field, replace
 from typing import Any
-
-import numpy as np
 
 from hsdsl.base.errors import Findings, ModelError
 from hsdsl.base.functions import replaced
 from hsdsl.base.names import shown
-from hsdsl.base.numbers.rational import Exact, about, axes, deepest, matrix, maximise, zeros
-from hsdsl.interface.imports.spaceex.document import Relation, renamed, within
-from hsdsl.interface.imports.spaceex.network import Arrow, Automaton, Key, Network, Place
+from hsdsl.interface.imports.spaceex.document import Relation, names_in, value, within
+from hsdsl.interface.imports.spaceex.network import Arrow, Automaton, Key, Network, Place, place
+from hsdsl.interface.imports.spaceex.points import decide
 from hsdsl.language.expression.algebra import lie_derivative
-from hsdsl.language.expression.plain import names_in, value
 from hsdsl.language.expression.scope import symbol
-from hsdsl.mathematics.decisions.decide import Decider
-from hsdsl.mathematics.decisions.polynomial import NormalForms
-from hsdsl.mathematics.decisions.search import (
-    NEVER,
-    UNKNOWN,
-    Answer,
-    Constraint,
-    SearchRange,
-    at_most_zero,
-    negative,
-    positive,
-    zero,
-)
+from hsdsl.mathematics.decisions.search import Answer, Constraint, at_most_zero, negative, positive, zero
 
 
 def mode_drafts(network: Network, found: Automaton, constants: Mapping[Any, Any]) -> dict[Key, ModeDraft]:
@@ -53,6 +37,11 @@ def mode_drafts(network: Network, found: Automaton, constants: Mapping[Any, Any]
     for arrow in found.arrows:
         _refuse_loose(arrow, drafts[arrow.source], drafts[arrow.target])
     return drafts
+
+
+def lone_draft(network: Network, key: Key, constants: Mapping[Any, Any]) -> ModeDraft:
+    """The mode of one place, without its transitions."""
+    return _draft(network, place(network, key, ()), [], constants)
 
 
 def _draft(network: Network, place: Place, arrows: list[Arrow], constants: Mapping[Any, Any]) -> ModeDraft:
@@ -117,7 +106,7 @@ def _refuse_free(network: Network, place: Place, arrows: list[Arrow], known: set
         for name in sorted(names):
             if name in network.variables and name not in known:
                 message = f"'{name}' has no derivative in location {place.name}: it may change in any way there"
-                hint = f"give it one, or an equation `{name} == ...` in the invariant"
+                hint = f"give it one, or an equation `{name} == ...` in the invariant, or a value by --at {name}=NUMBER"
                 raise relation.refusal(message, hint)
 
 
@@ -137,80 +126,6 @@ def _keep(draft: ModeDraft, relation: Relation) -> None:
         message = "the flow does not keep this equation of the invariant: time cannot pass"
         raise relation.refusal(message)
     draft.comments.append(f"`{relation.text}` holds all along")
-
-
-_FORMS = NormalForms()
-REACH = 100.0  # how far a search for a point of constraints that are not affine goes, in units of the model
-
-
-def decide(constraints: Sequence[Constraint]) -> Answer:
-    """Whether there is a point where all constraints hold; `never` is a proof over the whole space."""
-    constraints = [c for c in constraints if not _holds(c)]
-    names = sorted({s for c in constraints for s in c.expr.free_symbols}, key=lambda s: s.name)
-    found = [_row(c.expr, names) for c in constraints]
-    rows = [row for row in found if row is not None]
-    if len(rows) < len(found):
-        ranges = {name: SearchRange(None, None, (-REACH, REACH), 1.0) for name in names}
-        answer = Decider().decide(tuple(constraints), ranges, prove=True)
-        return UNKNOWN if answer.never and answer.searched else answer
-    relations = [c.relation for c in constraints]
-    if any(
-        not row[1:].any() and not _constant(row[0], relation) for row, relation in zip(rows, relations, strict=True)
-    ):
-        return NEVER
-    point = _interior(*_split(rows, relations, len(names)))
-    if point is None:
-        return NEVER
-    return Answer("somewhere", "symbolic", {name: float(v) for name, v in zip(names, point, strict=True)})
-
-
-def _holds(constraint: Constraint) -> bool:
-    row = _row(constraint.expr, [])
-    return row is not None and _constant(row[0], constraint.relation)
-
-
-def _constant(value: Fraction, relation: str) -> bool:
-    return value == 0 if relation == "= 0" else value <= 0 if relation == "<= 0" else value < 0
-
-
-def _row(expr: Any, names: Sequence[Any]) -> Exact | None:
-    """An affine expression as its constant and its slopes; None for another."""
-    row = zeros(1 + len(names))
-    for monomial, factor in _FORMS.of(expr).terms.items():
-        if not monomial:
-            row[0] += factor
-            continue
-        ((atom, exponent), *others) = monomial
-        if others or exponent != 1 or atom.kind != "name" or atom.head not in names:
-            return None
-        row[1 + names.index(atom.head)] += factor
-    return row
-
-
-def _split(rows: Sequence[Exact], relations: Sequence[str], size: int) -> tuple[Exact, Exact]:
-    """Rows that hold weakly, and those that hold strictly; those without names do not count."""
-    pairs = [(row, relation) for row, relation in zip(rows, relations, strict=True) if row[1:].any()]
-    weak = [sign * row for row, relation in pairs if relation != "< 0" for sign in (1, -1)[: 1 + (relation == "= 0")]]
-    return matrix(weak, 1 + size), matrix((row for row, relation in pairs if relation == "< 0"), 1 + size)
-
-
-def _interior(weak: Exact, strict: Exact) -> Exact | None:
-    """A point where weak rows hold, and strict ones with room to spare."""
-    size = weak.shape[1] - 1
-    if not len(weak) + len(strict):
-        return zeros(size)
-    depth, point, _ = deepest(np.vstack([weak, strict]))
-    if depth < 0:
-        return None
-    if not len(strict):
-        return point
-    goal = axes(size + 1)[-1]
-    lengths = np.array([about(row[1:]) for row in strict], dtype=object)
-    wider = [np.column_stack([weak, zeros(len(weak))]), np.column_stack([strict, lengths])]
-    wider.append(np.append(np.array([Fraction(-1)], dtype=object), goal)[None])
-    found = maximise(goal, np.vstack(wider), np.append(point, zeros(1)))
-    assert found is not None  # the last row bounds it
-    return found[0][:-1] if found[0][-1] > 0 else None
 
 
 @dataclass(frozen=True)
@@ -255,19 +170,25 @@ class ModeDraft:
 
 @dataclass
 class TransitionDraft:
-    """A transition of a model; ``facet`` is None where its surface is one of the guard, by choice."""
+    """A transition of a model, at a surface ``when`` or where all of ``event`` begins to hold.
+
+    ``facet`` is None where its surface is none of the invariant, by choice.
+    """
 
     arrow: Arrow
-    when: Relation
+    when: Relation | None
     condition: list[str]
     guard: list[Constraint]
     facet: Facet | None
     comments: list[str]
+    event: list[str] = field(default_factory=list[str])
 
 
 STRICT = "<>"
+ALWAYS = "1 >= 0"  # the condition of an event that goes on entry
 INWARD = "SpaceEx may also jump where the flow leads back inside; this does not"
 LATER = "SpaceEx may jump later: made as soon as the guard holds"
+FIRST = "SpaceEx may make either of several transitions: the first of them here is made"
 
 
 @dataclass(frozen=True)
@@ -277,29 +198,40 @@ class Judge:
     findings: Findings
     eager: bool = False
 
-    def transition(self, arrow: Arrow, source: ModeDraft, target: ModeDraft) -> TransitionDraft | None:
-        """The transition for an arrow; None where it is never made, or was refused."""
-        guard = [closed(relation, source.excess(relation)) for relation in arrow.guard]
+    def transitions(self, arrow: Arrow, source: ModeDraft, target: ModeDraft) -> list[TransitionDraft]:
+        """The transitions for an arrow, mostly one; none where it is never made, or was refused.
+
+        A jump is made only to where the target's invariant holds: that counts as a part of its guard.
+        """
+        landed = _landed(arrow, target)
+        relations = [side for relation in (*arrow.guard, *landed) for side in _sides(relation, source)]
+        guard = [closed(relation, source.excess(relation)) for relation in relations]
         if decide([*source.inside, *guard]).never:
             source.comments.append(f"no transition to {target.place.name}: its guard never holds in the invariant")
-            return None
-        facet, witness = self.facet(arrow, source, guard)
-        if facet is None:
-            return self.at_once(arrow, source, target, guard, witness)
-        on = [*source.inside, zero(facet.excess)]
-        rate = lie_derivative(facet.excess, source.flow)
-        leaving = [*on, at_most_zero(-rate)]
-        draft = TransitionDraft(arrow, facet.relation.mirrored(), [], guard, facet, [])
-        self.conditions(draft, source, leaving)
-        self.landing(draft, source, target, [*leaving, *guard])
-        if not decide([*on, *guard, negative(rate)]).never:
-            draft.comments.append(INWARD)
-        return draft
+            return []
+        self.landing(arrow, source, target, guard)
+        eager = self.eager or arrow.urgent or not source.place.passing
+        facet, witness = self.facet(relations, source, guard) if source.place.passing else (None, None)
+        if facet is None and not eager:
+            self.refuse_waiting(arrow, witness)
+            return []
+        if facet is not None:
+            drafts = self.on_facet(arrow, source, facet, guard, relations)
+        else:
+            drafts = self.at_once(arrow, source, guard, relations)
+        known = {relation.text: old.relation.text for old, relation in zip(target.facets, landed, strict=True)}
+        for draft in drafts:
+            kept = [f"`{known[text]}`" for text in (*draft.condition, *draft.event) if text in known]
+            if kept:
+                draft.comments.append(f"SpaceEx jumps only to where {' and '.join(kept)} holds in {target.place.name}")
+        return drafts
 
-    def facet(self, arrow: Arrow, source: ModeDraft, guard: list[Constraint]) -> tuple[Facet | None, Answer | None]:
+    def facet(
+        self, relations: Sequence[Relation], source: ModeDraft, guard: list[Constraint]
+    ) -> tuple[Facet | None, Answer | None]:
         """The facet that the guard lies on; else a point where the guard holds off one."""
         witness: Answer | None = None
-        mentioned = {name for relation in arrow.guard for name in relation.names}
+        mentioned = {name for relation in relations for name in relation.names}
         for facet in sorted(source.facets, key=lambda f: not f.relation.names <= mentioned):
             answer = decide([*source.inside, *guard, negative(facet.excess)])
             if answer.never:
@@ -307,33 +239,64 @@ class Judge:
             witness = answer if answer.somewhere or witness is None else witness
         return None, witness
 
-    def at_once(
-        self, arrow: Arrow, source: ModeDraft, target: ModeDraft, guard: list[Constraint], witness: Answer | None
-    ) -> TransitionDraft | None:
-        """A transition that is made as soon as its guard holds, where that is given; else it is refused."""
+    def refuse_waiting(self, arrow: Arrow, witness: Answer | None) -> None:
+        """Refuse an arrow whose guard can hold while time goes on."""
         where = f" ({point(witness)})" if witness and witness.point else ""
-        if not (self.eager or arrow.urgent):
-            message = f"the guard can hold where the invariant does not end{where}: SpaceEx may jump there or go on"
-            hint = "end the invariant where the guard begins, or give --urgent: jump as soon as the guard holds"
-            self.refuse(arrow, message, hint)
-            return None
-        open_ = [r for r, c in zip(arrow.guard, guard, strict=True) if not _implied(c, source.inside)]
-        if len(open_) != 1 or open_[0].operator == "==":
-            message = "the first time at which this guard holds is not where one inequality begins to hold"
-            self.refuse(arrow, message, "write a guard with one inequality that the invariant does not imply")
-            return None
-        draft = TransitionDraft(arrow, open_[0], [], guard, None, [])
-        draft.comments.append(LATER)
-        self.landing(draft, source, target, [*source.inside, *guard])
-        return draft
+        message = f"the guard can hold where the invariant does not end{where}: SpaceEx may jump there or go on"
+        hint = "end the invariant where the guard begins, or give --urgent: jump as soon as the guard holds"
+        self.refuse(arrow, message, hint)
 
-    def conditions(self, draft: TransitionDraft, source: ModeDraft, leaving: Sequence[Constraint]) -> None:
+    def on_facet(
+        self, arrow: Arrow, source: ModeDraft, facet: Facet, guard: list[Constraint], relations: Sequence[Relation]
+    ) -> list[TransitionDraft]:
+        """The transition of an arrow whose guard lies on a facet: made where the invariant ends."""
+        on = [*source.inside, zero(facet.excess)]
+        rate = lie_derivative(facet.excess, source.flow)
+        draft = TransitionDraft(arrow, facet.relation.mirrored(), [], guard, facet, [])
+        self.conditions(draft, source, [*on, at_most_zero(-rate)], relations)
+        if not decide([*on, *guard, negative(rate)]).never:
+            draft.comments.append(INWARD)
+        return [draft]
+
+    def at_once(
+        self, arrow: Arrow, source: ModeDraft, guard: list[Constraint], relations: Sequence[Relation]
+    ) -> list[TransitionDraft]:
+        """The transitions that are made as soon as a guard holds.
+
+        One inequality that the flow crosses is a surface. Several, or one that may be met at rest, are an event. An
+        equation is a surface from both of its sides. What always holds is a surface that every point is beyond.
+        """
+        pairs = zip(relations, guard, strict=True)
+        open_ = [(r, c) for r, c in pairs if not _implied(c, source.inside, r.operator in STRICT)]
+        comments = [LATER] if source.place.passing else []
+        equations = [r for r, _ in open_ if r.operator == "=="]
+        others = [r for r, _ in open_ if r.operator != "=="]
+        if equations:
+            if len(equations) > 1:
+                message = "the first time at which this guard holds is not where one inequality begins to hold"
+                self.refuse(arrow, message, "write a guard with one equation at most")
+                return []
+            conditions = [r.text for r in others] or ["true"]
+            sides = [replace(equations[0], operator=operator) for operator in (">=", "<=")]
+            return [TransitionDraft(arrow, side, [*conditions], guard, None, [*comments]) for side in sides]
+        draft = TransitionDraft(arrow, None, [], guard, None, comments, [r.text for r in others] or [ALWAYS])
+        if len(others) == 1 and source.place.passing:
+            (excess,) = (c.expr for r, c in open_ if r is others[0])
+            rate = lie_derivative(excess, source.flow)
+            if decide([*source.inside, zero(excess), at_most_zero(-rate)]).never:
+                return [replace(draft, when=others[0], event=[])]
+        return [draft]
+
+    def conditions(
+        self, draft: TransitionDraft, source: ModeDraft, leaving: Sequence[Constraint], relations: Sequence[Relation]
+    ) -> None:
         """What of the guard the surface does not imply."""
-        for relation in draft.arrow.guard:
+        facet = draft.when.text if draft.when else ""
+        for relation in relations:
             excess = source.excess(relation)
             if relation.operator == "==":
                 if not all(decide([*leaving, beyond]).never for beyond in (positive(excess), negative(excess))):
-                    message = f"the guard is smaller than the facet `{draft.when.text}` by an equation, not by a region"
+                    message = f"the guard is smaller than the facet `{facet}` by an equation, not by a region"
                     self.refuse(draft.arrow, message, "write an inequality", relation)
             elif decide([*leaving, at_most_zero(-excess) if relation.operator in STRICT else positive(excess)]).never:
                 continue
@@ -344,46 +307,39 @@ class Judge:
             else:
                 draft.condition.append(relation.text)
 
-    def landing(
-        self, draft: TransitionDraft, source: ModeDraft, target: ModeDraft, given: Sequence[Constraint]
-    ) -> None:
-        """A jump is made only to where the target's invariant holds."""
-        texts = {name: within(relation.right) for name, relation in draft.arrow.reset.items()}
-        moves = {symbol(name): value(relation.right) for name, relation in draft.arrow.reset.items()}
-        for facet in target.facets:
-            landed = source.placed(replaced(facet.excess, moves, {}))
-            answer = decide([*given, positive(landed)])
-            if answer.never:
-                continue
-            relation = facet.relation
-            if answer.somewhere:
-                draft.condition.append(
-                    f"{renamed(relation.left, texts)} {relation.operator} {renamed(relation.right, texts)}"
-                )
-                draft.comments.append(f"SpaceEx jumps only to where `{relation.text}` holds in {target.place.name}")
-            else:
-                self.refuse(draft.arrow, f"whether the jump leads to where `{relation.text}` holds is not decided")
+    def landing(self, arrow: Arrow, source: ModeDraft, target: ModeDraft, guard: Sequence[Constraint]) -> None:
+        """Refuse a jump that can miss an equation of its target."""
+        moves = {symbol(name): value(relation.right) for name, relation in arrow.reset.items()}
         for equality in target.equalities:
             landed = source.placed(replaced(equality, moves, {}))
+            given = [*source.inside, *guard]
             if not all(decide([*given, beyond]).never for beyond in (positive(landed), negative(landed))):
-                self.refuse(draft.arrow, f"the jump can miss an equation of the invariant of {target.place.name}")
+                self.refuse(arrow, f"the jump can miss an equation of the invariant of {target.place.name}")
 
     def choices(self, drafts: Sequence[TransitionDraft], source: ModeDraft) -> None:
-        """Refuse two transitions that are possible in a region of one facet."""
+        """Refuse two transitions that are possible in a region of one facet, or at one instant where no time passes."""
         for i, draft in enumerate(drafts):
-            for other in drafts[:i]:
-                if draft.facet is None or other.facet is None or draft.facet.excess != other.facet.excess:
+            if any(self.overlap(draft, other, source) for other in drafts[:i] if other.arrow is not draft.arrow):
+                if self.eager:
+                    draft.comments.append(FIRST)
                     continue
-                on = zero(draft.facet.excess)
-                others = [f for f in source.facets if f.excess != draft.facet.excess]
-                region = [negative(f.excess) for f in others]
-                held = [c for c in (*draft.guard, *other.guard) if not _implied(c, [*source.inside, on])]
-                if any(c.relation == "= 0" for c in held):
-                    continue
-                strictly = [Constraint(c.expr, "< 0") for c in held]
-                if not decide([on, *map(zero, source.equalities), *region, *strictly]).never:
-                    message = "this guard overlaps with that of a transition before it: either may be made"
-                    self.refuse(draft.arrow, message, "make the guards disjoint")
+                message = "this guard overlaps with that of a transition before it: either may be made"
+                hint = "make the guards disjoint, or give --urgent: the first of them in the file is made"
+                self.refuse(draft.arrow, message, hint)
+
+    def overlap(self, draft: TransitionDraft, other: TransitionDraft, source: ModeDraft) -> bool:
+        """Whether two transitions are possible in a region."""
+        if not source.place.passing:
+            return not decide([*source.inside, *draft.guard, *other.guard]).never
+        if draft.facet is None or other.facet is None or draft.facet.excess != other.facet.excess:
+            return False
+        on = zero(draft.facet.excess)
+        region = [negative(f.excess) for f in source.facets if f.excess != draft.facet.excess]
+        held = [c for c in (*draft.guard, *other.guard) if not _implied(c, [*source.inside, on])]
+        if any(c.relation == "= 0" for c in held):
+            return False
+        strictly = [Constraint(c.expr, "< 0") for c in held]
+        return not decide([on, *map(zero, source.equalities), *region, *strictly]).never
 
     def refuse(self, arrow: Arrow, message: str, hint: str | None = None, relation: Relation | None = None) -> None:
         """Gather a refusal, at the guard where there is one."""
@@ -392,14 +348,27 @@ class Judge:
         self.findings.add(fault)
 
 
+def _sides(relation: Relation, source: ModeDraft) -> list[Relation]:
+    """A relation; two inequalities for an equation that no flow changes, as of a counter."""
+    still = relation.operator == "==" and lie_derivative(source.excess(relation), source.flow) == 0
+    return [replace(relation, operator=operator) for operator in (">=", "<=")] if still else [relation]
+
+
+def _landed(arrow: Arrow, target: ModeDraft) -> list[Relation]:
+    """The inequalities of the target's invariant, of values before the jump."""
+    texts = {name: within(relation.right) for name, relation in arrow.reset.items()}
+    return [facet.relation.renamed(texts) for facet in target.facets]
+
+
 def closed(relation: Relation, excess: Any) -> Constraint:
     """A relation as a constraint; a strict one is closed, which allows more."""
     return zero(excess) if relation.operator == "==" else at_most_zero(excess)
 
 
-def _implied(constraint: Constraint, given: Sequence[Constraint]) -> bool:
-    beyond = [positive(constraint.expr), *([negative(constraint.expr)] if constraint.relation == "= 0" else [])]
-    return all(decide([*given, c]).never for c in beyond)
+def _implied(constraint: Constraint, given: Sequence[Constraint], strict: bool = False) -> bool:
+    outside = [at_most_zero(-constraint.expr) if strict else positive(constraint.expr)]
+    outside += [negative(constraint.expr)] if constraint.relation == "= 0" else []
+    return all(decide([*given, c]).never for c in outside)
 
 
 def point(answer: Answer) -> str:

@@ -7,16 +7,26 @@ the locations that can be reached, with labels synchronised, and the edges betwe
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from itertools import islice, product
 
 from hsdsl.base import limits
 from hsdsl.base.errors import ModelError
 from hsdsl.base.names import closest, shown
-from hsdsl.interface.imports.spaceex.document import Bind, Component, Jump, Location, Param, Relation
+from hsdsl.interface.imports.spaceex.document import (
+    BOUNDED,
+    DERIVED,
+    Bind,
+    Component,
+    Jump,
+    Location,
+    Param,
+    Relation,
+    names_in,
+    value,
+)
 from hsdsl.language.expression.parse import ExpressionError, parse
-from hsdsl.language.expression.plain import names_in
 from hsdsl.language.expression.scope import RESERVED
 from hsdsl.language.source.xml import Element, Passage
 
@@ -40,13 +50,29 @@ class Instance:
 
 @dataclass(frozen=True)
 class Network:
-    """All instances, the constants (None: not bound) and variables of the whole, and names by path and formal name."""
+    """All instances, the constants (None: not bound) and variables of the whole, and names by path and formal name.
+
+    ``given`` are values at the start that do not come from the files, ``held`` variables that are constants by choice.
+    """
 
     instances: tuple[Instance, ...]
     constants: dict[str, str | None]
     variables: tuple[str, ...]
     qualified: dict[str, str]
     params: dict[str, Param]
+    given: dict[str, str] = field(default_factory=dict[str, str])
+    held: tuple[str, ...] = ()
+
+    @property
+    def moved(self) -> set[str]:
+        """The names that a flow or an equation of an invariant gives anywhere."""
+        found: set[str] = set()
+        for instance in self.instances:
+            for location in instance.component.locations.values():
+                equations = (r for r in location.invariant if r.operator == "==")
+                names = {*(r.left for r in location.flow), *(name for r in equations for name in r.names)}
+                found |= {instance.names[name] for name in names if name in instance.names}
+        return found
 
 
 @dataclass
@@ -181,6 +207,7 @@ class Place:
     invariant: tuple[Relation, ...]
     flow: dict[str, Relation]
     element: Element
+    passing: bool  # whether time may pass
 
 
 @dataclass(frozen=True)
@@ -220,21 +247,21 @@ def automaton(network: Network, start: Key) -> Automaton:
         if len(found.places) >= most or len(found.arrows) > MOST_EDGES:
             message = f"the network has more than {most:,} locations or {MOST_EDGES:,} transitions"
             raise ModelError([network.instances[0].component.element.fault("HS332", message)])
-        found.places[key] = _place(network, key, found)
+        found.places[key] = place(network, key, [known.name for known in found.places.values()])
         arrows = list(islice(_arrows(network, key), MOST_EDGES))
         found.arrows += arrows
         waiting += [arrow.target for arrow in arrows]
     return found
 
 
-def _place(network: Network, key: Key, found: Automaton) -> Place:
+def place(network: Network, key: Key, taken: Collection[str]) -> Place:
+    """A location of the product, whose name is none of those that are taken."""
     locations = tuple(i.component.locations[k] for i, k in zip(network.instances, key, strict=True))
-    flow: dict[str, Relation] = {}
     invariant: dict[str, Relation] = {}
+    passing = all(location.passing for location in locations)
+    flow = _flow(network, locations) if passing else _still(network)
     for instance, location in zip(network.instances, locations, strict=True):
         names = instance.names
-        for relation in location.flow:
-            _add_flow(flow, relation.renamed(names))
         for relation in location.invariant:
             _known_names(relation, instance)
             renamed = relation.renamed(names)
@@ -248,10 +275,9 @@ def _place(network: Network, key: Key, found: Automaton) -> Place:
         location for i, location in zip(network.instances, locations, strict=True) if len(i.component.locations) > 1
     ]
     name = "_".join(_word(location.name) for location in telling or locations[:1])
-    taken = {place.name for place in found.places.values()}
     while name in taken:
         name += "_"
-    return Place(name, locations, tuple(invariant.values()), flow, locations[0].element)
+    return Place(name, locations, tuple(invariant.values()), flow, locations[0].element, passing)
 
 
 def _word(name: str) -> str:
@@ -267,15 +293,38 @@ def _known_names(relation: Relation, instance: Instance) -> None:
             raise ModelError([relation.fault(message, "declare it as a <param>", "HS331")])
 
 
-def _add_flow(flow: dict[str, Relation], relation: Relation) -> None:
-    if not relation.primed or relation.operator != "==":
-        hint = "write x' == and its derivative"
-        if relation.primed:
-            raise relation.refusal("a derivative that is only bounded leaves the flow open", hint)
-        raise relation.refusal("a flow gives derivatives, such as x' == v", hint)
-    if flow.get(relation.left, relation).text != relation.text:
-        raise relation.refusal(f"two instances give '{relation.left}' different derivatives")
-    flow[relation.left] = relation
+def _flow(network: Network, locations: Iterable[Location]) -> dict[str, Relation]:
+    """The derivatives of all instances; two bounds that are equal give one."""
+    flow: dict[str, Relation] = {}
+    bounds: dict[str, Relation] = {}
+    for instance, location in zip(network.instances, locations, strict=True):
+        for relation in (each.renamed(instance.names) for each in location.flow):
+            if not relation.primed or relation.operator == ":=":
+                raise relation.refusal("a flow gives derivatives, such as x' == v", DERIVED)
+            if relation.operator != "==":
+                other = bounds.setdefault(relation.left, relation)
+                if other.operator[:1] == relation.operator[:1] or value(other.right) != value(relation.right):
+                    continue
+                relation = replace(relation, operator="==")
+            if flow.get(relation.left, relation).text != relation.text:
+                raise relation.refusal(f"two instances give '{relation.left}' different derivatives")
+            flow[relation.left] = relation
+    for name, relation in bounds.items():
+        if name not in flow:
+            raise relation.refusal(BOUNDED, DERIVED)
+    return flow
+
+
+def _still(network: Network) -> dict[str, Relation]:
+    """The derivatives where time does not pass: 0 for all variables that have one anywhere."""
+    found: dict[str, Relation] = {}
+    for instance in network.instances:
+        for location in instance.component.locations.values():
+            for relation in location.flow:
+                if relation.primed:
+                    name = instance.names.get(relation.left, relation.left)
+                    found[name] = replace(relation, left=name, operator="==", right="0")
+    return found
 
 
 def _arrows(network: Network, key: Key) -> Iterator[Arrow]:
@@ -321,7 +370,7 @@ def _arrow(network: Network, key: Key, jumps: dict[int, Jump], label: str) -> Ar
 
 
 def _add_reset(reset: dict[str, Relation], relation: Relation) -> None:
-    if not (relation.operator == ":=" or (relation.operator == "==" and relation.primed)):
+    if relation.operator not in (":=", "=="):
         raise relation.refusal("an assignment gives one value, such as x := 0", "write x := and its value")
     if relation.left.isidentifier() and reset.get(relation.left, relation).right == relation.right:
         reset[relation.left] = relation

@@ -5,22 +5,24 @@ from __future__ import annotations
 import json
 import textwrap
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from hsdsl import __version__
 from hsdsl.base.names import counted, visible
 from hsdsl.interface.imports.spaceex.document import renamed, within
-from hsdsl.interface.imports.spaceex.modes import INWARD, LATER, ModeDraft, TransitionDraft
-from hsdsl.interface.imports.spaceex.network import Key
+from hsdsl.interface.imports.spaceex.modes import ALWAYS, FIRST, INWARD, LATER, ModeDraft, TransitionDraft
+from hsdsl.interface.imports.spaceex.network import Key, Network
 from hsdsl.interface.imports.spaceex.start import Start
 
 _WIDTH = 116
+NEVER = "0 >= 1"  # a wall that every point is beyond
 
 
 def written(
     source: str,
     title: str,
     notes: Sequence[str],
+    assumed: Sequence[str],
     drafts: Mapping[Key, ModeDraft],
     transitions: Mapping[Key, Sequence[TransitionDraft]],
     begin: Start,
@@ -29,17 +31,36 @@ def written(
 ) -> str:
     """The model's text."""
     lines = ["hsdsl: 1", f"title: {_quoted(title)}", f"source: {_quoted(source)}"]
-    assumed = list(_assumed([t for leaving in transitions.values() for t in leaving]))
+    assumed = [*assumed, *_assumed([t for leaving in transitions.values() for t in leaving])]
     lines += [*(["assumptions:", *(f"  - {_quoted(text)}" for text in assumed)] if assumed else []), ""]
     lines += _comment([f"Imported by hsdsl {__version__}: each transition is made where its guard is reached.", *notes])
-    lines += _section("parameters", begin.constants)
+    lines += _section("parameters", _with_ranges(begin.constants, begin, "value: {0}, "))
     lines += ["", "modes:"]
     for key, draft in drafts.items():
         lines += _indented(_mode(draft, transitions[key], drafts))
-    states = {name: begin.variables[name] for name in drafts[first].states}
+    states = _with_ranges({name: begin.variables[name] for name in drafts[first].states}, begin, "")
     lines += ["", "initial:", f"  mode: {_plain(drafts[first].place.name)}", *_indented(_entries(states))]
     lines += ["", "experiment:", f"  until: {_plain(until)}"]
     return "\n".join(lines) + "\n"
+
+
+def _with_ranges(values: Mapping[str, str], begin: Start, form: str) -> dict[str, str]:
+    """Values, or mappings where a range is kept."""
+    ranges = {name: begin.ranges[name] for name in values if name in begin.ranges}
+    written = {n: f"{{{form.format(values[n])}min: {low}, max: {high}}}" for n, (low, high) in ranges.items()}
+    return {**values, **written}
+
+
+def assumptions(network: Network, begin: Start, first: str | None) -> Iterator[str]:
+    """Sentences on where a run starts, and SpaceEx elsewhere too; ``first`` is one of several locations."""
+    if kept := [name for name in begin.ranges if name in network.constants]:
+        yield f"in SpaceEx {', '.join(kept)} may have any value from `min` to `max`, here the centre"
+    if begin.chosen:
+        yield f"SpaceEx starts in a set: --at chose the value of {', '.join(begin.chosen)}"
+    if network.held:
+        yield f"{', '.join(network.held)} may change in any way in SpaceEx, and does not change here"
+    if first is not None:
+        yield f"SpaceEx may start in other locations than {first}, the first one that admits the initial point"
 
 
 def _assumed(transitions: Sequence[TransitionDraft]) -> Iterator[str]:
@@ -47,6 +68,8 @@ def _assumed(transitions: Sequence[TransitionDraft]) -> Iterator[str]:
     inward, later = (sum(text in t.comments for t in transitions) for text in (INWARD, LATER))
     if inward:
         yield f"{counted(inward, 'transition')} may also be made in SpaceEx where the flow leads back inside, not here"
+    if first := sum(FIRST in t.comments for t in transitions):
+        yield f"of {counted(first, 'transition')} and others at the same time SpaceEx may make either, here the first"
     if later:
         yield f"{counted(later, 'transition')} may be made later in SpaceEx, here as soon as the guard holds"
 
@@ -64,6 +87,9 @@ def _mode(draft: ModeDraft, transitions: Sequence[TransitionDraft], drafts: Mapp
         for facet in draft.facets
         if facet.excess not in covered and not draft.kept(facet)
     ]
+    if not place.passing and not any(ALWAYS in t.event for t in transitions):
+        walls.append(NEVER)
+        lines.append("  # time does not pass here: a run ends where no transition can be made")
     if walls:
         lines += _indented(["domain:", *_indented([f"- {_plain(wall)}" for wall in walls])])
     if transitions:
@@ -78,16 +104,18 @@ def _transition(t: TransitionDraft, drafts: Mapping[Key, ModeDraft], labels: Cou
     arrow, inner = t.arrow, _substituted(drafts[t.arrow.source], drafts)
     source, target = drafts[arrow.source], drafts[arrow.target]
     entries = {"name": arrow.label} if arrow.label and labels[arrow.label] == 1 else {}
-    entries |= {
-        "when": t.when.renamed(inner).text,
-        "if": " and ".join(renamed(part, inner) for part in t.condition),
-        "to": target.place.name,
-    }
+    when = t.when.renamed(inner).text if t.when else None
+    entries |= {"when": when} if when else {"event": _joined(t.event, inner), "initially": "false"}
+    entries |= {"if": _joined(t.condition, inner), "to": target.place.name}
     reset = {name: relation.right for name, relation in arrow.reset.items() if name in target.states}
     reset |= {name: name for name in target.states if name not in reset and name in source.lets}
     reset = {name: renamed(text, inner) for name, text in reset.items()}
     body = _entries({key: text for key, text in entries.items() if text}) + _section("reset", reset)
     return [*_comment([*arrow.notes, *t.comments]), f"- {body[0]}", *_indented(body[1:])]
+
+
+def _joined(parts: Iterable[str], names: Mapping[str, str]) -> str:
+    return " and ".join(dict.fromkeys(renamed(part, names) for part in parts))
 
 
 def _substituted(draft: ModeDraft, drafts: Mapping[Key, ModeDraft]) -> dict[str, str]:
