@@ -163,12 +163,13 @@ class Edge:
         """The values that are not those before, by the symbols of their states."""
         return {symbol(name): value for name, value in self.values.items() if value != symbol(name)}
 
-    def mapped(self, change: Callable[[Any], Any]) -> Edge:
-        """The edge with changed expressions."""
+    def mapped(
+        self, change: Callable[[Any], Any], each: Callable[[Sequence[Any]], tuple[Any, ...]] | None = None
+    ) -> Edge:
+        """The edge with changed expressions; ``each`` changes several."""
         condition = None if self.condition is None else change(self.condition)
-        return replace(
-            self, surface=self.surface.mapped(change), condition=condition, reset=tuple(map(change, self.reset))
-        )
+        reset = tuple(map(change, self.reset)) if each is None else each(self.reset)
+        return replace(self, surface=self.surface.mapped(change), condition=condition, reset=reset)
 
     def of_states(self, names: Container[str]) -> Edge:
         """The edge with values of these states of its target, and no others."""
@@ -260,14 +261,19 @@ class Mode:
         done: dict[int, Any] = {}  # by the objects: resets have the same symbols of the states that they keep
 
         def once(expr: Any) -> Any:
-            found = done.get(id(expr))
-            return done.setdefault(id(expr), change(expr)) if found is None else found
+            return each((expr,))[0]
+
+        def each(expressions: Sequence[Any]) -> tuple[Any, ...]:
+            places = list(map(id, expressions))
+            new = dict(zip(places, expressions, strict=True))
+            done.update({k: change(new[k]) for k in new if k not in done})
+            return tuple(map(done.__getitem__, places))
 
         return replace(
             self,
             flow=tuple(map(once, self.flow)),
             walls=tuple(wall.mapped(once) for wall in self.walls),
-            edges=tuple(edge.mapped(once) for edge in self.edges),
+            edges=tuple(edge.mapped(once, each) for edge in self.edges),
             outputs=tuple(None if output is None else once(output) for output in self.outputs),
         )
 

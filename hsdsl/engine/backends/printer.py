@@ -89,13 +89,14 @@ class Language:
 
         Raises ValueError: the text is not of the language of routines.
         """
-        printer = _Printer(self, names)
+        own = dict(names)
+        printer = _Printer(self, own)
         lines: list[str] = []
         for statement in definition.body:
             match statement:
                 case ast.Assign(targets=[ast.Name(id=name)], value=value):
                     lines.append(self.assign.format(name=name, value=printer.expression(value)))
-                    printer.names[name] = name
+                    own[name] = name
                 case ast.Return(value=ast.Tuple(elts=results)):
                     lines += self.results([printer.expression(result) for result in results])
                 case _:
@@ -116,7 +117,7 @@ class Language:
 
 class _Printer:
     def __init__(self, language: Language, names: Mapping[str, str]) -> None:
-        self.language, self.names = language, dict(names)
+        self.language, self.names = language, names
 
     def expression(self, node: ast.expr) -> str:
         language, operators = self.language, self.language.operators

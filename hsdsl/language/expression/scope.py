@@ -217,7 +217,7 @@ def functions_called(tree: Tree) -> Iterator[str]:
     return (node.function for node in walk(tree) if isinstance(node, Call))
 
 
-@lru_cache(maxsize=10_000)
+@lru_cache(maxsize=1 << 17)  # a system of thousands of parts has tens of thousands of names
 def symbol(name: str) -> sp.Symbol:
     """The symbol of a state, parameter or sampled input: real, and never a thing of SymPy's own."""
     return sp.Symbol(name, real=True)

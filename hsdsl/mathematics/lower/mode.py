@@ -14,6 +14,8 @@ from collections import ChainMap, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
+from itertools import compress
+from operator import is_not
 from typing import Any
 
 import sympy as sp
@@ -175,8 +177,9 @@ def changed_by(edge: Edge, mode: Mode) -> tuple[int, ...]:
     """The states that an edge's reset changes, by their numbers in the target; all of another mode's."""
     if edge.target_states != mode.states:
         return tuple(range(len(edge.target_states)))
-    symbols = mode.vector_field
-    return tuple(i for i, (x, r) in enumerate(zip(symbols, edge.reset, strict=True)) if r is not x and r != x)
+    symbols = list(mode.vector_field)
+    others = compress(range(len(symbols)), map(is_not, symbols, edge.reset))
+    return tuple(i for i in others if edge.reset[i] != symbols[i])
 
 
 def _edge(edge: Edge, mode: Mode, indices: dict[str, int]) -> lowered.EdgeProgram:

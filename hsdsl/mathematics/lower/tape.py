@@ -62,12 +62,15 @@ class _Writer:
     def line_or_none(self, expr) -> int | None:
         """The line of an expression; None where it is kinked, with nothing written."""
         before = len(self.operations), len(self.constants)
-        kept = dict(self._known), dict(self._written), dict(self._numbers)
+        tables = self._known, self._written, self._numbers
+        sizes = list(map(len, tables))
         try:
             return self.line(expr)
         except Kinked:
             del self.operations[before[0] :], self._degrees[self._first + before[0] :], self.constants[before[1] :]
-            self._known, self._written, self._numbers = kept
+            for table, size in zip(tables, sizes, strict=True):
+                while len(table) > size:  # the last that was put in
+                    table.popitem()
             return None
 
     def line(self, expr) -> int:
