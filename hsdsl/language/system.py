@@ -196,8 +196,7 @@ class Shape:
         return 2 * self.points + len(SIZES[self.kind])
 
 
-@dataclass(frozen=True)
-class Queue:
+class Queue(NamedTuple):
     """States that say of the delayed executions of an event how many are ``waiting``, at most so many, and the first.
 
     ``values`` are the time at which the first is made and the values that it gives. The others wait elsewhere.
@@ -209,7 +208,7 @@ class Queue:
 
     def of_states(self, names: Container[str]) -> Queue:
         """The queue with values in these states, and no others."""
-        return replace(self, values=tuple(name for name in self.values if name in names))
+        return self._replace(values=tuple(name for name in self.values if name in names))
 
 
 @dataclass(frozen=True)

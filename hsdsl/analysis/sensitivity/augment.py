@@ -192,7 +192,7 @@ class _Writer:
             flow_texts=(*mode.flow_texts, *(f"the {name}" for name in states[len(mode.flow) :])),
             edges=tuple(self._edge(mode, edge, jump) for edge, jump in zip(mode.edges, jumps, strict=True)),
             outputs=tuple(self._outputs(mode)),
-            queues=tuple(replace(q, values=(*q.values, *self._derivatives(mode.name, q.values))) for q in mode.queues),
+            queues=tuple(q._replace(values=(*q.values, *self._derivatives(mode.name, q.values))) for q in mode.queues),
             scene=(),
         )
 

@@ -5,8 +5,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import sympy as sp
 
@@ -20,8 +20,7 @@ from hsdsl.language.system import HybridSystem, Initial, started
 from hsdsl.mathematics.lower.straight import Gradient
 
 
-@dataclass(frozen=True)
-class Overridden:
+class Overridden(NamedTuple):
     """A system with expressions of overrides in place; numbers are left to a run.
 
     ``parameters`` and ``initial`` are the overrides that a run still needs. A parameter in ``fixed`` and a state in
