@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, NamedTuple
 
@@ -184,8 +183,7 @@ IN_TIME = ("step", "relaxation")  # their default ranges are shares of a run
 EXAMPLE = "for example --map h=1e-4:1e-1:20,relaxation=1e-8:1e-2:20"
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(NamedTuple):
     """What varies: ``kind`` is a setting (step, tolerance, relaxation), ``parameter`` or ``initial``."""
 
     name: str
@@ -226,7 +224,7 @@ def read_axes(model: Model, text: str, until: float, base: Mapping[str, Any]) ->
         raise UsageError(f"--map: expected at most {MOST_CELLS:,} runs, got {len(x.values) * len(y.values):,}")
     units = model.program.units
     names = ("t" if axis.kind == "step" else axis.name.removeprefix("initial.") for axis in (x, y))
-    return replace(x, unit=units.get(next(names), "")), replace(y, unit=units.get(next(names), ""))
+    return x._replace(unit=units.get(next(names), "")), y._replace(unit=units.get(next(names), ""))
 
 
 def _axis(model: Model, part: str, until: float, base: Mapping[str, Any]) -> Axis:
