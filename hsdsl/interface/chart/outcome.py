@@ -32,31 +32,19 @@ WITHIN = Tolerance(state=0.05, time=0.005)  # of a right result
 
 @dataclass(frozen=True)
 class Outcome:
-    """What came of a run.
+    """What came of a run, in a ``word``.
 
-    Attributes
-    ----------
-    word : str
-        ``right``: the exact execution within the tolerance. ``warns``: another one, with the verdict ``left`` or
-        ``unknown``. ``wrong``: another one, without a word. ``stops``: an end before the end, with a reason.
-        ``refuses``: no run. ``crashes``, ``hangs``: the process died, or took longer than its limit.
-    why : str
-        The difference from the exact execution, or the tool's own words.
-    error : float
-        The largest difference of a state from the exact one, as a share of that state's span; NaN where none compares.
-    other : str
-        What differs from the exact execution: ``transitions`` (their number), ``modes``, ``values`` or ``end``; empty
-        where nothing does.
-    verdict : str
-        Of the theorem: ``holds``, ``left`` or ``unknown``; empty where the tool has none.
+    ``right``: the exact execution within the tolerance. ``warns``: another one, with the verdict ``left`` or
+    ``unknown``. ``wrong``: another one, without a word. ``stops``: an end before the end, with a reason.
+    ``refuses``: no run. ``crashes``, ``hangs``: the process died, or took longer than its limit.
     """
 
     word: str
-    why: str = ""
-    error: float = nan
+    why: str = ""  # the difference from the exact execution, or the tool's own words
+    error: float = nan  # the largest of a state, as a share of that state's span; NaN where none compares
     transitions: int | None = None
-    verdict: str = ""
-    other: str = ""
+    verdict: str = ""  # of the theorem: `holds`, `left` or `unknown`; empty where the tool has none
+    other: str = ""  # what differs: `transitions` (their number), `modes`, `values` or `end`; empty where nothing does
 
 
 def outcome(scene: Scene, result: Result, within: Tolerance, verdict: Verdict | None = None) -> Outcome:
