@@ -11,7 +11,6 @@ A case file `cases/RULE.yaml` has models under `good`, and under `bad` what the 
 A model may be a fragment; see `fragments.completed`.
 """
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -120,7 +119,7 @@ def test_a_rule_that_gives_up_says_so_and_the_others_go_on(monkeypatch, raised, 
     def fails(subject):
         raise raised
 
-    monkeypatch.setitem(RULES.own, "HS421", replace(RULES["HS421"], check=fails))
+    monkeypatch.setitem(RULES.own, "HS421", RULES["HS421"]._replace(check=fails))
     model = "parameters: {p: 1}\nmodes: {m: {flow: {x: 1}}}\n"
     found = lint("model.yaml", selected(["HS401", "HS421"]), text=completed(model).encode()).findings
     assert [f.code for f in found] == ["HS492", "HS401"] and says in found[0].message
