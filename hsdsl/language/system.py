@@ -181,8 +181,7 @@ class Edge:
 SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}
 
 
-@dataclass(frozen=True)
-class Shape:
+class Shape(NamedTuple):
     """A shape of the scene: a key of :data:`SIZES`, and how many points it has.
 
     Its numbers are the coordinates x, y of each point, and then its sizes.
