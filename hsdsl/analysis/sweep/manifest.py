@@ -294,7 +294,8 @@ def schema(manifest: Manifest) -> Any:
 def table(manifest: Manifest, first: int, varied: Mapping[str, Array], ensemble: Ensemble) -> Any:
     """The rows of an ensemble, the first of which has the number ``first``, and the values that vary."""
     arrow, columns = library(), schema(manifest)
-    values = {column_of(name): column for name, column in varied.items()} | dict(_columns(manifest, first, ensemble))
+    values: dict[str, Any] = {column_of(name): column for name, column in varied.items()}
+    values |= dict(_columns(manifest, first, ensemble))
     arrays = [
         _lists(arrow, values[field.name], field.type) if field.name.partition(".")[0] in LISTS
         else arrow.array(values[field.name], type=field.type, from_pandas=True)
