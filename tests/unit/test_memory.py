@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 from engines import ENGINES, needs_compiler
@@ -10,6 +12,7 @@ from shipped import MODELS
 import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits
+from hsdsl.engine.execution import records
 from hsdsl.engine.simulate import output_buffers
 
 OSCILLATOR = MODELS / "oscillator-with-stop-1.yaml"
@@ -98,3 +101,27 @@ def test_the_limit_on_the_command_line(tmp_path):
     done = subprocess.run([*command, "--limit", "memory=1e6"], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 3 and json.loads(done.stdout)["stop"]["reason"] == "memory_limit"
     assert (tmp_path / "run.csv").stat().st_size > 10_000
+
+
+@needs_compiler
+def test_transitions_of_a_long_run_are_a_sequence_made_where_it_is_looked_at(monkeypatch):
+    monkeypatch.setattr(records, "BLOCK", 3)
+    monkeypatch.setattr(records, "MOST_BLOCKS", 2)
+    thermostat = hsdsl.load(MODELS / "thermostat.yaml")
+    made = thermostat.simulate(until=100, engine="c").transitions
+    exact = thermostat.simulate(until=100, engine="python").transitions
+    assert len(made) == len(exact) > 6 and made == exact and exact == made and made[-1] == exact[-1]
+    assert made[2:7] == exact[2:7] and [each.index for each in made[::-1]] == [*range(len(made))][::-1]
+    assert made != exact[:-1] and pickle.loads(pickle.dumps(made)) == exact and (*made[:1], *made[1:]) == exact
+    with pytest.raises(IndexError):
+        made[len(made)]
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["thermostat", "pronking-runner", "bouncing-ball"])
+def test_chunks_gathered_are_the_columns_of_one_chunk(name, monkeypatch):
+    monkeypatch.setattr(output_buffers, "MOST_KEPT", 0)
+    whole = hsdsl.load(MODELS / f"{name}.yaml").simulate(engine="c")
+    monkeypatch.setattr(output_buffers, "LEAST_ROWS", 16)
+    parts = hsdsl.load(MODELS / f"{name}.yaml").simulate(engine="c")
+    assert parts == whole and parts.transitions == whole.transitions

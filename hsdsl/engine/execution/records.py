@@ -5,12 +5,13 @@ Records are frozen dataclasses, with fields that may be made on first use, and e
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import lru_cache
 from importlib import import_module
+from itertools import chain
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, Self, cast
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -91,8 +92,8 @@ def same(a: Any, b: Any) -> bool:
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         left, right = cast(Mapping[Any, Any], a), cast(Mapping[Any, Any], b)
         return list(left) == list(right) and all(same(left[key], right[key]) for key in left)
-    if isinstance(a, (tuple, list)) and isinstance(b, (tuple, list)):
-        left, right = cast("tuple[Any, ...]", a), cast("tuple[Any, ...]", b)
+    if isinstance(a, (tuple, list, Records)) and isinstance(b, (tuple, list, Records)):
+        left, right = cast("Sequence[Any]", a), cast("Sequence[Any]", b)
         return (
             isinstance(a, list) == isinstance(b, list)
             and len(left) == len(right)
@@ -111,6 +112,66 @@ def _same_arrays(a: Any, b: Any) -> bool:
         equal = np.asarray(left == right, dtype=bool)
         nan = np.asarray(left != left, dtype=bool) & np.asarray(right != right, dtype=bool)
     return bool(np.all(equal | nan))
+
+
+Item = TypeVar("Item")
+BLOCK, MOST_BLOCKS = 128, 256  # records that are made together, and how often these are kept
+
+
+class Records(Sequence[Item]):
+    """A tuple of so many records, but made where they are looked at: those of a long run take more than its columns.
+
+    ``make`` gives those from one number up to another. The blocks that were looked at last are kept.
+    """
+
+    def __init__(self, count: int, make: Callable[[int, int], Iterable[Item]]) -> None:
+        self._count, self._make = count, make
+        self._blocks: dict[int, list[Item]] = {}
+
+    def _block(self, number: int) -> list[Item]:
+        found = self._blocks.get(number)
+        if found is None:
+            if len(self._blocks) >= MOST_BLOCKS:
+                self._blocks.pop(next(iter(self._blocks)), None)
+            start = number * BLOCK
+            found = self._blocks[number] = list(self._make(start, min(start + BLOCK, self._count)))
+        return found
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> Item: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Item, ...]: ...
+    def __getitem__(self, index: int | slice) -> Any:
+        if isinstance(index, slice):
+            return tuple(self[place] for place in range(self._count)[index])
+        place = range(self._count)[index]
+        return self._block(place // BLOCK)[place % BLOCK]
+
+    def __iter__(self) -> Iterator[Item]:
+        return chain.from_iterable(map(self._block, range(-(-self._count // BLOCK))))
+
+    def __add__(self, other: tuple[Item, ...]) -> tuple[Item, ...]:
+        return (*self, *other)
+
+    def __radd__(self, other: tuple[Item, ...]) -> tuple[Item, ...]:
+        return (*other, *self)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, (tuple, Records)):
+            return NotImplemented
+        there = cast("Sequence[Item]", other)
+        return len(self) == len(there) and all(a == b for a, b in zip(self, there, strict=True))
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return tuple, (tuple(self),)
 
 
 Kind = Literal["flow", "strip"]

@@ -325,8 +325,8 @@ class Execution(Deferred):
     ----------
     stop : Stop
         The reason and time of the run's end.
-    transitions : tuple of Transition
-        The transitions, in order.
+    transitions : sequence of Transition
+        The transitions, in order: a tuple, or `Records` of a compiled run.
     final : Point
         Time, mode, states and outputs at the end.
     verdict : Verdict
@@ -368,7 +368,7 @@ class Execution(Deferred):
     method: str
     settings: dict[str, Any]
     stop: Stop
-    transitions: tuple[Transition, ...]
+    transitions: Sequence[Transition]
     final: Point
     verdict: Verdict
     output_names: tuple[str, ...]

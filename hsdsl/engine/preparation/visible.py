@@ -6,7 +6,7 @@ lacks these numbers, and states that the mode of their part does not have.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,7 @@ import numpy as np
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.base.parts import Part, numbered, numbers_of, present, product_name
 from hsdsl.engine.execution import Arc, Array, Execution, Point, Stop, Transition, Verdict
+from hsdsl.engine.execution.records import Records
 from hsdsl.engine.simulate import Prepared
 
 _AS_THEY_ARE = ("model", "digest", "engine", "scheme", "method", "output_names", "seconds", "digits", "title",
@@ -125,9 +126,10 @@ class _View:
         return seen
 
     @cached_property
-    def transitions(self) -> tuple[Transition, ...]:
+    def transitions(self) -> Sequence[Transition]:
         """The transitions between product modes."""
-        return tuple(map(self._transition, self.run.transitions))
+        own = self.run.transitions
+        return Records(len(own), lambda start, end: map(self._transition, own[start:end]))
 
     def _transition(self, made: Transition) -> Transition:
         after = made.after if made.after is not None else self._landing(made)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,24 +62,31 @@ class Gathered:
     def __init__(self, chunks: list[dict[str, Array]], rows: int, width: int) -> None:
         self._chunks, self.rows, self._width = chunks, rows, width
         self._arrays: dict[str, Array] = {}
+        self._lock = Lock()
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._arrays:
-            own = "pieces" if name == "coefficients" else name
-            with suppress(KeyError):  # another thread has joined them
-                self._arrays[name] = self._joined(name, [chunk[own] for chunk in self._chunks])
-            for chunk in self._chunks:
-                chunk.pop(own, None)
+            with self._lock:
+                if name not in self._arrays:
+                    self._arrays[name] = self._joined("pieces" if name == "coefficients" else name)
         return self._arrays[name]
 
-    def _joined(self, name: str, parts: list[Array]) -> Array:
-        """One column; a row's piece, which led to it in the run, leaves it here."""
-        if name == "coefficients":
-            parts = [parts[0][1:], *parts[1:]]
-            parts = [*(part[:-1] for part in parts[:-1]), parts[-1]]
-        if name in ("values", "coefficients"):
-            parts = [part[..., : self._width] for part in parts]
-        return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts))
+    def _joined(self, name: str) -> Array:
+        """One column; a row's piece, which led to it in the run, leaves it here. Copied parts are let go."""
+        first = self._chunks[0][name]
+        shape = (*first.shape[1:-1], self._width) if name in ("values", "pieces") else first.shape[1:]
+        count = self.rows if name == "pieces" else sum(len(chunk[name]) for chunk in self._chunks)
+        whole, end = np.empty((count, *shape), first.dtype), 0
+        for k, chunk in enumerate(self._chunks):
+            part = chunk.pop(name)
+            if name == "pieces":
+                part = part[int(k == 0) : -1]
+            if len(shape) and shape != part.shape[1:]:
+                part = part[..., : self._width]
+            whole[end : end + len(part)] = part
+            end += len(part)
+        whole[end:] = 0.0  # nothing leaves the last row
+        return whole
 
     @property
     def notes(self) -> int:

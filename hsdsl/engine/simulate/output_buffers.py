@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from hsdsl.base.limits import DEFAULT
 from hsdsl.engine.execution import Arc, Array, Transition
+from hsdsl.engine.execution.records import Records
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate.columns import Columns, Counts, Gathered, Packed, Shape, StateLayouts
 from hsdsl.engine.simulate.review import Review
@@ -66,10 +68,11 @@ class OutputBuffers:
         if self.sink is not None:
             self.sink(self._written())
             return self._reset()
-        self._full.append(self._written())
-        taken = sum(column.nbytes for column in self._columns.values())
+        written, rows = self._written(), max(1, self.counts.rows)
+        self._full.append(written)
+        taken = sum(column.nbytes for column in written.values())
         self._taken += taken
-        left = (self._memory - self._taken) * self._rows // taken
+        left = (self._memory - self._taken) * rows // taken
         self.full = left < min(LEAST_ROWS, self._rows)
         try:
             self._open(LEAST_ROWS if self.full else min(2 * self._rows, MOST_ROWS, left))
@@ -89,7 +92,7 @@ class OutputBuffers:
 
     def _open(self, rows: int) -> None:
         shape = self._shape
-        arcs, transitions, notes = rows // 2 + 8, rows // 4 + 8, rows // 16 + 8
+        arcs, transitions, notes = rows // 2 + 8, rows // 2 + 8, rows // 16 + 8
         notes += rows // 2 * max(0, shape.contacts - 1)  # of each guard that holds a state, where something else jumps
         self._columns: dict[str, Array] = {
             "times": np.empty(rows),
@@ -151,7 +154,6 @@ class OutputBuffers:
         if not self._full and self._rows * self._row_bytes <= MOST_KEPT:
             return Packed(pack, self.counts, self._shape)
         chunks = [*self._full, self._written()]
-        chunks[-1]["pieces"][-1] = 0.0  # nothing leaves the last row
         rows = sum(len(chunk["times"]) for chunk in chunks)
         if len(chunks) > 1:
             self._before = min(rows * 9 // 8, MOST_KEPT // self._row_bytes)
@@ -178,30 +180,35 @@ def arcs_of(whole: Columns, program: Program, layouts: StateLayouts, start: int 
             yield Arc(names[index], states[number], kinds[kind], jump, first, last)
 
 
-def transitions_of(whole: Columns, program: Program) -> Iterator[Transition]:
-    """Make the transitions of whole columns."""
-    alternatives: list[int] = whole["alternatives"].tolist()
-    made: list[tuple[float, float, int, int, int, int]] = whole["transition"].tolist()
-    states: list[list[list[float]]] = [whole["before"].tolist(), whole["after"].tolist()]
-    used = 0
-    for index, (time, resumed, source, number, entry, count) in enumerate(made):
-        before, after = states[0][index], states[1][index]
+def transitions_of(whole: Columns, program: Program) -> Records[Transition]:
+    """The transitions of whole columns."""
+    counts = whole["transition"]["alternatives"]
+    used = np.cumsum(counts) - counts if len(whole["alternatives"]) else None
+    return Records(len(counts), partial(_transitions, whole, program, used))
+
+
+def _transitions(whole: Columns, program: Program, used: Array | None, start: int, end: int) -> Iterator[Transition]:
+    """Make transitions from ``start`` up to ``end``; ``used`` has where the alternatives of each begin."""
+    made: list[tuple[float, float, int, int, int, int]] = whole["transition"][start:end].tolist()
+    before: list[list[float]] = whole["before"][start:end].tolist()
+    after: list[list[float]] = whole["after"][start:end].tolist()
+    for k, (time, resumed, source, number, entry, count) in enumerate(made):
         mode = program.modes[source]
         edge = mode.edges[number]
         ended = resumed != resumed
+        others: list[int] = [] if used is None else whole["alternatives"][used[start + k] :][:count].tolist()
         yield Transition(
-            index=index,
+            index=start + k,
             time=time,
             resumed=None if ended else resumed,
             edge=edge.name,
             source=mode.name,
             target=program.modes[edge.target].name,
-            before=dict(zip(mode.states, before, strict=False)),
-            after=None if ended else dict(zip(edge.target_states, after, strict=False)),
-            alternatives=tuple(mode.edges[k].name for k in alternatives[used : used + count]),
+            before=dict(zip(mode.states, before[k], strict=False)),
+            after=None if ended else dict(zip(edge.target_states, after[k], strict=False)),
+            alternatives=tuple(mode.edges[n].name for n in others),
             entry=bool(entry),
         )
-        used += count
 
 
 def grown(visited: Any, room: int, width: int) -> tuple[Array, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from typing import Any
 
@@ -109,8 +109,8 @@ def _settings(execution: Execution) -> dict[str, Any]:
     return described(problem.settings, problem.program.left_out)
 
 
-def _transitions(execution: Execution) -> tuple[Transition, ...]:
-    return tuple(transitions_of(_columns(execution), _of(execution).plan.problem.program))
+def _transitions(execution: Execution) -> Sequence[Transition]:
+    return transitions_of(_columns(execution), _of(execution).plan.problem.program)
 
 
 def _arcs(execution: Execution) -> tuple[Arc, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -104,7 +105,7 @@ def _is_near_transition(run: Execution, t: Number, margin: Number) -> bool:
     return k >= 0 and (times[k].resumed is None or t - margin <= times[k].resumed)
 
 
-def corrected_times(transitions: tuple[Transition, ...]) -> list[Number]:
+def corrected_times(transitions: Sequence[Transition]) -> list[Number]:
     """Return the transition times minus the time spent in strips before them."""
     times: list[Number] = []
     spent = 0
