@@ -79,8 +79,6 @@ def text_of(folder: Path) -> str:
     given = settings(folder)
     if not given["start"]:
         raise NotExpressible("flux balance: a steady state, not a course of time")
-    if re.search(r"^\s*testTags:.*RandomEventExecution", next(folder.glob("*-model.m")).read_text("latin-1"), re.M):
-        raise NotExpressible("a random choice between events of equal priority")
     kinds = {name: kind for kind in ("amount", "concentration") for name in given[kind]}
     outputs = {name: kinds.get(name, "value") for name in given["variables"]}
     end = float(given["start"]) + float(given["duration"])

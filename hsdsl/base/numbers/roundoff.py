@@ -194,8 +194,20 @@ class Roundoff:
         return Rounded(self, taken.value, (meant.value - taken.value) + meant.error, inf if unclear else meant.off)
 
 
+_HALF = 134217729.0  # 2**27 + 1: what cuts the digits of a float in half
+
+
 def _lost(a: float, b: float, product: float) -> float:
-    """What a product of two numbers is beyond another number, exactly."""
+    """What a product of two numbers is beyond another number, exactly.
+
+    In floats where no part of it can overflow or underflow (Dekker 1971, doi:10.1007/BF01397083).
+    """
+    p = a * b
+    if 1e-270 < abs(p) < 1e270 and 1e-270 < abs(a) < 1e270 and 1e-270 < abs(b) < 1e270 and 0.5 <= product / p <= 2:
+        cut, other = _HALF * a, _HALF * b
+        high, head = cut - (cut - a), other - (other - b)
+        low, tail = a - high, b - head
+        return (p - product) + (((high * head - p) + high * tail + low * head) + low * tail)
     if not isfinite(product) or not isfinite(a) or not isfinite(b):
         return product - product
     return float(Fraction(a) * Fraction(b) - Fraction(product))
