@@ -129,7 +129,9 @@ class Scipy:
 
     def excess(self, text: str, names: dict[str, float]) -> float:
         """How far an inequality holds: at least zero where it does."""
-        left, sign, right = SIDES.fullmatch(str(text).strip()).groups()
+        matched = SIDES.fullmatch(str(text).strip())
+        assert matched is not None
+        left, sign, right = matched.groups()
         return (self.value(left, names) - self.value(right, names)) * (1 if sign[0] == ">" else -1)
 
     def holds(self, text: Any, names: dict[str, float], within: float) -> bool:
