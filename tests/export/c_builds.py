@@ -12,7 +12,7 @@ from pathlib import Path
 from shutil import which
 from typing import Any
 
-from hsdsl.engine.runtime.library import RUNTIME
+from hsdsl.engine.runtime.library import RUNTIME, print_scheme, runtime_text
 from hsdsl.export import files_of, source_of, write
 from hsdsl.export.c.sources import COMPILED, EXACT_FLAGS
 from hsdsl.interface.model import Model
@@ -73,7 +73,8 @@ def cached_compiler() -> str:
 def runtime_object(command: tuple[str, ...]) -> str:
     """The runtime compiled by a command, once for all tests: it is the same in every export."""
     target = Path(_objects().name) / f"hs{runtime_object.cache_info().currsize}.o"
-    _run([*command, f"-I{RUNTIME}", "-c", "-o", str(target), str(RUNTIME / "hs.c")])
+    headers = [f"-I{RUNTIME}", f"-I{print_scheme(target.parent)}"]
+    _run([*command, *headers, "-c", "-o", str(target), str(RUNTIME / "hs.c")])
     return str(target)
 
 
@@ -87,7 +88,7 @@ def objects(folder: Path, compiler: list[str], *options: str, main: str = "") ->
     """Compile the files of an export, and a main one where it is named, with all warnings as errors."""
     command = [*compiler, "-O1", *WARNINGS, *EXACT_FLAGS, *options]
     sources = [name for name in (main, *COMPILED) if name not in ("", "runtime/hs.c")]
-    assert all(path.read_bytes() == (RUNTIME / path.name).read_bytes() for path in (folder / "runtime").iterdir())
+    assert all(path.read_text() == runtime_text(path.name) for path in (folder / "runtime").iterdir())
     made = [(folder / name).with_suffix(".o") for name in sources]
     for name, target in zip(sources, made, strict=True):
         _run([*command, f"-I{folder}", f"-I{folder / 'runtime'}", "-c", "-o", str(target), str(folder / name)])

@@ -18,6 +18,7 @@ import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.compiler import FLAGS, find_compiler
+from hsdsl.engine.runtime.library import print_scheme
 from hsdsl.engine.simulate import output_buffers
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
@@ -54,8 +55,9 @@ def test_the_compiler_lays_out_structures_and_numbers_names_as_they_were_read(tm
 @pytest.mark.parametrize(
     "name", ["functions.h", "hs_math.h", "hs_series.h", "hs_screen.h", "workspace.h", "hs.c", "library.c"]
 )
-def test_what_is_compiled_or_included_alone_includes_what_it_uses(name):
-    command = [*find_compiler().command, "-std=c99", "-fsyntax-only", "-Werror=implicit-function-declaration"]
+def test_what_is_compiled_or_included_alone_includes_what_it_uses(name, tmp_path):
+    flags = ["-std=c99", "-fsyntax-only", "-Werror=implicit-function-declaration", f"-I{print_scheme(tmp_path)}"]
+    command = [*find_compiler().command, *flags]
     done = subprocess.run([*command, str(structures.FOLDER / name)], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
 

@@ -10,9 +10,43 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
-from hsdsl.engine.simulate.surfaces import ROUNDING, bernstein, changes, last_root, rises, split, value, value_and_slope
+from hsdsl.engine.scheme import roots as text
+from hsdsl.engine.simulate.surfaces import make_roots
 
-TINY = 2.0**-50
+ROUNDING = text.ROUNDING
+ROOM = make_roots(12, FLOAT64)
+TINY = ROOM.unit
+
+
+def bernstein(c):
+    text.fill_bernstein(ROOM.binomials, c, len(c) - 1, b := [c[0]] * len(c))
+    return b
+
+
+def changes(b):
+    return text.changes(b, len(b) - 1)
+
+
+def split(b, s):
+    right, left = [*b], [*b]
+    text.split(right, len(b) - 1, s, left)
+    return left, right
+
+
+def value(c, s):
+    return text.value_of(c, len(c) - 1, s)
+
+
+def value_and_slope(c, s):
+    return text.value_and_slope(c, len(c) - 1, s)
+
+
+def rises(c, level, start, room=ROOM):
+    return text.rises(room, c, len(c) - 1, 1, level, start)
+
+
+def last_root(c, start, end, room=ROOM):
+    return text.last_root(room, c, len(c) - 1, 0, start, end)
 
 
 def from_roots(roots: list[Fraction], sign: int = 1) -> list[Fraction]:
@@ -56,10 +90,10 @@ def test_every_rise_is_found(thousandths: list[int]) -> None:
     found, start, noise = [], 0.0, ROUNDING * TINY * sum(map(abs, c))
     ends = [*roots, Fraction(1)]
     assume(all(abs(value(exact, (a + b) / 2)) > 2 * noise for a, b in pairwise(ends)))  # else it is lost in round-off
-    while (above := rises(c, noise, start, TINY)) is not None:
-        root = last_root(c, start, above, TINY, bernstein(c))
+    while (above := rises(c, noise, start)) is not None:
+        root = last_root(c, start, above)
         found.append(start if root is None else root)
-        below = rises(down, 0.0, above, TINY)
+        below = rises(down, 0.0, above)
         if below is None:
             break
         start = below
@@ -73,28 +107,29 @@ def test_two_roots_close_together(arithmetic: object) -> None:
     """A visit of 1e-6 of the step, which no sign test at its ends could see."""
     number = arithmetic.constant  # type: ignore[attr-defined]
     c = [number(a) for a in from_roots([Fraction(3, 10), Fraction(3, 10) + Fraction(1, 10**6)], -1)]
-    above = rises(c, number(Fraction(0)), number(Fraction(0)), number(Fraction(1, 2**50)))
+    room, zero = make_roots(2, arithmetic), number(Fraction(0))  # type: ignore[arg-type]
+    above = rises(c, zero, zero, room)
     assert above is not None
-    root = last_root(c, number(Fraction(0)), above, number(Fraction(1, 2**50)), bernstein(c))
+    root = last_root(c, zero, above, room)
     assert abs(root - number(Fraction(3, 10))) <= 1e-9
 
 
 def test_a_touch_from_below_is_no_rise() -> None:
     c = [float(a) for a in from_roots([Fraction(1, 3), Fraction(1, 3)], -1)]
-    assert rises(c, 1e-15, 0.0, TINY) is None
+    assert rises(c, 1e-15, 0.0) is None
 
 
 def test_above_all_along_has_no_root() -> None:
-    assert last_root([0.5, 1.0], 0.0, 1.0, TINY, [0.5, 1.5]) is None
-    assert rises([0.5, 1.0], 0.0, 0.0, TINY) == 0.0
+    assert last_root([0.5, 1.0], 0.0, 1.0) is None
+    assert rises([0.5, 1.0], 0.0, 0.0) == 0.0
 
 
 def test_a_root_at_the_start_belongs_to_the_start() -> None:
-    assert last_root([0.0, 1.0], 0.0, 1.0, TINY, [0.0, 1.0]) == 0.0
+    assert last_root([0.0, 1.0], 0.0, 1.0) == 0.0
 
 
 def test_small_roots_are_found_to_the_last_bits_of_themselves() -> None:
     c = [-1e-9 * 0.5, 0.5, 1.0]
-    root = last_root(c, 0.0, 1.0, TINY, bernstein(c))
+    root = last_root(c, 0.0, 1.0)
     assert root == pytest.approx(1e-9 / (1 + 2e-9) * 1.0, rel=1e-8)
     assert abs(value(c, root)) <= 1e-24

@@ -13,7 +13,7 @@ import pytest
 import hsdsl
 from hsdsl.engine.backends.c.source import model_source
 from hsdsl.engine.runtime.compiler import FLAGS
-from hsdsl.engine.runtime.library import RUNTIME
+from hsdsl.engine.runtime.library import RUNTIME, print_scheme
 
 TESTS = Path(__file__).parents[1]
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
@@ -27,7 +27,17 @@ def test_no_warnings(compiler: str, tmp_path: Path) -> None:
     for path in sorted((TESTS.parent / "models").glob("*.yaml")):
         (tmp_path / f"{path.stem}.c").write_text(model_source(hsdsl.load(path).program))
     for source in tmp_path.glob("*.c"):
-        command = [compiler, *FLAGS, *WARNINGS, f"-I{RUNTIME}", "-o", str(tmp_path / "x.so"), str(source), "-lm"]
+        command = [
+            compiler,
+            *FLAGS,
+            *WARNINGS,
+            f"-I{RUNTIME}",
+            f"-I{print_scheme(tmp_path)}",
+            "-o",
+            str(tmp_path / "x.so"),
+            str(source),
+            "-lm",
+        ]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
 

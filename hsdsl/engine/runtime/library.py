@@ -23,6 +23,7 @@ from hsdsl.mathematics.program import Program
 
 RUNTIME = Path(__file__).parent / "c"
 BACKENDS = Path(__file__).parents[1] / "backends"
+SCHEME = Path(__file__).parents[1] / "scheme"
 SHIPPED = Path(__file__).parent / "shipped"
 KIND = "compiled"
 GIVEN_UP = "given-up"  # entries for models that took too long to compile: the seconds that the compiler had
@@ -46,9 +47,28 @@ def loop_object(folder: Path) -> Path:
             _copy(kept, made)
             return made
         flags = ("-c", *(flag for flag in FLAGS if flag != "-shared"))
-        compiler.build([RUNTIME / "hs.c"], [RUNTIME], made, EFFORT, flags)
+        compiler.build([RUNTIME / "hs.c"], [RUNTIME, print_scheme(folder)], made, EFFORT, flags)
         _keep(key, made)
     return made
+
+
+def runtime_text(name: str) -> str:
+    """A file of the runtime: written by hand, or printed."""
+    path = RUNTIME / name
+    return path.read_text() if path.exists() else _printed()[name]
+
+
+def print_scheme(folder: Path) -> Path:
+    """Write the files that are printed into a folder, for a compiler to include; returns the folder."""
+    for name, text in _printed().items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def _printed() -> dict[str, str]:
+    from hsdsl.engine.scheme.printer import printed  # what is compiled already needs none
+
+    return printed()
 
 
 def ship(folder: Path) -> Path:
@@ -116,8 +136,13 @@ def _key(content: str, compiler: Compiler) -> str:
 
 @cache
 def _our_text() -> bytes:
-    """The hand-written C and what writes the rest: closer than a version to what a library was made by."""
-    printers = (BACKENDS / "printer.py", BACKENDS / "taylor.py", *sorted((BACKENDS / "c").glob("*.py")))
+    """The hand-written C and what prints the rest: closer than a version to what a library was made by."""
+    printers = (
+        BACKENDS / "printer.py",
+        BACKENDS / "taylor.py",
+        *sorted((BACKENDS / "c").glob("*.py")),
+        *sorted(SCHEME.glob("*.py")),
+    )
     paths = (*sorted(RUNTIME.glob("*.[ch]")), *printers)
     return b"".join(path.read_bytes() for path in paths)
 
@@ -169,7 +194,7 @@ def _compile(compiler: Compiler, texts: Sequence[str], library: Path, effort: Ef
     sources = [library.with_name(f"model{number or ''}.c") for number in range(len(texts))]
     for source, text in zip(sources, texts, strict=True):
         source.write_text(text)
-    compiler.build(sources, [RUNTIME], library, effort, FLAGS)
+    compiler.build(sources, [RUNTIME, print_scheme(library.parent)], library, effort, FLAGS)
 
 
 def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:

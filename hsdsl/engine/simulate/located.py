@@ -24,6 +24,7 @@ from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Polynomial, Stages, State
 from hsdsl.engine.integrators.taylor import proposed_step
 from hsdsl.engine.kernel import Series
+from hsdsl.engine.scheme.roots import slope_of, stays_below, value_of
 from hsdsl.engine.simulate.contact import (
     at_limit,
     behind_end,
@@ -62,10 +63,7 @@ from hsdsl.engine.simulate.surfaces import (
     rises_along,
     settles,
     shortened,
-    slope_of,
-    stays_below,
     total,
-    value,
     without_zeros,
 )
 from hsdsl.engine.simulate.transitions import choose, enter, reset
@@ -213,7 +211,7 @@ def crossings_along(run: Run, here: ModeState, span: Span) -> list[Crossing]:
             found[crossing.edge] = crossing
 
     for k in range(len(span.curves)):
-        rises = rises_of(here, span, k, run.arithmetic.unit)
+        rises = rises_of(run, here, span, k)
         rise = next(rises, None)
         if rise is None:
             keep(reaches(run, here, span, k, pieces_of(here, span, k)))
@@ -250,14 +248,15 @@ def pieces_of(here: ModeState, span: Span, k: int) -> list[Piece]:
     return deflated(span.curves[k]) if k in here.surfaces.active else span.curves[k]
 
 
-def rises_of(here: ModeState, span: Span, k: int, unit: Number) -> Iterator[Rise]:
+def rises_of(run: Run, here: ModeState, span: Span, k: int) -> Iterator[Rise]:
     """Where surface k rises along a step, on its polynomials."""
     surfaces, pieces = here.surfaces, pieces_of(here, span, k)
-    if span.ends[k] <= 0 and all(stays_below(piece.coefficients, piece.off) for piece in pieces):
+    polynomials = ((piece.coefficients, len(piece.coefficients) - 1, piece.off) for piece in pieces)
+    if span.ends[k] <= 0 and all(stays_below(run.roots, *each) for each in polynomials):
         return
     first, last = surfaces.roundoff_bound(k, span.t, span.x), surfaces.roundoff_bound(k, span.t1, span.z)
     beyond = pieces[0].coefficients[0] > first
-    yield from rises_along(pieces, max(first, last), beyond, span.ends[k] > last, unit)
+    yield from rises_along(run.roots, pieces, max(first, last), beyond, span.ends[k] > last)
 
 
 def first_crossing(
@@ -691,10 +690,10 @@ class SeriesSteps(Steps):
         tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)
         tail = abs(c[-1]) <= LAST_TERM * tolerance * largest and abs(c[-2]) <= TERM_BEFORE * tolerance * largest
         one = end * 0 + 1
-        off = abs(value(c, one) - end)
+        off = abs(value_of(c, len(c) - 1, one) - end)
         if tail:
             return settles(off, tolerance * largest, noise, k)
-        return off <= noise(k) and abs(value(c, one / 2) - middle()[k]) <= noise(k)
+        return off <= noise(k) and abs(value_of(c, len(c) - 1, one / 2) - middle()[k]) <= noise(k)
 
 
 def sizes_along(x: State, piece: Polynomial, s: Number) -> State:
@@ -710,7 +709,7 @@ def reaches(run: Run, here: ModeState, span: Span, k: int, pieces: list[Piece]) 
     c, one = pieces[0].coefficients, run.arithmetic.zero + 1
     if not c[1] > 0 or len(pieces) > 1 or run.control.tolerance is None:
         return None
-    share, time, q, slope = one, span.t1, span.z, slope_of(c, one)
+    share, time, q, slope = one, span.t1, span.z, slope_of(c, len(c) - 1, one)
     if slope > ROUNDOFF_UNITS * run.arithmetic.unit * c[1]:
         return None
     if here.kernel.rates[k](span.t1, *span.z)[0] > 0:
@@ -731,7 +730,7 @@ def turning(c: Sequence[Number], one: Number) -> Number:
     low, high = one * 0, one
     for _ in range(TURNINGS):
         middle = (low + high) / 2
-        low, high = (middle, high) if slope_of(c, middle) > 0 else (low, middle)
+        low, high = (middle, high) if slope_of(c, len(c) - 1, middle) > 0 else (low, middle)
     return low
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from hsdsl.base.numbers.arithmetic import Number
@@ -10,18 +11,21 @@ from hsdsl.engine.execution import Stop, Transition
 from hsdsl.engine.integrators.stepper import Derivatives, State, Stepper, stepper
 from hsdsl.engine.integrators.taylor import taylor_stepper
 from hsdsl.engine.kernel import ModeKernel
+from hsdsl.engine.scheme.roots import Roots
 from hsdsl.engine.simulate.control import Control
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.moving import moved_by_flow, moved_crossing
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.recorder import OpenArc, Recorder
 from hsdsl.engine.simulate.stops import Diagnostics, limit
-from hsdsl.engine.simulate.surfaces import Crossing, Surfaces, larger
+from hsdsl.engine.simulate.surfaces import Crossing, Surfaces, larger, make_roots
 from hsdsl.engine.simulate.transitions import Cascade, Tails
 from hsdsl.mathematics.program import ModeProgram
 
 if TYPE_CHECKING:
     from hsdsl.engine.simulate.stalls import Standstill
+
+MOST_DEGREE = 8  # of surfaces along steps where a method asks for less
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,14 @@ class Run(Problem):
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
     cascade: Cascade = field(default_factory=Cascade)
     tails: Tails = field(default_factory=Tails)
+
+    @cached_property
+    def roots(self) -> Roots:
+        """Room to look for roots of surfaces along steps."""
+        method = self.settings.method
+        return make_roots(
+            max(MOST_DEGREE, method.degree, method.error_order) if method else MOST_DEGREE, self.arithmetic
+        )
 
     def stepper(self, here: ModeState) -> Stepper:
         """The method for the mode that the run is in."""

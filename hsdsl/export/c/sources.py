@@ -13,7 +13,7 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible
 from hsdsl.engine.backends.c.source import model_source
 from hsdsl.engine.runtime.compiler import FLAGS
-from hsdsl.engine.runtime.library import RUNTIME
+from hsdsl.engine.runtime.library import runtime_text
 from hsdsl.export.c.problem import PARTS, comment, header, numbers
 from hsdsl.export.source import Source, filled
 
@@ -53,7 +53,7 @@ def _included(names: Iterable[str], including: Mapping[str, str]) -> dict[str, s
     while ahead:
         name = ahead.pop()
         if name not in found and name not in including:
-            found[name] = (RUNTIME / name).read_text()
+            found[name] = runtime_text(name)
             ahead += _INCLUDE.findall(found[name])
     return found
 

@@ -18,7 +18,6 @@ enum { WITHOUT_VALUE = -4 }; /* how first_event() ends, else GOES_ON, LANDED or 
 #define CREEPING 10
 #define MOST_CREEPING 2000
 #define ROUNDOFF_UNITS 32
-#define ROUNDING 8
 
 typedef int hs_functions(hs_run *run, hs_real s, hs_real *values);
 typedef int hs_allowed(hs_run *run, int k, hs_real *allowed);

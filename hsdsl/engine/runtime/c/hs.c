@@ -19,6 +19,9 @@
 #include "stepper.c"
 #include "control.c"
 
+#include "primitives.h"
+#include "roots.c" /* printed from hsdsl/engine/scheme */
+
 #include "surfaces.c"
 #include "stalls.c"
 #include "run.c"
@@ -114,6 +117,19 @@ static hs_span lay_out_span(const hs_run *run, hs_store *store) {
   return span;
 }
 
+static hs_roots lay_out_roots(hs_store *store, int degree) {
+  hs_real *const left = numbers(store, degree + 1), *const own = numbers(store, degree + 1);
+  hs_real *const binomials = numbers(store, (int64_t)(degree + 1) * (degree + 2) / 2);
+  hs_cut *const cuts = take(store, MOST_CUTS, sizeof(hs_cut));
+  const hs_roots roots = {HS_UNIT, binomials, 0, own, left, cuts};
+  if (store->numbers) fill_binomials(binomials, degree);
+  for (int i = 0; i < MOST_CUTS; i++) {
+    hs_real *const b = numbers(store, degree + 1);
+    if (store->numbers) cuts[i].b = b;
+  }
+  return roots;
+}
+
 /* The same for the arrays of the located scheme. */
 static void lay_out_located(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1, most = most_degree(run->method);
@@ -128,16 +144,8 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->other_k = take_stages(store, run);
   take_each(store, m, values);
   run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
-  run->left = numbers(store, most + 1);
-  run->bernstein = numbers(store, most + 1);
-  run->binomials = numbers(store, (int64_t)(most + 1) * (most + 2) / 2);
-  if (store->numbers) fill_binomials(run->binomials, most);
+  run->roots = lay_out_roots(store, most);
   run->waiting = take(store, m, sizeof(hs_riser));
-  run->cuts = take(store, MOST_CUTS, sizeof(hs_cut));
-  for (int i = 0; i < MOST_CUTS; i++) {
-    hs_real *b = numbers(store, most + 1);
-    if (store->numbers) run->cuts[i].b = b;
-  }
   run->unsettled = take(store, (int64_t)run->model->modes * m, sizeof(int));
   for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->unsettled[i] = 0;
   run->reach = numbers(store, run->model->modes);

@@ -336,7 +336,7 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
   const int n = *degree_of(&run->curves, 0, k);
   hs_real rate, noise, share = 1.0;
   if (!may_be_reached(run, k)) return 0;
-  const hs_real slope = slope_at_end(c, n);
+  const hs_real slope = slope_of(c, n, 1.0);
   if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
   if (run->here.table->rates[k](run->here.p, span->t1, run->z, &rate)) return RAISED;
   crossing->time = span->t1;
@@ -363,11 +363,11 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
 /* Whether the polynomials of surface k say that it is not crossed. */
 static int is_passed_by(hs_run *run, int k) {
   const hs_curves *curves = &run->curves;
-  run->bernstein_of = 0;
+  run->roots.of = 0;
   if (run->active_surfaces[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
   if (!(run->ends[k] <= 0)) return 0;
   for (int i = 0; i < curves->parts; i++)
-    if (!stays_below(run, coefficients_of(curves, i, k), *degree_of(curves, i, k), *off_of(curves, i, k))) return 0;
+    if (!stays_below(&run->roots, coefficients_of(curves, i, k), *degree_of(curves, i, k), *off_of(curves, i, k))) return 0;
   return 1;
 }
 
@@ -419,8 +419,9 @@ static int first_rise(hs_run *run, int k, hs_crossing *crossing) {
   if (is_passed_by(run, k)) return reaches(run, k, crossing);
   if (bound_at(run, k, AT_START, &first) || bound_at(run, k, AT_END, &last)) return RAISED;
   const int beyond = coefficients_of(&run->curves, 0, k)[0] > first;
-  waiting->walk = begin_walk(k, hs_max(first, last), beyond, run->ends[k] > last);
-  waiting->open = next_rise(run, &waiting->walk, &waiting->rise);
+  const hs_path path = {k, 0, {hs_max(first, last), beyond, run->ends[k] > last, 0.0}};
+  waiting->path = path;
+  waiting->open = next_rise(run, &waiting->path, &waiting->rise);
   return waiting->open ? 0 : reaches(run, k, crossing);
 }
 
@@ -438,7 +439,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
     crossing->edge = k;
     crossing->depth = 0.0;
     return 1;
-  } while (next_rise(run, &waiting->walk, rise));
+  } while (next_rise(run, &waiting->path, rise));
   return reaches(run, k, crossing);
 }
 

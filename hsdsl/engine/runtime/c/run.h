@@ -9,6 +9,7 @@
 
 #include "hs_math.h"
 #include "hs_simulate.h"
+#include "scheme.h"
 
 #if defined(HS_INLINE) /* given by who compiles: sanitizers take minutes over code that is inlined everywhere */
 #elif defined(__GNUC__)
@@ -168,11 +169,6 @@ typedef struct {
   hs_real *x;
 } hs_cascade;
 
-/* A part of an interval, with the Bernstein coefficients of a polynomial on it. */
-typedef struct {
-  hs_real low, high, *b;
-} hs_cut;
-
 /* Surfaces along one step: on part i, from start[i] on, surface k is a polynomial of the share of that part. */
 typedef struct {
   int parts, count, room; /* room: numbers for each polynomial */
@@ -186,15 +182,15 @@ typedef struct {
   int certain;
 } hs_rise;
 
-/* A walk along surface k; `outside` says at first whether it begins beyond round-off, `risen` whether it ends there. */
+/* A walk along all parts of surface k. */
 typedef struct {
-  int k, risen, outside, part;
-  hs_real level, at;
-} hs_walk;
+  int k, part;
+  hs_walk walk;
+} hs_path;
 
 /* A surface that rises along the step, first at `rise`, and whether its crossing there is still to be settled. */
 typedef struct {
-  hs_walk walk;
+  hs_path path;
   hs_rise rise;
   int open;
 } hs_riser;
@@ -266,10 +262,9 @@ typedef struct {
   int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
   hs_real ratio;                     /* of the last error estimate */
   hs_curves curves;
-  hs_riser *waiting;               /* one for each surface */
-  hs_cut *cuts;
-  const hs_real *bernstein_of;       /* the polynomial that `bernstein` has the coefficients of, 0 for none */
-  hs_real *bernstein, *binomials, *left, *rows;
+  hs_riser *waiting; /* one for each surface */
+  hs_roots roots;
+  hs_real *rows;
   hs_real *q, *ends, *starts, *middle, *other_end, **other_k;
   int has_middle;
   hs_real *began;                   /* where a motion along a guard began */
