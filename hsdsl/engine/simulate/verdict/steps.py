@@ -71,7 +71,7 @@ class Parts:
     def times(self) -> Range:
         """The times of each part."""
         low, high = self.time + self.start * self.length, self.time + (self.start + self.width) * self.length
-        return Range(np.nextafter(low, -np.inf), np.nextafter(high, np.inf))
+        return Range(np.where(low == 0, 0.0, np.nextafter(low, -np.inf)), np.nextafter(high, np.inf))  # 0 is exact
 
     def states(self, wider: float = 0.0) -> list[Range]:
         """The states along each part, ``wider`` times the error either way."""
