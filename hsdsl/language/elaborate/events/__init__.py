@@ -17,7 +17,7 @@ from hsdsl.base.names import SINCE
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.events.event import Event, chosen
 from hsdsl.language.elaborate.events.firing import edges_of
-from hsdsl.language.elaborate.events.remembering import Memory, all_states, entered, new_values, remembered
+from hsdsl.language.elaborate.events.remembering import Memory, Order, all_states, entered, new_values, remembered
 from hsdsl.language.expression.conditions import comparisons
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import ONE, TIME, ZERO, Edge, HybridSystem, Initial, Mode, started
@@ -29,7 +29,10 @@ def with_events(system: HybridSystem) -> HybridSystem:
     events = {mode.name: _events(system, mode, timed) for mode in system.modes}
     if not any(events.values()):
         return system
-    order = {mode.name: (*mode.states, *all_states(events[mode.name])) for mode in system.modes}
+    order = {
+        mode.name: (*mode.states, *all_states(events[mode.name])) if mode.states or not mode.final else None
+        for mode in system.modes
+    }
     memories = {name: Memory(own) for name, own in events.items()}
     modes = tuple(_mode(mode, memories, order) for mode in system.modes)
     parts = tuple(_part(part, [event for own in events.values() for event in own]) for part in system.parts)
@@ -78,7 +81,7 @@ def _part(part: Part, events: Sequence[Event]) -> Part:
     return replace(part, states=tuple((*states, *own[k]) for k, states in enumerate(part.states)))
 
 
-def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, tuple[str, ...]]) -> Mode:
+def _mode(mode: Mode, memories: Mapping[str, Memory], order: Mapping[str, Order]) -> Mode:
     own, edges = memories[mode.name].events, list[Edge]()
     by_name = {e.edge.name: e for e in own}
     for edge in mode.edges:

@@ -42,7 +42,10 @@ def all_states(events: Sequence[Event]) -> tuple[str, ...]:
     return tuple(name for event in events for name in event.states)
 
 
-def remembered(draft: Draft, memories: Mapping[str, Memory], order: Mapping[str, tuple[str, ...]]) -> Edge:
+Order = tuple[str, ...] | None  # of the states of a mode; None of a final one, which has those of the mode before it
+
+
+def remembered(draft: Draft, memories: Mapping[str, Memory], order: Mapping[str, Order]) -> Edge:
     """An edge with what the events of its target remember after it."""
     edge, fired, reached = draft
     given = edge.values
@@ -53,11 +56,12 @@ def remembered(draft: Draft, memories: Mapping[str, Memory], order: Mapping[str,
             values |= entered(event, new_values(edge, event.timed))
     else:
         values |= _stayed(edge, fired, reached, index)
-    kept = inside or not order[edge.target]  # a final mode without a flow has the states of the mode before it
-    for name in all_states(memories[edge.target if order[edge.target] else edge.source].events):
-        values.setdefault(name, symbol(name) if kept else ZERO)
+    own = order[edge.target]
+    for name in all_states(memories[edge.source if own is None else edge.target].events):
+        values.setdefault(name, symbol(name) if inside or own is None else ZERO)
     values |= {name: value for name, value in given.items() if name not in values or value != symbol(name)}
-    ordered = {name: values[name] for name in order[edge.target] or (*given, *all_states(memories[edge.source].events))}
+    names = (*given, *all_states(memories[edge.source].events)) if own is None else own
+    ordered = {name: values[name] for name in names}
     texts = dict(zip(edge.target_states, edge.reset_texts, strict=True))
     return replace(
         edge,
