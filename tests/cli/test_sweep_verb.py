@@ -40,7 +40,7 @@ def test_a_sweep_that_has_no_picture_is_summarised(command, model, tmp_path):
     words = ["--vary", "rate=1,2", "--vary", "low=0.4,0.8", "--vary", "initial.x=1,2", "--processes", 1]
     assert command("sweep", model(DECAY), *words, "--out", tmp_path / "s", "-q").code == 0
     shown = command("sweep", "--show", tmp_path / "s")
-    assert shown.code == 0 and "8 of 8 rows" in shown.out and "no picture: a map has two" in shown.err
+    assert shown.code == 0 and "8 of 8 rows" in shown.out and "no picture: a map shows two" in shown.err
     assert command("sweep", "--show", tmp_path / "s", "--of", "final.x").code == 2
 
 

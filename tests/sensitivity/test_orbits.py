@@ -374,3 +374,17 @@ def test_the_axes_of_a_picture_have_units(tmp_path: Path) -> None:
     assert (left.get_xlabel(), left.get_ylabel()) == tuple(label(x, orbit.units) for x in (first, second))
     assert (right.get_xlabel(), right.get_ylabel()) == ("real part", "imaginary part")
     assert "stable, multipliers" in seen[0].get_suptitle()
+
+
+def test_a_refusal_names_the_state_that_does_not_return():
+    """The ball repeats its flights, but d grows at a rate between 1 and 3: no orbit closes."""
+    model = hsdsl.loads("""hsdsl: 1
+modes:
+  fly:
+    flow: {h: v, v: -9.81, d: 2 + sin(d)}
+    transitions: [{name: bounce, when: h <= 0, to: fly, reset: {v: 5}}]
+initial: {mode: fly, h: 1, v: 0, d: 1}
+experiment: {until: 8}
+""")
+    with pytest.raises(UsageError, match=r"'d' does not return to its value: it starts at \S+ and comes back at \S+"):
+        model.orbit("bounce")

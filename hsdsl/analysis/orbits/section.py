@@ -277,13 +277,25 @@ def closed(
             break
     if best.residual < CLOSED:
         return best
-    raise NotClosed(f"Newton's method comes no closer: the orbit does not close, by {best.residual:.2g} of the sizes")
+    raise NotClosed(f"Newton's method stops improving, and {_open(section, best, multiple)}")
 
 
 def _looked_at(point: Array, phase: float, passage: Return, sizes: Array, multiple: float | None) -> Closed:
     found, scale = symmetry(passage, sizes), np.append(sizes, multiple or 1.0)
     missing = np.abs(found.without_shifts(gap(passage, point, multiple))) / scale[found.kept(len(scale))]
     return Closed(point, phase, passage, float(np.max(missing)), found, sizes)
+
+
+def _open(section: Section, here: Closed, multiple: float | None) -> str:
+    """Which state of an orbit does not return to its value, and by how much; it may be the time of the forcing."""
+    of, scale = here.symmetry, np.append(here.sizes, multiple or 1.0)
+    kept = of.kept(len(scale))
+    missing = np.abs(of.without_shifts(gap(here.passage, here.point, multiple))) / scale[kept]
+    k = kept[int(np.argmax(missing))]
+    if k == len(here.point):
+        return f"the orbit takes {here.passage.time:.10g} instead of the period {multiple:.10g} of the forcing"
+    ends = f"it starts at {here.point[k]:.10g} and comes back at {here.passage.point[k]:.10g}"
+    return f"'{section.states[k]}' does not return to its value: {ends}"
 
 
 def _sizes(passage: Return, point: Array, coarse: Return) -> Array:
@@ -336,4 +348,4 @@ def _damped(section: Section, here: Closed, step: Array, multiple: float | None)
         there = _looked_at(point, phase, passage, here.sizes, multiple)
         if there.residual < 2 * here.residual or here.residual < CLOSED:
             return there
-    raise NotClosed(f"Newton's method is stuck where the orbit does not close, by {here.residual:.2g}: {problem}")
+    raise NotClosed(f"Newton's method is stuck ({problem}), and {_open(section, here, multiple)}")

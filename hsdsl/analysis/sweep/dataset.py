@@ -300,8 +300,8 @@ def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float
     if over and not _is_sampled(column):
         raise UsageError(f"--over {TIME}: '{column}' has no samples", "choose one with --of sample.NAME")
     if not over and len(names) > (1 if listed else 2):
-        most = "a bifurcation diagram has one name that varies" if listed else "a map has two"
-        raise UsageError(f"{most}, and here {', '.join(names)} vary", "read the dataset with pandas, and draw a part")
+        most = "a bifurcation diagram shows one varied name" if listed else "a map shows two varied names"
+        raise UsageError(f"{most}, got {', '.join(names)}", "read the dataset with pandas, and draw a part")
     if not 0 < tail <= 1:
         raise UsageError(f"--tail: expected a share above 0 and up to 1, got {tail:g}")
     title = called(sweep.manifest.title, sweep.manifest.model)

@@ -41,7 +41,7 @@ ESTIMATE = "Run again, finer, and give the distance of the runs."
 SAMPLES = "Rows of tables: every=TIME or count=N; jumps are always written. Else the file's, or the integrator's."
 EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
 DRAW = "Draw it: .png, .svg, or .html, an interactive page; with --outputs only these."
-FILM = "Write the model's scene as a film: .gif, or .mp4 where ffmpeg is there. It is of a second, equal run."
+FILM = "Write the scene of a second run with the same settings as a film: .gif, or .mp4 where ffmpeg is there."
 SPEED = "Of the film: time of the run by seconds; else 1 where the film then lasts 4 to 20 s."
 EVERY_ALONE = "--every streams to --out FILE.csv, without --plot, --animate, --estimate or --precision"
 WRITES = {  # the suffixes of the files that options write
