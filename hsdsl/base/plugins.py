@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Generic, TypeVar, cast
 
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import did_you_mean
+from hsdsl.base.names import checks_arguments, did_you_mean
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -88,6 +88,7 @@ class Table(Mapping[str, T], Generic[T]):
         self._given[name] = value
 
 
+@checks_arguments
 def register(table: str, name: str, value: object) -> None:
     """Add a method, a lint rule, an export target, a peer or a metric, for this process.
 

@@ -67,7 +67,7 @@ WRONG = {
     "give two runs, or one model": ("coarse.npz", "fine.npz", "--from", "on T=19"),
     "positive number of seconds": ("coarse.npz", "fine.npz", "--seconds", "-1"),
     "runs are of different models": ("fine.npz", "other.npz"),
-    "no metric 'skorohod'": ("coarse.npz", "fine.npz", "--metric", "skorohod"),
+    "no distance 'skorohod' between runs": ("coarse.npz", "fine.npz", "--metric", "skorohod"),
     "no state 'S'": ("coarse.npz", "fine.npz", "--metric", "rho-hat", "--coordinates", "S"),
     "relaxation must be positive": ("coarse.npz", "fine.npz", "--relaxation", "0"),
     "cannot read gone.npz": ("gone.npz", "fine.npz"),

@@ -19,7 +19,7 @@ NUMBER = re.compile(r"\(?[-+*/. \deE]*\)?|0x1p[-+]?\d+")
 FOLDERS = ("simulate", "simulate/verdict", "integrators")
 PROGRAM = ("hsdsl.base.numbers.arithmetic", "hsdsl.base.numbers.enclosures", "hsdsl.mathematics.program")
 IN_C_ALONE = {
-    "BITS", "UNIT", "TIME_UNIT", "INTEGER_POWERS",  # of the number type
+    "BITS", "UNIT", "TIME_UNIT", "INTEGER_POWERS", "AT_START", "AT_END",  # of the number type, and of places
     "PAUSED", "LANDED", "AT_BOUNDARY", "WITHOUT_VALUE", "NO_VALUE", "NO_CONVERGENCE", "TESTS",  # answers of functions
     "MOST_CUTS", "LEAST_MOST_DEGREE", "BLOCK", "STEPS_BEFORE_SEARCH", "SMALL", "FEWEST_WAITS",  # of memory
     "LEVELS", "END_LEVELS", "MOST_PARTS_TRIED", "COARSE_PARTS_TRIED", "CLOSE_SHARE",  # of the screen

@@ -172,7 +172,8 @@ def _unknown_method(option: Option) -> Exception:
     hint = method_meant(str(name))
     if option.origin == FILE and isinstance(name, Key):
         return ModelError([name.place.diagnostic("HS204", f"there is no method '{name}'", hint)])
-    return UsageError(f"there is no method '{name}' ({option.origin})", hint)
+    origin = f" ({option.origin})" if option.origin == FILE else ""  # else it is before the reader's eyes
+    return UsageError(f"there is no method '{name}'{origin}", hint)
 
 
 def method_meant(name: str) -> str:
