@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hsdsl.engine.simulate.surfaces import affine_curve, at, value
+from hsdsl.engine.scheme.roots import value_of
+from hsdsl.engine.simulate.surfaces import affine_curve, at
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
 
@@ -60,4 +61,5 @@ def test_an_affine_surface_is_its_polynomial(x, piece, slopes, h, share):
     start = slopes[1] * x[0] + slopes[2] * x[1]
     (curve,) = affine_curve(start, slopes, h, tuple(piece), Fraction(0))
     point = at(x, tuple(piece), share)
-    assert value(curve.coefficients, share) == slopes[0] * h * share + slopes[1] * point[0] + slopes[2] * point[1]
+    found = value_of(curve.coefficients, len(curve.coefficients) - 1, share)
+    assert found == slopes[0] * h * share + slopes[1] * point[0] + slopes[2] * point[1]

@@ -18,6 +18,7 @@ from engines import needs_compiler
 from hsdsl.base.numbers.bernstein import around_middle, from_powers
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.compiler import FLAGS, find_compiler
+from hsdsl.engine.runtime.library import print_scheme
 from hsdsl.engine.simulate.verdict import flows
 from hsdsl.engine.simulate.verdict.flows import EXPANDED
 
@@ -67,7 +68,8 @@ Expansion = ctypes.c_double * 7
 def compiled(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder: Path = tmp_path_factory.mktemp("expansions")
     (folder / "one.c").write_text(ONE)
-    find_compiler().build([folder / "one.c"], [structures.FOLDER], folder / "one.so", "-O1", (*FLAGS, "-w"))
+    headers = [structures.FOLDER, print_scheme(folder)]
+    find_compiler().build([folder / "one.c"], headers, folder / "one.so", "-O1", (*FLAGS, "-w"))
     return ctypes.CDLL(str(folder / "one.so"))
 
 

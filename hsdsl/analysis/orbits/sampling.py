@@ -65,7 +65,7 @@ class OrbitalStability:
                 "sampled": True,
                 "sentence": self.sentence,
                 "exponent": self.exponent,
-                "runs": [vars(run) for run in self.runs],
+                "runs": [run._asdict() for run in self.runs],
             }
         )
 

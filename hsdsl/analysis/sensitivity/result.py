@@ -434,7 +434,7 @@ def as_json(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> dict[str, Any]
         result["samples"] = {"times": table.times, "values": values}
     if found.ties:
         result["ties"] = [
-            {"time": tie.time, "reason": tie.reason, "orders": [vars(order) for order in tie.orders]}
+            {"time": tie.time, "reason": tie.reason, "orders": [order._asdict() for order in tie.orders]}
             for tie in found.ties
         ]
     if found.breaks:
