@@ -61,7 +61,7 @@ class Table(Mapping[str, T], Generic[T]):
         owner = f"the plug-in {point.value} of the package {point.dist.name if point.dist else '?'}"
         try:
             value = point.load()
-        except Exception as error:  # whatever another package raises
+        except Exception as error:  # another package may raise any
             raise UsageError(f"{owner} does not load: {type(error).__name__}: {error}") from error
         if fault := self._check(name, value):
             raise UsageError(f"{owner}: {fault}")

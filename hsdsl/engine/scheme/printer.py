@@ -163,11 +163,11 @@ class _Function:
         self.places: dict[str, tuple[int, ...]] = {}
         self.known = Signature({}, (), False, False)
         self.failed, self.before = "", set[str]()
-        self.told = 0  # line of the last comment
+        self.commented = 0  # line of the last comment
 
     def printed(self, definition: ast.FunctionDef) -> str:
         """Print it."""
-        self.known, self.told = self.scheme.functions[definition.name], definition.lineno
+        self.known, self.commented = self.scheme.functions[definition.name], definition.lineno
         self.before = {*takewhile(lambda name: name != definition.name, self.scheme.functions)}
         if self.known.fails:
             self.failed = "return RAISED;"
@@ -200,15 +200,17 @@ class _Function:
         for part in body:
             first = getattr(part, "value", part)
             lines += [
-                f"/* {self.text.comments[k]} */" for k in range(self.told + 1, part.lineno) if k in self.text.comments
+                f"/* {self.text.comments[k]} */"
+                for k in range(self.commented + 1, part.lineno)
+                if k in self.text.comments
             ]
             beside = self.text.comments.get(part.lineno)
-            self.told = part.lineno
+            self.commented = part.lineno
             printed = self.statement(part, path)
             if beside:
                 printed[0] += f" /* {beside} */"
             lines += printed
-            self.told = max(self.told, getattr(first, "end_lineno", part.lineno))
+            self.commented = max(self.commented, getattr(first, "end_lineno", part.lineno))
         return lines
 
     def statement(self, part: ast.stmt, path: tuple[int, ...]) -> list[str]:

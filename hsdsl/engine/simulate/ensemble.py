@@ -68,7 +68,7 @@ class Kept:
         self.results = np.full((instances, samples, outputs), nan)
 
     def told(self) -> None:
-        """Put into words what the compiled loop has said by numbers."""
+        """Write the codes of the compiled loop as sentences."""
         self.stop[:] = np.array([*structures.STOPPED, "interrupted"], LONGEST)[self.reason]
         for seen in set(self.notices[self.notices != 0].tolist()):
             self.noted[self.notices == seen] = codes_of(kind for bit, kind in KINDS_OF_NOTICES if seen >> bit & 1)
