@@ -312,7 +312,7 @@ class _Writer:
             f"{self.table('int', 'places', list(map(str, edge.changes)))}, "
             f"{-1 if edge.contact is None else edge.contact}, {edge.push_order}, {len(edge.counts)}, "
             f"{self.table('int', 'places', list(map(str, edge.counts)))}, {int(edge.branched)}, "
-            f"{bool(edge.of_event) + edge.strict}, {-1 if edge.releases is None else edge.releases}}}"
+            f"{int(bool(edge.of_event))}, {int(edge.strict)}, {-1 if edge.releases is None else edge.releases}}}"
         )
 
     def pointers(self, names: Iterable[str]) -> str:

@@ -91,7 +91,8 @@ typedef struct {
   int counts;     /* states that it counts with, which motion along its guard leaves as they are */
   const int *count;
   int branched;   /* whether its reset in the mode with motion along guards is a branch of this one, for slow impacts */
-  int of_event;   /* whether it is part of an event; 2 where it is made behind its surface, not at the end of a run */
+  int of_event;   /* whether it is part of an event */
+  int strict;     /* whether it is made behind its surface, not at the end of a run */
   int releases;   /* of a mode with motion along guards: the contact that it ends, or -1 */
 } hs_edge;
 

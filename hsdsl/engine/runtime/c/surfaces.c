@@ -195,7 +195,7 @@ static int turns_back(hs_run *run, int k, hs_time t, const hs_real *x, hs_real r
 
 /* Whether an edge that is crossed at a time is one that is made behind it, and the run ends there. */
 static int too_late(const hs_run *run, int k, hs_time t, hs_real since) {
-  return run->here.table->edge[k].of_event > 1 && t + since >= run->until;
+  return run->here.table->edge[k].strict && t + since >= run->until;
 }
 
 /* Mark in run->tied, beside the edges that are marked, those on whose guards the state stands, with the flow pointing out
