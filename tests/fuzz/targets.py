@@ -105,8 +105,8 @@ class Guard:
     def _compiled(self, source: Any, filename: Any) -> None:
         ours = str(filename).startswith(("<hsdsl", *self._readable[1:]))  # generated, or a module imported just now
         ours = ours or (isinstance(source, bytes) and source.startswith(b"def routine("))
-        if source is not None and not ours:
-            self.seen.append(f"compile {source!r:.200}")
+        if source and not ours:  # an empty text does nothing
+            self.seen.append(f"compile {source!r:.200} of {filename}")
 
     @contextmanager
     def watch(self) -> Generator[None]:

@@ -343,7 +343,7 @@ def test_pictures_that_cannot_be_drawn_are_refused(model, tmp_path):
     for of, tail, sentence in (
         ("sample.x", 1, "no column 'sample.x' to draw"),
         ("row", 1, "no column 'row' to draw"),
-        ("before.v", 1, "a bifurcation diagram has one name"),
+        ("before.v", 1, "a bifurcation diagram shows one varied name"),
         ("final.x", 0, "expected a share"),
     ):
         with pytest.raises(UsageError, match=sentence):
