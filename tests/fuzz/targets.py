@@ -112,11 +112,12 @@ class Guard:
     def watch(self) -> Generator[None]:
         """Raise what was seen; also where a payload has left its mark."""
         self.seen.clear()
-        self.watching = True
+        keeps = sys.dont_write_bytecode
+        self.watching = sys.dont_write_bytecode = True  # what is imported here for the first time is not the input's
         try:
             yield
         finally:
-            self.watching = False
+            self.watching, sys.dont_write_bytecode = False, keeps
         if (Path(self.folder) / seeds.CANARY).exists() or hasattr(builtins, seeds.CANARY):
             self.seen.append("the payload ran")
         if self.seen:
