@@ -34,7 +34,6 @@ TOLERANCE = 1e-10
 BEYOND = 1e-6  # runs are longer by this share: the suite counts what happens at the last instant, as floor(t) does
 
 
-TIE = 1e-12  # relative: times that differ by less are one
 LONGEST = 30.0  # seconds of processor time that a case may take
 
 
@@ -97,26 +96,16 @@ def expected(folder: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
     return values[:, 0], dict(zip(header[1:], values[:, 1:].T, strict=True))
 
 
-def made_behind(text: str, run: Any, times: np.ndarray) -> np.ndarray:
-    """Which times are those of strict events alone: these are made behind them, and values there are those before."""
-    events = dict(re.findall(r"- name: (\S+).*\n +event: (.*)", text))
-    made = [(float(m.time), "=" in events.get(m.edge, "=")) for m in run.transitions if " re-arms" not in m.edge]
-    near = [[closed for time, closed in made if abs(time - t) <= TIE * abs(t)] for t in times]
-    return np.array([bool(found) and not any(found) for found in near])
-
-
 def differences(folder: Path, text: str, run: Any) -> str:
     """Where a run of a text is off the results of a case; nothing where it is right."""
     given, (times, columns) = settings(folder), expected(folder)
-    samples, before = run.sample(times), run.sample(times * (1 - TIE), side="left")
+    samples, before = run.sample(times), run.sample(times, side="left")
     left_out = dict(re.findall(r"(\w+) = (-?inf|nan)\b", text.partition("# Left out")[2].partition("\n")[0]))
-    behind = made_behind(text, run, times)
     for name, right in columns.items():
         if name in left_out:  # a constant that the text has in a comment: every number of a model is finite
             own = earlier = np.full(len(times), float(left_out[name]))
         else:
             own, earlier = samples[f"out_{name}"], before[f"out_{name}"]
-        own = np.where(behind, earlier, own)
         valued = np.isnan(own) & ~np.isnan(right)  # the last instant of a piece, where the next one has no value
         own = np.where(valued, earlier, own)
         allowed = float(given["absolute"]) + float(given["relative"]) * np.abs(right)

@@ -200,7 +200,7 @@ def difference(text: str, run: Any) -> float:
     if (other.mode, other.jumps) != (final.mode, len(run.transitions)):
         return math.inf
     a, b = (np.array([state[key] for key in other.state]) for state in (final.state, other.state))
-    return float(np.max(np.abs(a - b)) / max(1.0, float(np.max(np.abs(b)))))
+    return float(np.max(np.abs(a - b), initial=0.0) / np.max(np.abs(b), initial=1.0))  # a mode may have no states
 
 
 def timed(path: Path) -> Outcome:
@@ -215,6 +215,8 @@ def timed(path: Path) -> Outcome:
         return outcome(path)
     except TimeoutError:
         return Outcome("refused", "", f"more than {LONGEST} s")
+    except hsdsl.ModelError as error:  # what is printed is larger than a file may be
+        return Outcome("refused", "", str(error).partition("error ")[2].partition("\n")[0])
     except Exception as error:  # every file must have its line
         return Outcome("refused", "", f"DEFECT {type(error).__name__}: {error}"[:200])
     finally:
