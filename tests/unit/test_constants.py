@@ -16,7 +16,7 @@ COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 DEFINED = re.compile(r"#define (\w+) (.+)")
 LISTED = re.compile(r"\b([A-Z][A-Z_]+) = (\d+)\b")  # of `enum { NODES = 4, POWERS = 6 }`
 NUMBER = re.compile(r"\(?[-+*/. \deE]*\)?|0x1p[-+]?\d+")
-FOLDERS = ("simulate", "simulate/verdict", "integrators")
+FOLDERS = ("simulate", "simulate/verdict", "integrators", "scheme")
 PROGRAM = ("hsdsl.base.numbers.arithmetic", "hsdsl.base.numbers.enclosures", "hsdsl.mathematics.program")
 IN_C_ALONE = {
     "BITS", "UNIT", "TIME_UNIT", "INTEGER_POWERS", "AT_START", "AT_END",  # of the number type, and of places

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.scheme.words import Room, Vector
+from hsdsl.engine.scheme.words import Here, Room, Time, Vector, may_fail
 
 
 def fill_bernstein(binomials: Vector, c: Vector, n: int, b: Room) -> None:
@@ -26,3 +26,9 @@ def largest_of(b: Vector, n: int) -> Number:
 def least_of(b: Vector, n: int) -> Number:
     """The least of b_0, ..., b_n."""
     return min(b[: n + 1])
+
+
+@may_fail
+def flow_between(here: Here, k: int, t: Time, x: Vector, t1: Time, z: Vector, s: Number) -> Number:
+    """Component k of the flow at the share s of the way from (t, x) to (t1, z)."""
+    return here.flow(t + s * (t1 - t), *(a + s * (b - a) for a, b in zip(x, z, strict=True)))[k]

@@ -22,14 +22,14 @@ from hsdsl.engine.backends.printer import C_OPERATORS
 
 FOLDER = Path(__file__).parent
 BY_HAND = "primitives"  # the text whose C is `primitives.h`
-TEXTS = ("roots",)  # in the order in which they build on each other
-PLAIN = {"Number": "hs_real", "Time": "hs_time", "int": "int", "bool": "int"}
-VECTORS = {"Room": "hs_real *", "Vector": "const hs_real *", "Integers": "int *"}
-ELEMENTS = {"Room": "Number", "Vector": "Number", "Integers": "int"}
+TEXTS = ("control", "pace", "cascade", "roots")  # in the order in which they build on each other
+PLAIN = {"Number": "hs_real", "Time": "hs_time", "int": "int", "bool": "int", "Count": "int64_t"}
+VECTORS = {"Room": "hs_real *", "Vector": "const hs_real *", "Here": "hs_run *"}
+ELEMENTS = {"Room": "Number", "Vector": "Number"}
 GIVEN = {"TIE": "HS_TIE", "NOTHING": "HS_NOTHING"}  # constants that differ by the type of numbers
 CALLS = {"abs": "fabs", "sqrt": "sqrt"}
 FOLDED = {"min": "hs_min", "max": "hs_max"}
-SIGNS: Mapping[type[ast.AST], str] = {**C_OPERATORS, ast.Div: "/", ast.Is: "==", ast.IsNot: "!="}
+SIGNS: Mapping[type[ast.AST], str] = {**C_OPERATORS, ast.Div: "/", ast.Is: "==", ast.IsNot: "!=", ast.BitOr: "|"}
 MAY_BE_NONE = " | None"
 
 
@@ -450,7 +450,11 @@ class _Function:
         wider = _wider(kind, another)
         if isinstance(operator, ast.Pow):
             return f"pow({one}, {two})", wider
-        if type(operator) not in SIGNS or wider not in PLAIN or (isinstance(operator, ast.Div) and wider == "int"):
+        if (
+            type(operator) not in SIGNS
+            or wider not in PLAIN
+            or (isinstance(operator, ast.Div) and wider in ("int", "Count"))
+        ):
             raise self.text.refused(node, f"an operation of {kind} and {another}")
         return f"{one} {SIGNS[type(operator)]} {two}", wider
 
@@ -486,7 +490,7 @@ class _Function:
 
 def _wider(kind: str, another: str) -> str:
     """What an operation of two kinds gives."""
-    for one in ("Time", "Number"):
+    for one in ("Time", "Number", "Count"):
         if one in (kind, another):
             return one
     return "int" if {kind, another} == {"bool"} else kind if another in ("int", "bool") else another

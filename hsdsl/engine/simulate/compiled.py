@@ -97,7 +97,7 @@ def task_settings(settings: Settings, states: tuple[str, ...]) -> Any:
     scale = [settings.scale.get(name, 0.0) for name in states] if settings.scale else None
     return structures.Settings(
         control.h,
-        control.tolerance or 0.0,
+        control.tolerance,
         control.largest,
         settings.relaxation,
         settings.until,

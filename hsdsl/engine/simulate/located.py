@@ -24,6 +24,8 @@ from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Polynomial, Stages, State
 from hsdsl.engine.integrators.taylor import proposed_step
 from hsdsl.engine.kernel import Series
+from hsdsl.engine.scheme.control import accept, begin_steps, reject, struggles
+from hsdsl.engine.scheme.pace import creeps, is_slow
 from hsdsl.engine.scheme.roots import slope_of, stays_below, value_of
 from hsdsl.engine.simulate.contact import (
     at_limit,
@@ -42,7 +44,7 @@ from hsdsl.engine.simulate.contact import (
 from hsdsl.engine.simulate.control import error_ratio
 from hsdsl.engine.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED, Event, go_on, sizes, standing_on
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stalls import Stalls
+from hsdsl.engine.simulate.stalls import across_jump, make_pace
 from hsdsl.engine.simulate.stops import FREE, LEFT, left_domain, reached, reached_in_strip, slides
 from hsdsl.engine.simulate.surfaces import (
     NONE,
@@ -66,7 +68,7 @@ from hsdsl.engine.simulate.surfaces import (
     total,
     without_zeros,
 )
-from hsdsl.engine.simulate.transitions import choose, enter, reset
+from hsdsl.engine.simulate.transitions import choose, comes_back, enter, reset
 
 MOST_CORRECTIONS = 8
 
@@ -132,7 +134,7 @@ def follow(run: Run, here: ModeState, limit: Number) -> Event | ModeState | Stop
     t, x, arc = here.t, here.x, here.arc
     method, before = run.settings.method, None
     steps = SeriesSteps(run, here) if method is not None and method.is_series else TableSteps(run, here)
-    while t < limit and not steps.stalls.is_slow(t):
+    while t < limit and not is_slow(steps.pace, t):
         span = steps.next(t, x, limit)
         if isinstance(span, StepFailure):
             return stuck(run, here.moved(t, x), span)
@@ -369,7 +371,7 @@ def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop
     entered = enter(run, *target, resumed, after, scale, here, arrival)
     if isinstance(entered, Stop):
         return entered
-    if run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
+    if comes_back(run, flowed, entered):
         return slides(edge.name, here.mode, entered.mode, entered.t)
     if entered.mode is not here.mode:
         return at_limit(run, entered) or entered
@@ -466,7 +468,7 @@ class Steps:
     """Makes steps in one mode, on one segment of the inputs, that the error allows and that do not pass a limit."""
 
     def __init__(self, run: Run, here: ModeState) -> None:
-        self.run, self.here, self.method, self.stalls = run, here, run.stepper(here), Stalls(run, here.t)
+        self.run, self.here, self.method, self.pace = run, here, run.stepper(here), make_pace(run, here.t)
 
 
 class TableSteps(Steps):
@@ -487,7 +489,7 @@ class TableSteps(Steps):
         except DOMAIN_ERRORS:
             return NOT_FINITE
         if self.slope is None:
-            control.begin(self.here.arc.scales, slope)
+            begin_steps(control, self.here.arc.scales, slope, len(x))
         mode = self.here.mode.name
         h = control.within_reach(mode, control.h)
         while True:
@@ -495,20 +497,20 @@ class TableSteps(Steps):
             tried = self._try(t, h, t1, x, slope) if t1 > t else TOO_WRONG
             if isinstance(tried, Span):
                 assert self.slope is not None
-                if control.tolerance is not None and self.stalls.chatters(flow, t, x, slope, t1, tried.z, self.slope):
+                if control.tolerance > 0 and across_jump(self.pace, self.here, t, x, slope, t1, tried.z, self.slope):
                     return StepFailure("jump")
-                if control.tolerance is not None and halvings == 0:
-                    control.accept(h, self._ratio)
+                if control.tolerance > 0 and halvings == 0:
+                    accept(control, h, self._ratio)
                 control.slow_enough(mode, h)
-                return StepFailure("creeping") if self.stalls.creeps(halvings) else tried
-            if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance is not None)):
-                control.reject(h, None if tried is UNSOLVED else self._ratio)
+                return StepFailure("creeping") if creeps(self.pace, halvings) else tried
+            if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance > 0)):
+                reject(control, h, self._ratio, tried is not UNSOLVED)
                 h = control.within_reach(mode, control.h)
             else:
                 if tried is TOO_FAST:
                     control.too_fast(mode, h)
                 h, halvings = h / 2, halvings + 1
-            if halvings > self.run.arithmetic.most_halvings or not t + h > t or control.struggles:
+            if halvings > self.run.arithmetic.most_halvings or not t + h > t or struggles(control):
                 return tried
 
     def _try(self, t: Number, h: Number, t1: Number, x: State, slope: State) -> Span | StepFailure:
@@ -518,7 +520,7 @@ class TableSteps(Steps):
             end = flow(t1, *z)
             if not self.run.arithmetic.isfinite(sum(z) + sum(end)):
                 return NOT_FINITE
-            if control.tolerance is not None and method.error is not None:
+            if control.tolerance > 0 and method.error is not None:
                 self._ratio = error_ratio(self.run, self.here, method, method.error(h, stages, end), t, h, x, z)
                 if not self._ratio <= 1:
                     return TOO_WRONG
@@ -527,7 +529,7 @@ class TableSteps(Steps):
                 return NOT_FINITE  # it may overflow where its end does not
             curves = curves_along(self.run, self.here, t, h, x, z, piece)
             ends = self.here.kernel.surfaces(t1, *z)
-            if method.landing is not None and control.tolerance is not None and method.error is not None:
+            if method.landing is not None and control.tolerance > 0 and method.error is not None:
                 curves = self._blurred(curves, t1, z, method.error(h, stages, end), ends)
         except NoConvergence:
             return UNSOLVED
@@ -601,7 +603,7 @@ class SeriesSteps(Steps):
 
     def _longest(self, stages: Stages) -> Number:
         control = self.run.control
-        if control.tolerance is None:
+        if not control.tolerance > 0:
             return control.h
         tolerance = max(control.tolerance, self.run.arithmetic.unit)
         proposed = proposed_step(stages, self.here.arc.scales, tolerance, self.run.arithmetic)
@@ -621,7 +623,7 @@ class SeriesSteps(Steps):
             if not run.arithmetic.isfinite(sum(z) + sum(end)):
                 return NOT_FINITE
             tolerance, error = run.control.tolerance, self.method.error
-            if tolerance is not None and error is not None:
+            if tolerance > 0 and error is not None:
                 ratio = error_ratio(run, here, self.method, error(h, stages, end), t, h, x, z)
                 if ratio > max(1, 64 * run.arithmetic.unit / tolerance):
                     return TOO_WRONG
@@ -687,7 +689,7 @@ class SeriesSteps(Steps):
         That of a surface linear in the states need not run out: it converges if it gives the surface to round-off.
         """
         given, largest = self.run.control.tolerance, max(abs(a) for a in c)
-        tolerance = UNKNOWN_TOLERANCE if given is None else max(given, self.run.arithmetic.unit)
+        tolerance = max(given, self.run.arithmetic.unit) if given > 0 else UNKNOWN_TOLERANCE
         tail = abs(c[-1]) <= LAST_TERM * tolerance * largest and abs(c[-2]) <= TERM_BEFORE * tolerance * largest
         one = end * 0 + 1
         off = abs(value_of(c, len(c) - 1, one) - end)
@@ -707,7 +709,7 @@ TURNINGS = 60  # halvings of a step
 def reaches(run: Run, here: ModeState, span: Span, k: int, pieces: list[Piece]) -> Crossing | None:
     """Return where in a step surface k is reached so and its condition holds, on the step's own polynomial."""
     c, one = pieces[0].coefficients, run.arithmetic.zero + 1
-    if not c[1] > 0 or len(pieces) > 1 or run.control.tolerance is None:
+    if not c[1] > 0 or len(pieces) > 1 or not run.control.tolerance > 0:
         return None
     share, time, q, slope = one, span.t1, span.z, slope_of(c, len(c) - 1, one)
     if slope > ROUNDOFF_UNITS * run.arithmetic.unit * c[1]:

@@ -16,13 +16,16 @@ from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper, hermite
 from hsdsl.engine.kernel import Vector
+from hsdsl.engine.scheme.cascade import takes_back
+from hsdsl.engine.scheme.control import accept, begin_steps, reject, struggles
+from hsdsl.engine.scheme.pace import is_slow
 from hsdsl.engine.simulate.contact import holds_next, unresolved
 from hsdsl.engine.simulate.control import error_ratio
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stalls import Stalls
+from hsdsl.engine.simulate.stalls import across_jump, make_pace, stall_ends
 from hsdsl.engine.simulate.stops import reached, reached_in_strip, slides
 from hsdsl.engine.simulate.surfaces import Arrival, Crossing, StepFailure, at, close_bracket, joined, shortened
-from hsdsl.engine.simulate.transitions import choose, enter, reset, takes_back
+from hsdsl.engine.simulate.transitions import choose, comes_back, enter, reset
 
 SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved
@@ -66,16 +69,16 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     """Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9)."""
     control, method, arc = run.control, run.stepper(here), here.arc
     attempt = attempts(run, here, method)
-    estimate, curved = method.error if control.tolerance is not None else None, run.recorder.degree > 0
+    estimate, curved = method.error if control.tolerance > 0 else None, run.recorder.degree > 0
     most_halvings = run.arithmetic.most_halvings
-    t, x, limit, stalls = here.t, here.x, here.segment.end, Stalls(run, here.t)
+    t, x, limit, pace = here.t, here.x, here.segment.end, make_pace(run, here.t)
     active, emerging = here.surfaces.active, here.surfaces.emerging
     try:
         slope = here.kernel.flow(t, *x)
     except DOMAIN_ERRORS:
         return run.standstill(here).not_finite([(t, x)])
-    control.begin(arc.scales, slope)
-    while t < limit and not stalls.is_slow(t):
+    begin_steps(control, arc.scales, slope, len(x))
+    while t < limit and not is_slow(pace, t):
         h, halvings, ratio, failure = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
@@ -89,21 +92,21 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
             failure = found
             too_long = found is TOO_WRONG or (found is UNSOLVED and estimate is not None)
             if too_long and halvings == 0:
-                control.reject(h, None if found is UNSOLVED else ratio)
+                reject(control, h, ratio, found is not UNSOLVED)
                 h = control.h
             else:
                 h, halvings = h / 2, halvings + 1
-            if halvings > most_halvings or (too_long and (control.struggles or not t + h > t)):
+            if halvings > most_halvings or (too_long and (struggles(control) or not t + h > t)):
                 return stuck(run, here.moved(t, x), found, slope)
         if ratio is not None and halvings == 0:
-            control.accept(h, ratio)
+            accept(control, h, ratio)
         if found or end is None:
             crossing, alternatives = choose(here, found, run)
             last = z if crossing.theta > 0 else x
             return Event(crossing, alternatives, t1, sizes(x, last, here, crossing.edge in active))
-        if (halvings or not t1 > t) and (given_up := stalls.ends(here, halvings, control.h, failure, t, x, t1, z)):
+        if (halvings or not t1 > t) and (given_up := stall_ends(pace, here, halvings, control.h, failure, t, x, t1, z)):
             return stuck(run, here.moved(t, x), given_up, slope)
-        if estimate and stalls.chatters(here.kernel.flow, t, x, slope, t1, z, end):
+        if estimate and across_jump(pace, here, t, x, slope, t1, z, end):
             return stuck(run, here.moved(t, x), StepFailure("jump"), slope)
         if active or emerging:
             here.surfaces.leave(t1, z)
@@ -374,7 +377,7 @@ def through_strip(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
     entered = enter(run, edge.target, edge.target_states, resumed, after, scale, here, Arrival(reset_at=t))
     if isinstance(entered, Stop):
         return entered
-    if not run.cascade.returns(flowed, entered.index, entered.mode, entered.x):
+    if not comes_back(run, flowed, entered):
         return (entered.mode is here.mode and unresolved(run, entered, crossing.edge)) or entered
     return slides(edge.name, here.mode, entered.mode, entered.t) if moves_on(here, crossing, entered) else entered
 
@@ -387,7 +390,7 @@ def moves_on(here: ModeState, crossing: Crossing, entered: ModeState) -> bool:
         one, other = here.kernel.flow(crossing.time, *crossing.state), entered.kernel.flow(entered.t, *entered.x)
     except DOMAIN_ERRORS:
         return True
-    return len(one) != len(other) or not takes_back(one, other)
+    return len(one) != len(other) or not takes_back(one, other, len(one))
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:

@@ -11,6 +11,7 @@ from hsdsl.engine.execution import Stop, Transition
 from hsdsl.engine.integrators.stepper import Derivatives, State, Stepper, stepper
 from hsdsl.engine.integrators.taylor import taylor_stepper
 from hsdsl.engine.kernel import ModeKernel
+from hsdsl.engine.scheme.cascade import Cascade
 from hsdsl.engine.scheme.roots import Roots
 from hsdsl.engine.simulate.control import Control
 from hsdsl.engine.simulate.input_segments import Segment
@@ -19,7 +20,7 @@ from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.recorder import OpenArc, Recorder
 from hsdsl.engine.simulate.stops import Diagnostics, limit
 from hsdsl.engine.simulate.surfaces import Crossing, Surfaces, larger, make_roots
-from hsdsl.engine.simulate.transitions import Cascade, Tails
+from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.mathematics.program import ModeProgram
 
 if TYPE_CHECKING:
@@ -63,8 +64,12 @@ class Run(Problem):
     control: Control
     recorder: Recorder
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
-    cascade: Cascade = field(default_factory=Cascade)
     tails: Tails = field(default_factory=Tails)
+
+    @cached_property
+    def cascade(self) -> Cascade:
+        """Where transitions without flow between them have led."""
+        return Cascade([self.arithmetic.zero] * max(len(mode.states) for mode in self.program.modes))
 
     @cached_property
     def roots(self) -> Roots:

@@ -11,13 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from math import nan
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
-from hsdsl.engine.integrators.stepper import Flow, State
+from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.integrators.tableau import ButcherTableau
 from hsdsl.engine.integrators.taylor import NoSeries, terms
+from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.runtime import structures
+from hsdsl.engine.scheme.pace import MOST_SHORT, SHORT, Pace, chatters, creeps, gets_nowhere, is_idle, jump_between
 from hsdsl.engine.simulate import stops
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.problem import Problem
@@ -27,88 +30,35 @@ from hsdsl.engine.simulate.surfaces import StepFailure
 from hsdsl.engine.simulate.workspace import Workspace
 from hsdsl.mathematics.program import HELD, ModeProgram, Program
 
-IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
-MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
-CREEPING = 10  # halvings; steps below a thousandth of the full one
-MOST_CREEPING = 2000  # in a row: the run would take a thousand times its length in steps
-SHORT = 1e-6  # of a run
-MOST_SHORT = 100_000  # steps within that, in one flight: so the run would take a hundred billion
-MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
-JUMP_HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
+
+def make_pace(run: Run, t: Number) -> Pace:
+    """Begin to count the steps of one stretch of flow that do not lead on, from time t."""
+    brief = run.settings.until * (SHORT if run.control.tolerance > 0 else 0)
+    return Pace(run.arithmetic.unit, brief, t, nan)
 
 
-class Stalls:
-    """Counts the steps of one stretch of flow that do not lead on, from time t."""
-
-    def __init__(self, run: Run, t: Number) -> None:
-        self._unit = run.arithmetic.unit
-        self._reached: Number | None = None  # by the last step cut short: another start means full steps between
-        self._idle = self._creeping = self._turns = self._made = 0
-        self._short = run.settings.until * (0 if run.control.tolerance is None else SHORT)
-        self._since = t
-
-    def ends(
-        self, here: ModeState, halvings: int, full: Number, failure: StepFailure,
-        t: Number, x: State, t1: Number, z: State,
-    ) -> StepFailure | None:  # fmt: skip
-        """Count a step from (t, x) to (t1, z) that was halved because of ``failure``; say what ends the run, if so."""
-        if t != self._reached:
-            self._idle = self._creeping = 0
-        self._reached, k = t1, failure.surface
-        small = t1 - t <= IDLE_UNITS * self._unit * max(t, full)
-        # the surface in the way did not come nearer: its round-off is larger than what the step adds
-        still = k is not None and here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]
-        self._idle = self._idle + 1 if small or still else 0
-        creeps = self.creeps(halvings)
-        if self._idle > MOST_IDLE or (small and z == x):
-            return failure
-        return StepFailure("creeping", k) if creeps else None
-
-    def creeps(self, halvings: int) -> bool:
-        """Count a step that was halved so often; whether too many in a row were far below the full step."""
-        self._creeping = self._creeping + 1 if halvings >= CREEPING else 0
-        return self._creeping > MOST_CREEPING
-
-    def is_slow(self, t: Number) -> bool:
-        """Count a step from t; whether there were too many within a millionth of the run."""
-        self._made += 1
-        if t - self._since > self._short:
-            self._since, self._made = t, 0
-        return self._made > MOST_SHORT
-
-    def chatters(self, flow: Flow, t: Number, x: State, slope: State, t1: Number, z: State, end: State) -> bool:
-        """Count a step, by whether a component of the flow has the other sign at its end; say whether it is one of very
-        many across a jump. Smooth flows that turn around are none.
-        """
-        turned = [k for k, (a, b) in enumerate(zip(slope, end, strict=True)) if a * b < 0]
-        self._turns = self._turns + 2 if turned else max(0, self._turns - 1)
-        if self._turns < MOST_CHATTER:
-            return False
-        self._turns = 0
-        return any(jump_between(flow, k, t, x, t1, z) is not None for k in turned)
+def stall_ends(
+    pace: Pace, here: ModeState, halvings: int, full: Number, failure: StepFailure,
+    t: Number, x: State, t1: Number, z: State,
+) -> StepFailure | None:  # fmt: skip
+    """Count a step from (t, x) to (t1, z) that was halved because of ``failure``; say what ends the run, if so."""
+    small, k = is_idle(pace, t, t1, full), failure.surface
+    # the surface in the way did not come nearer: its round-off is larger than what the step adds
+    still = k is not None and here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]
+    nowhere, creeping = gets_nowhere(pace, small or still), creeps(pace, halvings)
+    if nowhere or (small and z == x):
+        return failure
+    return StepFailure("creeping", k) if creeping else None
 
 
-def jump_between(flow: Flow, k: int, t: Number, x: State, t1: Number, z: State) -> tuple[State, Number, Number] | None:
-    """Return the state at which component k of the flow jumps, and its values before and behind that; None if not."""
-
-    def at(s: Number) -> tuple[State, Number]:
-        point = tuple(a + s * (b - a) for a, b in zip(x, z, strict=True))
-        return point, flow(t + s * (t1 - t), *point)[k]
-
-    try:
-        low, high = t * 0, t * 0 + 1
-        (_, before), (point, behind) = at(low), at(high)
-        size = abs(behind - before)
-        for _ in range(JUMP_HALVINGS):
-            middle = (low + high) / 2
-            q, value = at(middle)
-            if abs(value - before) >= abs(behind - value):
-                high, behind, point = middle, value, q
-            else:
-                low, before = middle, value
-    except DOMAIN_ERRORS:
-        return None
-    return (point, before, behind) if size > 0 and 2 * abs(behind - before) >= size else None
+def across_jump(
+    pace: Pace, here: ModeState, t: Number, x: State, slope: State, t1: Number, z: State, end: State
+) -> bool:
+    """Count a step; say whether it is one of very many across a jump. Smooth flows that turn around are none."""
+    if not chatters(pace, slope, end, len(x)):
+        return False
+    turned = [k for k, (a, b) in enumerate(zip(slope, end, strict=True)) if a * b < 0]
+    return any(jump_between(here.kernel, k, t, x, t1, z) is not None for k in turned)
 
 
 SHORTEST = 40  # halvings of a step, at which expressions without a value are looked for
@@ -224,24 +174,25 @@ class Standstill:
         """Name a component of a flow that jumps a few steps ahead or behind, and the place."""
         for step in (way * self.h * 2**n for n in range(-NEAR, NEAR + 1) for way in (1, -1)):
             t1, z = self.t + step, tuple(a + step * f for a, f in zip(self.x, slope, strict=True))
-            for flow, texts in self._flows():
+            for kernel, texts in self._flows():
                 for k, (state, text) in enumerate(zip(self.mode.states, texts, strict=True)):
-                    if jump := jump_between(flow, k, self.t, self.x, t1, z):
-                        point, before, behind = jump
+                    if jump := jump_between(kernel, k, self.t, self.x, t1, z):
+                        share, before, behind = jump
+                        point = tuple(a + share * (b - a) for a, b in zip(self.x, z, strict=True))
                         values = f"from {show(before)} to {show(behind)}"
                         return f"the flow of {state}{text} jumps {values} at {self._state(point)}"
         return None
 
-    def _flows(self) -> Iterator[tuple[Flow, Sequence[str]]]:
+    def _flows(self) -> Iterator[tuple[ModeKernel, Sequence[str]]]:
         """The mode's flow, and those along each of its guards alone, with what to call their components."""
         kernel, data, mode = self.problem.kernel, self.segment.data, self.mode
-        yield kernel.bind(self.index, data).flow, [f", {text}," for text in mode.flow_texts]
+        yield kernel.bind(self.index, data), [f", {text}," for text in mode.flow_texts]
         if mode.held is None:
             return
         contacts = {edge.contact: edge.name for edge in mode.edges if edge.contact is not None}
         for i, name in contacts.items():
             numbers = (self.problem.arithmetic.zero + (HELD if j == i else 0) for j in sorted(contacts))
-            yield kernel.bind(mode.held, (*data, *numbers)).flow, [f" along the guard of {name}"] * len(mode.states)
+            yield kernel.bind(mode.held, (*data, *numbers)), [f" along the guard of {name}"] * len(mode.states)
 
     def _has_no_series(self) -> bool:
         """Whether the method is Taylor's and cannot expand the flow here."""

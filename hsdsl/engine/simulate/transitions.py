@@ -18,13 +18,14 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hsdsl.base.names import nth_memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, TIE, Number
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.stepper import State
+from hsdsl.engine.scheme.cascade import returns
 from hsdsl.engine.simulate.moving import moved_reset
 from hsdsl.engine.simulate.stops import ENTERED, endless, entered_final, left_domain, reset_not_finite, too_many_wait
 from hsdsl.engine.simulate.surfaces import ANY, Arrival, Crossing
@@ -195,38 +196,12 @@ def choose_entry(edges: tuple[EdgeProgram, ...], beyond: list[Crossing]) -> tupl
     return chosen, tuple(edges[c.edge].name for c in beyond if c is not chosen)
 
 
-PARALLEL = 1e-6  # of a component: flows that differ by less move no state on by more than this share of the way back
-
-
-@dataclass
-class Cascade:
-    """One of the states that such transitions led to, with which those after it are compared (Brent's algorithm)."""
-
-    reference: tuple[int, State] | None = None
-    length: int = 0
-    room: int = 1
-
-    def returns(self, flowed: bool, index: int, mode: ModeProgram, x: State) -> bool:
-        """Count a transition that led to a state; say whether one of the same cascade has led there before."""
-        here = index, decisive(mode, x)
-        if flowed or self.reference is None:
-            self.reference, self.length, self.room = here, 0, 1
-            return False
-        if here == self.reference:
-            return True
-        self.length += 1
-        if self.length == self.room:
-            self.reference, self.length, self.room = here, 0, 2 * self.room
-        return False
+def comes_back(run: Run, flowed: bool, here: ModeState) -> bool:
+    """Count a transition that led to ``here``; whether one of the same cascade has led there before."""
+    x = decisive(here.mode, here.x)
+    return returns(run.cascade, flowed, here.index, x, len(x))
 
 
 def decisive(mode: ModeProgram, x: State) -> State:
     """What of a state decides how a run goes on: a cascade that only counts comes back to it."""
     return tuple(x[i] for i in mode.deciding) if mode.idle else x
-
-
-def takes_back(slope: State, back: State) -> bool:
-    """Whether one direction is opposite to another that is not zero, in each component."""
-    pairs = list(zip(back, slope, strict=True))
-    share: Number = next((b / f for b, f in pairs if f != 0), 0)
-    return share < 0 and all(abs(b - share * f) <= PARALLEL * abs(share) * abs(f) for b, f in pairs)

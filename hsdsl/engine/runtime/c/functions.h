@@ -15,8 +15,6 @@ enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, else GOES_ON or a re
 enum { WITHOUT_VALUE = -4 }; /* how first_event() ends, else GOES_ON, LANDED or a reason to stop */
 
 #define MOST_HALVINGS (16 + 2 * HS_BITS)
-#define CREEPING 10
-#define MOST_CREEPING 2000
 #define ROUNDOFF_UNITS 32
 
 typedef int hs_functions(hs_run *run, hs_real s, hs_real *values);

@@ -6,6 +6,13 @@
 #pragma GCC optimize("tree-pre") /* of what -O2 does beyond -O1 the part that makes it faster, by a tenth */
 #endif
 
+/* printed from hsdsl/engine/scheme */
+#include "primitives.h"
+#include "control.c"
+#include "pace.c"
+#include "cascade.c"
+#include "roots.c"
+
 #include "taylor.c"
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC push_options
@@ -17,10 +24,6 @@
 #pragma GCC pop_options
 #endif
 #include "stepper.c"
-#include "control.c"
-
-#include "primitives.h"
-#include "roots.c" /* printed from hsdsl/engine/scheme */
 
 #include "surfaces.c"
 #include "stalls.c"

@@ -124,7 +124,7 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
   const hs_time t = run->here.t;
   int halvings = 0;
   if (!run->sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
-  if (!run->sloped) begin_steps(run);
+  if (!run->sloped) begin_steps(control, run->scales, run->slope, n);
   run->sloped = 1;
   hs_real h = within_reach(run, control->h);
   hs_time t1;
@@ -133,14 +133,13 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
     run->refused = 0;
     const hs_step_failure tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
     if (tried == HS_CLEAR) {
-      if (control->tolerance > 0 && chatters(run, n, t1)) return HS_JUMP;
+      if (control->tolerance > 0 && across_jump(run, n, t1)) return HS_JUMP;
       if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
       slow_enough(run, h);
-      run->creeping = halvings >= CREEPING ? run->creeping + 1 : 0;
-      return run->creeping <= MOST_CREEPING ? HS_CLEAR : HS_CREEPING;
+      return creeps(&run->pace, halvings) ? HS_CREEPING : HS_CLEAR;
     }
     if (halvings == 0 && (tried == HS_ERROR || (tried == HS_UNSOLVED && control->tolerance > 0))) {
-      reject(control, h, tried == HS_UNSOLVED ? NAN : run->ratio);
+      reject(control, h, run->ratio, tried != HS_UNSOLVED);
       h = within_reach(run, control->h);
     } else {
       if (run->refused) too_fast(run, h);
@@ -668,11 +667,11 @@ HS_INLINE void go_to_end(hs_run *run) {
 static int follow(hs_run *run, hs_time limit) {
   hs_mode_state *const here = &run->here;
   const int n = here->dimension;
-  run->sloped = run->creeping = run->has_before = run->chatter = 0;
+  run->sloped = run->has_before = 0;
   run->ratio = 1;
   forget_steps(run);
   begin_pace(run);
-  while (here->t < limit && !is_slow(run)) {
+  while (here->t < limit && !is_slow(&run->pace, here->t)) {
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
     const hs_step_failure failure = next_span(run, n, limit);
     if (failure != HS_CLEAR) return located_stuck(run, failure);
@@ -825,7 +824,7 @@ static int jump(hs_run *run) {
   copy(run->scale, run->both, edge->target_dimension);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0, t);
   if (entered != GOES_ON) return entered;
-  if (returns(run, flowed)) return slides(run, mode, k);
+  if (comes_back(run, flowed)) return slides(run, mode, k);
   if (run->here.mode != mode) return at_limit(run);
   int closed = close_tail(run, k);
   if (closed == GOES_ON) closed = at_limit(run);

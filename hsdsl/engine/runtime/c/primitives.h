@@ -3,7 +3,7 @@
 #ifndef HS_PRIMITIVES_H
 #define HS_PRIMITIVES_H
 
-#include "run.h"
+#include "functions.h"
 
 /* C(n, 0) to C(n, n) for n up to `most`. */
 static void fill_binomials(hs_real *row, int most) {
@@ -37,6 +37,15 @@ HS_INLINE hs_real least_of(const hs_real *b, int n) {
   hs_real least = b[0];
   for (int i = 1; i <= n; i++) least = hs_min(least, b[i]);
   return least;
+}
+
+static int flow_between(hs_run *run, int k, hs_time t, const hs_real *x, hs_time t1, const hs_real *z, hs_real s,
+                        hs_real *f) {
+  const hs_mode_state *here = &run->here;
+  for (int i = 0; i < here->dimension; i++) run->at[i] = x[i] + s * (z[i] - x[i]);
+  if (here->table->flow(here->p, t + s * (t1 - t), run->at, run->source)) return RAISED;
+  *f = run->source[k];
+  return 0;
 }
 
 #endif

@@ -352,13 +352,11 @@ static int flow(hs_run *run) {
   const int adaptive = control->tolerance > 0, curved = run->method->degree > 0;
   const int n = here->dimension;
   const hs_time limit = segment_end(run);
-  run->stall.reached = NAN;
-  run->stall.idle = run->stall.creeping = run->chatter = 0;
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
-  begin_steps(run);
+  begin_steps(control, run->scales, run->slope, n);
   begin_pace(run);
-  while (here->t < limit && !is_slow(run)) {
+  while (here->t < limit && !is_slow(&run->pace, here->t)) {
     hs_real h = control->h, ratio = NAN;
     hs_time t1;
     int halvings = 0;
@@ -376,7 +374,7 @@ static int flow(hs_run *run) {
       last = found;
       const int too_long = found.failure == HS_ERROR || (found.failure == HS_UNSOLVED && adaptive);
       if (too_long && halvings == 0) {
-        reject(control, h, found.failure == HS_UNSOLVED ? NAN : ratio);
+        reject(control, h, ratio, found.failure != HS_UNSOLVED);
         h = control->h;
       } else {
         h = h / 2, halvings++;
@@ -395,7 +393,7 @@ static int flow(hs_run *run) {
       const hs_step_failure given_up = stall_ends(run, halvings, last.failure, last.surface, t1);
       if (given_up != HS_CLEAR) return stuck(run, given_up, last.surface);
     }
-    if (adaptive && chatters(run, n, t1)) return stuck(run, HS_JUMP, -1);
+    if (adaptive && across_jump(run, n, t1)) return stuck(run, HS_JUMP, -1);
     if (here->active || here->emerging) leave(run, t1, run->z);
     const hs_polynomial *const piece = curved && !piece_of(run, &run->trial) ? &run->trial.piece : 0;
     HS_MOVE(run, move_along(run, t1, run->z, h));
@@ -455,7 +453,7 @@ static int through_strip(hs_run *run) {
   const int unknown = before.table->flow(before.p, t, crossing->state, run->source);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0, t);
   if (entered != GOES_ON) return entered;
-  if (!returns(run, flowed)) return run->here.mode == before.mode ? unresolved(run, k) : GOES_ON;
+  if (!comes_back(run, flowed)) return run->here.mode == before.mode ? unresolved(run, k) : GOES_ON;
   return moves_on(run, &before, unknown) ? slides(run, before.mode, k) : GOES_ON;
 }
 

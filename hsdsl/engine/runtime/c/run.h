@@ -89,17 +89,6 @@ typedef struct {
   int crossings;
 } hs_found;
 
-typedef struct {
-  hs_real h, tolerance, largest, least;
-  int order;
-  int implicit;
-  hs_real before, root_before; /* the step last accepted, 0 for none, and the root of its error ratio */
-  int64_t accepted, rejected; /* in a stretch of time */
-  hs_real stretch;
-  hs_time failed_at; /* where the last step began that was too wrong; before the first, not-a-number */
-  int closer;       /* whether a look at the flow's round-off let one pass */
-} hs_control;
-
 /* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
    the derivatives should be renewed for the next step. */
 typedef struct {
@@ -151,23 +140,11 @@ typedef struct {
 #define HS_RADAU_SPACE(w, factors) (5 * HS_NUMBERS(factors) + 23 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
 #define HS_IMPLICIT_SPACE(kind, w, factors) ((kind) == HS_RADAU ? HS_RADAU_SPACE(w, factors) : 0)
 
-typedef struct {
-  hs_time reached;
-  int idle, creeping;
-} hs_stall;
-
 /* What is remembered of a transition. */
 typedef struct {
   hs_time time, resumed;
   int mode, edge, target, entry;
 } hs_made;
-
-/* A state that transitions without flow between them led to, and how many followed: room 0 for none. */
-typedef struct {
-  int mode;
-  long length, room;
-  hs_real *x;
-} hs_cascade;
 
 /* Surfaces along one step: on part i, from start[i] on, surface k is a polynomial of the share of that part. */
 typedef struct {
@@ -214,9 +191,8 @@ typedef struct {
   hs_trial trial;
   hs_control control;
   int64_t placed; /* arcs of flow that were begun */
-  hs_stall stall;
+  hs_pace pace;
   hs_cascade cascade;
-  int chatter;
   /* in the workspace, a state's room each unless said otherwise */
   hs_real *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
   /* scale: the sizes of the numbers that the state was computed from on entry, negative where the terms of a reset gave
@@ -257,9 +233,7 @@ typedef struct {
 #endif
   /* of the located scheme */
   hs_span span, before;
-  hs_time since, short_time; /* short_steps of a flight since then; a millionth of the run */
-  int short_steps;
-  int has_before, sloped, creeping; /* sloped: the flow at the step's start is known */
+  int has_before, sloped; /* sloped: the flow at the step's start is known */
   hs_real ratio;                     /* of the last error estimate */
   hs_curves curves;
   hs_riser *waiting; /* one for each surface */
@@ -287,8 +261,7 @@ typedef struct {
    task's stop. Its time is behind the pause where it waits in a strip. */
 typedef struct {
   int ended, mode, dimension, active, emerging, noted_crowded, cascade_mode;
-  long cascade_length, cascade_room;
-  int64_t placed, jump, row;
+  int64_t cascade_length, cascade_room, placed, jump, row;
   hs_time time;
   hs_control control;
   hs_made made[FREE];

@@ -242,3 +242,51 @@ static void forget_steps(hs_run *run) {
   run->expanded = 0;
   if (run->method->kind == HS_RADAU) radau_forget(run);
 }
+
+/* Error ratio of a step of length h to run->z, errors held against these scales. */
+HS_INLINE hs_real ratio_with(hs_run *run, hs_real h, const hs_real *scales) {
+  return ratio_to(&run->control, h, run->error, run->z, scales, run->scales, run->here.dimension);
+}
+
+/* The same with a look at what the flow is computed from; see hsdsl/engine/simulate/control.py. */
+static hs_real ratio_closer(hs_run *run, hs_real h, hs_real ratio) {
+  hs_control *const control = &run->control;
+  const int again = run->here.t == control->failed_at;
+  control->failed_at = run->here.t;
+  if (!control->closer && !again) return ratio;
+  const hs_real *const scales = closer_scales(run, h);
+  if (!scales) return ratio;
+  ratio = ratio_with(run, h, scales);
+  control->closer = ratio <= 1;
+  return ratio;
+}
+
+/* Error ratio of a step of length h from run->x to run->z; at most 1 is acceptable. */
+HS_INLINE hs_real error_ratio(hs_run *run, hs_real h) {
+  const hs_real ratio = ratio_with(run, h, error_scales(run));
+  return !(ratio > 1) ? ratio : ratio_closer(run, h, ratio);
+}
+
+#define ALMOST (1 - 0x1p-30)
+
+/* End of a step of length h from t, which is stretched to the limit where it nearly gets there. */
+static hs_time end_of_step(hs_time t, hs_real *h, hs_time limit) {
+  if (*h < (limit - t) * ALMOST) return t + *h;
+  *h = limit - t;
+  return limit;
+}
+
+/* Cut a step to what the surfaces of the mode allow. */
+static hs_real within_reach(const hs_run *run, hs_real h) {
+  const hs_real reach = run->reach[run->here.mode];
+  return reach > 0 ? hs_min(h, reach) : h;
+}
+
+/* Learn that surfaces vary too fast for a step. */
+static void too_fast(hs_run *run, hs_real tried) { run->reach[run->here.mode] = tried / 2; }
+
+/* Learn that they do not for another one. */
+static void slow_enough(hs_run *run, hs_real taken) {
+  hs_real *const reach = &run->reach[run->here.mode];
+  if (*reach > 0 && taken >= *reach) *reach = 2 * taken;
+}

@@ -1,0 +1,109 @@
+"""Steps that do not lead on: how a run notices that no shorter step helps. See hsdsl/engine/simulate/stalls.py."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.engine.scheme.primitives import flow_between
+from hsdsl.engine.scheme.words import Here, Time, Vector, inline
+
+IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
+MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
+CREEPING = 10  # halvings; steps below a thousandth of the full one
+MOST_CREEPING = 2000  # in a row: the run would take a thousand times its length in steps
+SHORT = 1e-6  # of a run
+MOST_SHORT = 100000  # steps within that, in one flight: so the run would take a hundred billion
+MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
+JUMP_HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
+
+
+@dataclass
+class Pace:
+    """Counts of the steps of one stretch of flow that do not lead on.
+
+    The last step cut short ``reached`` a time: another start means full steps between. So many steps were ``made``
+    ``since`` a time, which lasts as long as is ``brief``; ``turns`` counts those that turn the flow around.
+    """
+
+    unit: Number
+    brief: Time
+    since: Time
+    reached: Time
+    idle: int = 0
+    creeping: int = 0
+    made: int = 0
+    turns: int = 0
+
+
+def creeps(pace: Pace, halvings: int) -> bool:
+    """Count a step that was halved so often; whether too many in a row were far below the full step."""
+    pace.creeping = pace.creeping + 1 if halvings >= CREEPING else 0
+    return pace.creeping > MOST_CREEPING
+
+
+def is_slow(pace: Pace, t: Time) -> bool:
+    """Count a step from t; whether there were too many within a millionth of the run."""
+    pace.made += 1
+    if t - pace.since > pace.brief:
+        pace.since, pace.made = t, 0
+    return pace.made > MOST_SHORT
+
+
+def is_idle(pace: Pace, t: Time, t1: Time, full: Number) -> bool:
+    """Begin to count a step that was cut short; whether round-off of time shows it."""
+    if t != pace.reached:
+        pace.idle = 0
+        pace.creeping = 0
+    pace.reached = t1
+    return t1 - t <= IDLE_UNITS * pace.unit * max(t, full)
+
+
+def gets_nowhere(pace: Pace, idle: bool) -> bool:
+    """Count a step that is idle or not; whether too many in a row were."""
+    pace.idle = pace.idle + 1 if idle else 0
+    return pace.idle > MOST_IDLE
+
+
+@inline
+def chatters(pace: Pace, slope: Vector, end: Vector, n: int) -> bool:
+    """Count a step, by whether a component of the flow has the other sign at its end; whether those are very many."""
+    turned = False
+    for k in range(n):
+        turned |= slope[k] * end[k] < 0
+    if turned:
+        pace.turns += 2
+    elif pace.turns > 0:
+        pace.turns -= 1
+    if pace.turns < MOST_CHATTER:
+        return False
+    pace.turns = 0
+    return True
+
+
+def jump_between(here: Here, k: int, t: Time, x: Vector, t1: Time, z: Vector) -> tuple[Number, Number, Number] | None:
+    """The share of the way from (t, x) to (t1, z) at which component k of the flow jumps, and its values there.
+
+    They are those before and behind the jump. None where it does not jump, or has no value.
+    """
+    low: Number = 0
+    high: Number = 1
+    try:
+        before = flow_between(here, k, t, x, t1, z, low)
+        behind = flow_between(here, k, t, x, t1, z, high)
+    except DOMAIN_ERRORS:
+        return None
+    size = abs(behind - before)
+    for _half in range(JUMP_HALVINGS):
+        middle = (low + high) / 2
+        try:
+            value = flow_between(here, k, t, x, t1, z, middle)
+        except DOMAIN_ERRORS:
+            return None
+        if abs(value - before) >= abs(behind - value):
+            high, behind = middle, value
+        else:
+            low, before = middle, value
+    if not (size > 0 and 2 * abs(behind - before) >= size):
+        return None
+    return high, before, behind
