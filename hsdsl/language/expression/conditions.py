@@ -36,7 +36,7 @@ def equation(tree: Tree, scope: Scope, text: str) -> tuple[Value, Value]:
     Raises ExpressionError: as `symbolic.number`, and where there is no single equation.
     """
     if not (isinstance(tree, Comparison) and tree.operators == ("==",)):
-        raise ExpressionError.at(tree, "HS325", "expected one equation", "write it as left == right")
+        raise ExpressionError("HS325", "expected one equation", tree.start, tree.end, "write it as left == right")
     left, right = (symbolic.number(side, scope, text) for side in tree.operands)
     return left, right
 
@@ -48,18 +48,18 @@ def the_comparison(tree: Tree, key: str, text: str) -> Comparison:
     """
     if isinstance(tree, (Logic, Not)) or (isinstance(tree, Comparison) and len(tree.operands) > 2):
         message = f"`{key}` takes one inequality"
-        raise ExpressionError.at(tree, "HS116", message, _apart(tree, key, text))
+        raise ExpressionError("HS116", message, tree.start, tree.end, _apart(tree, key, text))
     if not isinstance(tree, Comparison):
         message = f"`{key}` takes an inequality, and this is not one"
         hint = "write it as left >= right" + ("" if isinstance(tree, Truth) else f": {_said(tree, text)} >= 0")
-        raise ExpressionError.at(tree, "HS116", message, hint)
+        raise ExpressionError("HS116", message, tree.start, tree.end, hint)
     operator = tree.operators[0]
     if operator in ("==", "!="):
         message = f"`{key}` takes an inequality, not `{operator}`"
         left, right = (_said(side, text) for side in tree.operands)
         hint = f"write {left} >= {right} or {left} <= {right}, whichever is true where the mode "
         hint += "ends" if key == "when" else "may be"
-        raise ExpressionError.at(tree, "HS107", message, hint)
+        raise ExpressionError("HS107", message, tree.start, tree.end, hint)
     return tree
 
 
@@ -202,7 +202,7 @@ def trigger_of(tree: Tree, scope: Scope, text: str, positive: bool = True) -> Tr
             parts = tuple(_reached(tree, *pair, scope, text, positive) for pair in pairs)
             return parts[0] if len(parts) == 1 else Joined("and" if positive else "or", parts)
     message = f"expected a condition, got the number `{shown(text[tree.start : tree.end], 40)}`"
-    raise ExpressionError.at(tree, "HS115", message, "compare it with something, as x > 0")
+    raise ExpressionError("HS115", message, tree.start, tree.end, "compare it with something, as x > 0")
 
 
 def _reached(tree: Tree, operator: str, left: Tree, right: Tree, scope: Scope, text: str, positive: bool) -> Reached:
@@ -211,7 +211,7 @@ def _reached(tree: Tree, operator: str, left: Tree, right: Tree, scope: Scope, t
         a, b = (shown(text[side.start : side.end], 40) for side in (left, right))
         hint = f"write {a} >= {b} for where it rises, or {a} <= {b} for where it falls; for both, an event each"
         hint = f"write {a} > {b} or {a} < {b}" if operator == "!=" else hint
-        raise ExpressionError.at(tree, "HS107", message, hint)
+        raise ExpressionError("HS107", message, tree.start, tree.end, hint)
     a, b = symbolic.number(left, scope, text).expr, symbolic.number(right, scope, text).expr
     own, other = text[left.start : left.end], text[right.start : right.end]
     operator = operator if positive else _OPPOSITE[operator]

@@ -12,6 +12,9 @@ from typing import Any
 import mpmath
 import sympy as sp
 
+from hsdsl.language.expression.parse import Call, Negative, Power, Product, Sum, Tree
+from hsdsl.language.expression.scope import Value
+
 _BITS = 200  # far beyond both doubles and the fifty digits of a precise run
 _context: Any = mpmath.mp.clone()
 _context.prec = _BITS
@@ -27,6 +30,14 @@ _FUNCTIONS = {
     "max": max,
     "select": lambda number, one, other: one if number > 0 else other,
 }
+
+
+class Refused(Exception):
+    """A node without a value: in ``message`` `{it}` stands for its text, or for that of its part number ``of``."""
+
+    def __init__(self, code: str, message: str, hint: str | None = None, of: int | None = None) -> None:
+        super().__init__(message)
+        self.code, self.message, self.hint, self.of = code, message, hint, of
 
 
 def finite(number: Any) -> bool:
@@ -72,6 +83,23 @@ def apply(function: str, arguments: list[Any]) -> Any:
     return _guarded(_FUNCTIONS.get(function) or getattr(_context, function), arguments)
 
 
+def of_node(tree: Tree, numbers: list[Any]) -> Any:
+    """The number of a node whose parts have these; None where one is unknown, NaN where it has none."""
+    match tree:
+        case Negative():
+            return product([*numbers, -1])
+        case Sum():
+            signed = zip(numbers, tree.terms, strict=True)
+            return total([n if n is None or not minus else -n for n, (minus, _) in signed])
+        case Product():
+            return product([inverse(n) if below else n for n, (below, _) in zip(numbers, tree.factors, strict=True)])
+        case Power():
+            return power(*numbers)
+        case Call():
+            return apply(tree.function, numbers)
+    raise AssertionError(tree)
+
+
 def _guarded(function: Any, arguments: list[Any]) -> Any:
     numbers = arguments[0] if isinstance(arguments[0], list) else arguments
     if not all(finite(n) for n in numbers):
@@ -96,6 +124,76 @@ MOST_NODES_OF_A_CONSTANT = 500  # SymPy computes one as often as it asks for its
 MOST_LEVELS_OF_A_CONSTANT = 12  # and computes it anew at each of its levels
 MOST_LEVELS = 100  # SymPy's time grows with the cube of it
 LARGEST_NUMBER = 2**1024  # no float is as large
+DECIMAL, _SIMPLIFY = "write its value as a decimal", "make it a state or simplify it"
+TOO_DEEP = (
+    "HS120",
+    f"functions, powers and sums in products are nested more than {MOST_LEVELS} deep",
+    "this counts what is written under `let`",
+)
+_NOT_FINITE = ("HS118", "`{it}` has no finite real value")
+_TOO_LONG = (
+    "HS120", f"`{{it}}` contains an exact number of more than {MOST_BITS:,} bits", "write it as a decimal"
+)  # fmt: skip
+_NOT_REAL = frozenset((sp.zoo, sp.nan, sp.oo, -sp.oo, sp.I))
+
+
+def refuse_work(tree: Tree, exprs: list[Any], number: Any) -> None:
+    """Raise where the node of these parts has no value, or too long a one; ``number`` is that of a constant."""
+    if isinstance(tree, Product):
+        for k, (expr, (below, _)) in enumerate(zip(exprs, tree.factors, strict=True)):
+            if below and expr.is_zero and expr.is_number:
+                raise Refused("HS118", "nothing can be divided by 0, and `{it}` is 0", of=k)
+    elif isinstance(tree, Power) and large_exponent(exprs[1]):
+        raise Refused("HS119", f"the exponent `{{it}}` is above {LARGEST_EXPONENT:,} in magnitude", of=1)
+    if number is not None and not finite(number):
+        raise Refused(*_NOT_FINITE)
+    match tree:
+        case Sum():
+            length = sum_bits(exprs)
+        case Product():
+            length = sum(map(bits, exprs))
+        case Power():
+            length = power_bits(*exprs)
+        case Call(function="exp") if large_exponent(exprs[0]):
+            raise Refused("HS119", f"`{{it}}` is a power with an exponent above {LARGEST_EXPONENT:,} in magnitude")
+        case _:
+            return
+    if length > MOST_BITS:
+        raise Refused(*_TOO_LONG)
+
+
+def refuse_value(value: Value, of_power: bool) -> None:
+    """Raise where a value is not finite, or SymPy would need too long for it; ``of_power`` says that it is a power."""
+    expr = value.expr
+    if _not_real(expr) or beyond_floats(expr):
+        raise Refused(*_NOT_FINITE)
+    if bits(expr) > MOST_BITS:
+        raise Refused(*_TOO_LONG)
+    if value.constant and value.number is not None and not finite(value.number):
+        raise Refused(*_NOT_FINITE)
+    if value.size > MOST_NODES:
+        message = "the expression grows too large once the names of `let` and inputs are written out"
+        raise Refused("HS120", message, _SIMPLIFY)
+    if value.constant and not expr.is_Rational:  # SymPy would compute it for ever
+        if value.size > MOST_NODES_OF_A_CONSTANT:
+            message = f"`{{it}}` is a constant of more than {MOST_NODES_OF_A_CONSTANT} operations"
+            raise Refused("HS120", message, DECIMAL)
+        if value.depth > MOST_LEVELS_OF_A_CONSTANT:
+            most = MOST_LEVELS_OF_A_CONSTANT
+            message = f"`{{it}}` is a constant whose functions are nested more than {most} deep"
+            raise Refused("HS120", message, DECIMAL)
+    if value.bits > (MOST_BITS_WITHIN_A_POWER if of_power else MOST_BITS_WITHIN):
+        message = "the exact numbers in the expression grow too long once its powers are multiplied out"
+        raise Refused("HS120", message, _SIMPLIFY)
+    if value.depth > MOST_LEVELS:
+        raise Refused(*TOO_DEEP)
+
+
+def _not_real(expr: Any) -> bool:
+    """Whether an expression is infinite for SymPy, or not real."""
+    parts = (expr, *(expr.args if expr.is_Mul or expr.is_Add else ()))
+    roots = [(p.base, p.exp) for p in parts if p.is_Pow and p.base.is_Rational and p.exp.is_Rational]
+    return any(p in _NOT_REAL for p in parts) or any(base < 0 and not exp.is_Integer for base, exp in roots)
 
 
 def bits(expr: Any) -> int:

@@ -8,21 +8,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Literal, NamedTuple, Protocol
+from typing import Literal, NamedTuple
 
 from hsdsl.base.names import LOOKALIKES, normalised, shown
 from hsdsl.language.expression.timebox import deep_stack
 
 Expected = Literal["number", "condition", "inequality"]
-
-
-class Ranged(Protocol):
-    """A token or a node: it has a range of characters."""
-
-    @property
-    def start(self) -> int: ...
-    @property
-    def end(self) -> int: ...
 
 
 class ExpressionError(Exception):
@@ -35,11 +26,6 @@ class ExpressionError(Exception):
         self.start = start
         self.end = end
         self.hint = hint
-
-    @classmethod
-    def at(cls, node: Ranged, code: str, message: str, hint: str | None = None) -> ExpressionError:
-        """A fault at a token or a node."""
-        return cls(code, message, node.start, node.end, hint)
 
 
 @dataclass(frozen=True, slots=True)
@@ -420,7 +406,7 @@ class _Parser:
             self.at += 1
             return token.end
         if token.kind == "end":
-            raise ExpressionError.at(opened, "HS103", "this parenthesis is never closed", "add `)`")
+            raise ExpressionError("HS103", "this parenthesis is never closed", opened.start, opened.end, "add `)`")
         raise self.unexpected()
 
     @contextmanager
@@ -430,7 +416,7 @@ class _Parser:
         if self.depth > DEEPEST:
             token = self.tokens[self.at - 1]
             message = f"the expression is nested more than {DEEPEST} deep"
-            raise ExpressionError.at(token, "HS123", message, "name its parts under `let`")
+            raise ExpressionError("HS123", message, token.start, token.end, "name its parts under `let`")
         yield
         self.depth -= 1
 

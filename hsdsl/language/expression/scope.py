@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections import ChainMap
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
@@ -93,19 +93,24 @@ class Scope:
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
         faults: list[ExpressionError] = []
-        end = 0
+        passed = 0
         for node in walk(tree):
-            if node.start < end:
+            if node.start < passed or not isinstance(node, (Name, Call)):
                 continue
-            fault = None
-            if isinstance(node, Name):
-                fault = self._name(node, tree)
-            elif isinstance(node, Call) and (fault := self._call(node)):
+            name = node.name if isinstance(node, Name) else node.function
+            start, end = node.start, node.end
+            if "." in name and (isinstance(node, Call) or self.expanded is None):
+                start += name.index(".")
+                fault, end = _DOTTED, start + 1
+            elif isinstance(node, Name):
+                fault = self._name(name, name not in self.values and start in _behind_numbers(tree))
+            elif fault := self._call(name, node.arguments):
                 from hsdsl.language.diagnosis.expressions import timed
 
-                end = node.end if timed(node.function, None) else end  # its units mean nothing here
+                passed = end if timed(name, None) else passed  # its units mean nothing here
+                end = start + len(name) if fault.code == "HS112" else end
             if fault and fault.message not in [other.message for other in faults]:
-                faults.append(fault)
+                faults.append(ExpressionError(fault.code, fault.message, start, end, fault.hint))
         return faults
 
     def broken(self, tree: Tree) -> bool:
@@ -116,59 +121,54 @@ class Scope:
             isinstance(function, Function) and function.tree is None for function in called
         )
 
-    def _name(self, node: Name, tree: Tree) -> ExpressionError | None:
-        if node.name in CONSTANTS:
+    def _name(self, name: str, measured: bool) -> Refusal | None:
+        """Why a name cannot be used; one that is ``measured`` is the factor behind a number."""
+        if name in CONSTANTS:
             return None
-        if node.name in FUNCTIONS or isinstance(self.values.get(node.name), Function):
-            message = f"`{node.name}` is a function and needs its arguments"
-            return ExpressionError.at(node, "HS112", message, f"write {node.name}(...)")
-        if self.expanded is None and "." in node.name:
-            return _dotted(node, node.name)
-        if node.name not in self.values:
+        if name in FUNCTIONS or isinstance(self.values.get(name), Function):
+            return Refusal("HS112", f"`{name}` is a function and needs its arguments", f"write {name}(...)")
+        if name not in self.values:
             from hsdsl.language.diagnosis.expressions import unknown_name
 
             known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
-            hint = unknown_name(node.name, known, node.start in _behind_numbers(tree))
-            return ExpressionError.at(node, "HS111", f"nothing here is called '{shown(node.name)}'", hint)
-        value = self.values[node.name]
-        if isinstance(value, Refusal):
-            return ExpressionError.at(node, value.code, value.message, value.hint)
+            return Refusal("HS111", f"nothing here is called '{shown(name)}'", unknown_name(name, known, measured))
+        value = self.values[name]
         if not isinstance(value, Value) or self._reachable(value):
-            return None
+            return value if isinstance(value, Refusal) else None
         assert self.states is not None
         lacking = ", ".join(f"'{s}'" for s in sorted(value.uses - self.states))
-        message = f"'{node.name}' needs the state {lacking}, which {self.place} does not have"
+        message = f"'{name}' needs the state {lacking}, which {self.place} does not have"
         flow = ", ".join(f"{s}: 0" for s in sorted(value.uses - self.states))
         hint = f"add {flow} to its flow, where it then keeps its value"
-        if value.uses == {node.name}:
-            message = f"{self.place} has no state '{node.name}'"
-            hint = did_you_mean(node.name, sorted(self.states - {SINCE}), hint)
-        return ExpressionError.at(node, "HS117", message, hint)
+        if value.uses == {name}:
+            message = f"{self.place} has no state '{name}'"
+            hint = did_you_mean(name, sorted(self.states - {SINCE}), hint)
+        return Refusal("HS117", message, hint)
 
-    def _call(self, node: Call) -> ExpressionError | None:
-        if "." in node.function:
-            return _dotted(node, node.function)
-        known = self.values.get(node.function)
-        if isinstance(known, Function) and known.tree is None:
-            return None
+    def _call(self, name: str, arguments: Sequence[Tree]) -> Refusal | None:
+        """Why a function cannot be called with these arguments."""
+        known, given = self.values.get(name), len(arguments)
         if isinstance(known, Function):
-            return _miscounted(node, len(known.arguments), len(known.arguments), known.example)
-        if node.function not in FUNCTIONS:
-            end = node.start + len(node.function)
-            if node.function in self.values or node.function in CONSTANTS:
-                message, hint = f"'{shown(node.function)}' is not a function", _product_or_value(node)
-            else:
-                message = f"there is no function '{shown(node.function)}'"
-                own = [name for name, value in self.values.items() if isinstance(value, Function)]
-                first = node.arguments[0] if node.arguments else None
-                time = f"{float(first.value):g}" if isinstance(first, Number) else getattr(first, "name", None)
-                from hsdsl.language.diagnosis.expressions import unknown_function
+            fewest = most = len(known.arguments)
+            example = known.example
+        elif name in FUNCTIONS:
+            _, fewest, most = FUNCTIONS[name]
+            example = f"{name}({'x' if most == fewest == 1 else 'x, y'})"
+        elif name in self.values or name in CONSTANTS:
+            return Refusal("HS112", f"'{shown(name)}' is not a function", _product_or_value(name, arguments))
+        else:
+            own = [name for name, value in self.values.items() if isinstance(value, Function)]
+            first = arguments[0] if arguments else None
+            time = f"{float(first.value):g}" if isinstance(first, Number) else getattr(first, "name", None)
+            from hsdsl.language.diagnosis.expressions import unknown_function
 
-                hint = unknown_function(node.function, time, own)
-            return ExpressionError("HS112", message, node.start, end, hint)
-        _, fewest, most = FUNCTIONS[node.function]
-        arguments = "x" if most == fewest == 1 else "x, y"
-        return _miscounted(node, fewest, most, f"{node.function}({arguments})")
+            return Refusal("HS112", f"there is no function '{shown(name)}'", unknown_function(name, time, own))
+        broken = isinstance(known, Function) and known.tree is None
+        if broken or (given >= fewest and (most is None or given <= most)):
+            return None
+        from hsdsl.language.diagnosis.expressions import miscounted
+
+        return Refusal("HS113", *miscounted(name, given, fewest, most, example))
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states
@@ -182,34 +182,21 @@ def _behind_numbers(tree: Tree) -> Iterator[int]:
             yield from (factor.start for before, factor in pairs if isinstance(before, Number))
 
 
-def _dotted(node: Name | Call, name: str) -> ExpressionError:
-    at = node.start + name.index(".")
-    hint = "write the name or the function alone: sin(x)"
-    return ExpressionError("HS109", "names have no dots in an expression", at, at + 1, hint)
+_DOTTED = Refusal("HS109", "names have no dots in an expression", "write the name or the function alone: sin(x)")
 
 
-def _product_or_value(node: Call) -> str:
-    match node.arguments:
-        case (Number(value),) if node.function == SINCE:
+def _product_or_value(name: str, arguments: Sequence[Tree]) -> str:
+    match arguments:
+        case (Number(value),) if name == SINCE:
             return f"write since >= {float(value):g}: it is the time since the mode was entered"
-        case _ if node.function == SINCE:
+        case _ if name == SINCE:
             return "write since alone: it is the time since the mode that the run is in was entered"
         case (Name("t"),):
-            return f"write {node.function}: every name has its value at the present time"
+            return f"write {name}: every name has its value at the present time"
         case (argument,) if any(isinstance(part, Name) and part.name == "t" for part in walk(argument)):
             return "a name has its value at the present time: there are no delays"
         case _:
-            return f"write {node.function}*(...)"
-
-
-def _miscounted(node: Call, fewest: int, most: int | None, example: str) -> ExpressionError | None:
-    """The error for a call with too few or too many arguments."""
-    given = len(node.arguments)
-    if given >= fewest and (most is None or given <= most):
-        return None
-    from hsdsl.language.diagnosis.expressions import miscounted
-
-    return ExpressionError.at(node, "HS113", *miscounted(node.function, given, fewest, most, example))
+            return f"write {name}*(...)"
 
 
 def functions_called(tree: Tree) -> Iterator[str]:

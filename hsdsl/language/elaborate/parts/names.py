@@ -415,7 +415,7 @@ class Names(Mapping[str, Meaning]):
             return self._no_range(tree, inner) if tree.function in _SUMS else None
         if len(bases) > 1:
             message = f"`{tree.function}` ranges over the instances of one automaton, not of {', '.join(sorted(bases))}"
-            raise ExpressionError.at(tree, "HS113", message)
+            raise ExpressionError("HS113", message, tree.start, tree.end)
         (base,) = bases
         several = group(base) or []
         terms = [_of_instance(inner, base, one.name) for one in several]
@@ -432,13 +432,13 @@ class Names(Mapping[str, Meaning]):
                 return Name(f"{base}.{IN_MODE}", node.start, node.end)
             if base in roster.automata and not roster.group(base):
                 message = f"no instance is of the automaton '{base}'"
-                raise ExpressionError.at(node, "HS111", message, "give one under `system`")
+                raise ExpressionError("HS111", message, node.start, node.end, "give one under `system`")
             if "." in node.name and not roster.group(base):
                 message = f"there is no automaton or instance '{base}'"
-                raise ExpressionError.at(node, "HS111", message, did_you_mean(base, roster.names))
+                raise ExpressionError("HS111", message, node.start, node.end, did_you_mean(base, roster.names))
         example = f"{tree.function}({next(iter(roster.names), 'leg')}.NAME)"
         message = f"`{tree.function}` ranges over the instances of one automaton, each by its name and a point"
-        raise ExpressionError.at(tree, "HS113", message, f"write {example}")
+        raise ExpressionError("HS113", message, tree.start, tree.end, f"write {example}")
 
     def _count(self, tree: Call, inner: Name) -> Tree:
         """How many instances there are, or are in a mode."""
@@ -448,7 +448,7 @@ class Names(Mapping[str, Meaning]):
             return Number(Fraction(len(several)), tree.start, tree.end)
         if mode not in several[0].part.modes:
             message = f"the automaton '{several[0].automaton}' has no mode '{mode}'"
-            raise ExpressionError.at(inner, "HS303", message, did_you_mean(mode, several[0].part.modes))
+            raise ExpressionError("HS303", message, inner.start, inner.end, did_you_mean(mode, several[0].part.modes))
         terms = [Name(f"{one.name}.{IN_MODE}{mode}", inner.start, inner.end) for one in several]
         return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
 
