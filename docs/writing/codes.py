@@ -12,26 +12,26 @@ from hsdsl.base import errors
 
 ERROR_CODES = """# Error codes
 
-A code keeps its meaning for ever; a retired one is not used again. `hsdsl explain CODE` prints this text.
+A code keeps its meaning for ever, and a retired code is not used again. `hsdsl explain CODE` prints this text.
 Examples may leave out the keys that every model has.
 
 """
 
 WARNING_CODES = """# Warnings of runs
 
-What a run reports first: each is a line `warning` of its summary, an entry of `warnings` in `--json` (code, time, edge,
-message) and of `run.warnings` in Python, and a code in the column `warnings` of ensembles and sweeps. A run with
-warnings may be right, and its verdict may be `holds`: they are about what its author may not have meant.
-Several of one code about one transition are one line, with the first time and how often. Codes keep their meaning.
-`hsdsl explain CODE` prints this text.
+A run reports its warnings first. Each is a line `warning` of the summary, and an entry (code, time, edge, message) of
+`warnings` in `--json` and of `run.warnings` in Python. In ensembles and sweeps its code is in the column `warnings`.
+A run with warnings may be right, and its verdict may be `holds`: a warning names what you may not have intended.
+Warnings with the same code and transition share one line, with the first time and their number. Codes keep their
+meaning. `hsdsl explain CODE` prints this text.
 
 """
 
 LINT_RULES = """# Lint rules
 
 `hsdsl lint` finds probable mistakes in legal models (warnings), and makes remarks (notes).
-`hsdsl explain CODE` prints the page of a rule. How to choose rules and ignore findings is on
-[a page of its own](../how-to/lint.md).
+`hsdsl explain CODE` prints the page of a rule. [Lint models](../how-to/lint.md) shows how to choose rules and ignore
+findings.
 
 """
 

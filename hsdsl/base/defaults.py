@@ -22,17 +22,17 @@ SETTINGS = {
     "until": Setting("T", "End of the run."),
     "scheme": Setting("S", "relaxed, located or paoli-schatzman.", "located", numerical=True),
     "method": Setting("M", "A method's name, such as dopri5 or taylor, or auto.", "auto", numerical=True),
-    "step": Setting("H", "Fixed step size; excludes --tolerance.", numerical=True),
+    "step": Setting("H", "Fixed step size. Not with --tolerance.", numerical=True),
     "tolerance": Setting("TOL", "Bound on the local error, relative to the states' scales.", numerical=True),
     "relaxation": Setting(
-        "EPS", "The paper's epsilon: depth of the strips, and a time.", Fraction("1e-6"), numerical=True
+        "EPS", "The paper's epsilon: a depth beyond guards, and a time.", Fraction("1e-6"), numerical=True
     ),
     "scale": Setting(),
     "samples": Setting(numerical=True),
     "max_transitions": Setting(default=10**6),
     "completion": Setting(
         "C",
-        "Where transitions accumulate: contact follows guards, auto slides on surfaces of two modes, too; or none.",
+        "Where transitions accumulate, contact moves along guards, auto also slides between two modes, none stops.",
         "contact",
     ),
 }

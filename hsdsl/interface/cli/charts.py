@@ -29,34 +29,31 @@ if TYPE_CHECKING:
 
 
 MODELS = "Model files; FILE:1 is the second start of its reference."
-PEERS_HELP = "Peers to run: scipy, heyoka, diffrax, sksundae, casadi; or all."
+PEERS_HELP = "Peers (other tools) to run: scipy, heyoka, diffrax, sksundae, casadi; or all."
 
 
 def chart(
     models: Annotated[list[str], Argument(metavar="MODEL...", help=MODELS, autocompletion=model_files)],
     *,
-    schemes: Annotated[str | None, option("A,B", "Our schemes; all unless given.")] = None,
-    methods: Annotated[str | None, option("A,B", "Our methods; all unless given.")] = None,
-    engines: Annotated[str | None, option("A,B", "Our engines; all unless given.")] = None,
-    tolerances: Annotated[str | None, option("A,B", "For adaptive methods and peers.")] = None,
-    steps: Annotated[str | None, option("A,B", "For fixed-step methods.")] = None,
+    schemes: Annotated[str | None, option("A,B", "Schemes of hsdsl. Default: all.")] = None,
+    methods: Annotated[str | None, option("A,B", "Methods of hsdsl. Default: all.")] = None,
+    engines: Annotated[str | None, option("A,B", "Engines of hsdsl. Default: all.")] = None,
+    tolerances: Annotated[str | None, option("A,B", "Tolerances of adaptive methods and peers.")] = None,
+    steps: Annotated[str | None, option("A,B", "Steps of fixed-step methods.")] = None,
     against: Annotated[str | None, option("A,B", PEERS_HELP)] = None,
     states: Annotated[str | None, option("A,B", "Take the error of these states only.")] = None,
-    until: Annotated[str | None, option("T", "End of runs; an earlier one has a reference of its own.")] = None,
-    samples: Annotated[int, option("N", "At how many samples the error is taken.")] = 2000,
+    until: Annotated[str | None, option("T", "End of the runs.")] = None,
+    samples: Annotated[int, option("N", "Number of samples at which the error is measured.")] = 2000,
     clearance: Annotated[
         float | None,
-        option("DT", "Samples nearer than this to an exact jump do not count; else 1e-4, or 1e-4 of a run below 1."),
+        option("DT", "Ignore samples closer than this to an exact jump. Default: 1e-4, or 1e-4 of a run below 1."),
     ] = None,
-    digits: Annotated[int, option("N", "Digits of the reference where no exact execution is known.")] = 8,
-    rounds: Annotated[int, option("N", "Timed turns, after one that warms up.")] = 5,
+    digits: Annotated[int, option("N", "Digits of the reference if no exact execution is known.")] = 8,
+    rounds: Annotated[int, option("N", "Number of timed rounds, after one that warms up.")] = 5,
     patience: Annotated[
-        float,
-        option(
-            "S", "Seconds of a run or of a search for rho; a longer run is ended, its tool gets no tighter setting."
-        ),
+        float, option("S", "Time limit in seconds of a run or a search for rho. Its tool then gets no tighter setting.")
     ] = 10.0,
-    rho: Annotated[bool, Option(help="Also compute rho of our runs.")] = True,
+    rho: Annotated[bool, Option(help="Also compute rho for the runs of hsdsl.")] = True,
     out: Annotated[Path | None, option("FILE", "Write the table: .csv.")] = None,
     plot: Annotated[Path | None, option("FILE", "Draw the chart: .png or .svg.")] = None,
     answer: Answer,
@@ -140,25 +137,25 @@ def _numbers(text: str | None, name: str) -> tuple[float, ...]:
 
 
 MAP = (
-    "Two of h, tolerance, relaxation, parameters and initial.NAME, each with its range if not the default:"
-    " h=1e-4:1e-1:20,relaxation. Values are spaced logarithmically, with :lin evenly. Left out, h,relaxation."
+    "The two axes: h, tolerance, relaxation, a parameter or initial.NAME, each with a range if you like:"
+    " h=1e-4:1e-1:20,relaxation. Values are spaced logarithmically, or evenly with :lin. Default: h,relaxation."
 )
 SET_OF_MAPS = "Override a parameter, an initial value or a setting for every run. May be repeated."
-AGAINST = "Peers, on maps of tolerance: scipy, heyoka, diffrax, sksundae, casadi; or all."
+AGAINST = "Peers (other tools) on maps of tolerance: scipy, heyoka, diffrax, sksundae, casadi; or all."
 
 
 def stability(
     model: Model,
     *,
     map: Annotated[str | None, option("X,Y", MAP, "--map")] = None,
-    scheme: Annotated[str | None, option("A,B", "Our schemes; else relaxed on maps of it, and the file's.")] = None,
-    method: Annotated[str | None, option("A,B", "Our methods; else rk4 on maps of h, and auto.")] = None,
+    scheme: Annotated[str | None, option("A,B", "Schemes of hsdsl. Default: the file's, or relaxed.")] = None,
+    method: Annotated[str | None, option("A,B", "Methods of hsdsl. Default: rk4 for h, else auto.")] = None,
     against: Annotated[str | None, option("A,B", AGAINST)] = None,
     overrides: Annotated[list[str] | None, overriding(SET_OF_MAPS)] = None,
-    patience: Annotated[float, option("S", "Processor seconds of a run; a longer one is stuck.")] = 10.0,
-    processes: Annotated[int | None, option("N", "How many at a time; else as many as there are cores.")] = None,
-    rho: Annotated[bool, Option(help="Compute rho of runs that get to the end.")] = True,
-    out: Annotated[Path | None, option("FILE", "Write a line for each run: .csv.")] = None,
+    patience: Annotated[float, option("S", "Time limit of a run, in processor seconds.")] = 10.0,
+    processes: Annotated[int | None, option("N", "Number of processes. Default: one per core.")] = None,
+    rho: Annotated[bool, Option(help="Compute rho for runs that reach their end.")] = True,
+    out: Annotated[Path | None, option("FILE", "Write one line per run: .csv.")] = None,
     plot: Annotated[Path | None, option("FILE", "Draw the map: .png or .svg.")] = None,
     answer: Answer,
 ) -> None:

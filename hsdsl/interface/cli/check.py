@@ -47,7 +47,7 @@ def _size(path: Path) -> tuple[dict[str, Any], str]:
     return {"valid": True}, f"valid, {size}, {counted(edges, 'transition')}"
 
 
-SELECT = "Use these rules alone: codes, beginnings of codes, families or names."
+SELECT = "Use only these rules: codes, beginnings of codes, families or names."
 IGNORE = "Do not use these rules."
 
 
@@ -57,11 +57,11 @@ def lint(
     format: Formatted = "text",
     select: Annotated[str | None, option("RULE,...", SELECT, complete=rule_codes)] = None,
     ignore: Annotated[str | None, option("RULE,...", IGNORE, complete=rule_codes)] = None,
-    notes: Annotated[bool, Option("--notes", help="Show notes in full; with --select they always are.")] = False,
-    fix: Annotated[bool, Option("--fix", help="Remedy in the files what can be remedied safely.")] = False,
+    notes: Annotated[bool, Option("--notes", help="Show notes in full, as --select always does.")] = False,
+    fix: Annotated[bool, Option("--fix", help="Apply the remedies that keep the model's meaning.")] = False,
     answer: Answer,
 ) -> None:
-    """Look for what is legal in a model but suspicious."""
+    """Find what is legal in a model but suspicious."""
     from hsdsl.analysis.lint import configured, selected
     from hsdsl.analysis.lint import lint as findings_of
     from hsdsl.analysis.lint.fix import fix as remedy

@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from hsdsl.language.system import HybridSystem
 
 TO = f"The target: {', '.join(ABOUT)}, or that of a plug-in."
-FOLDER = "The folder for the files; left out, a target with one file of text prints it."
-MODE = "What the number of the mode is in a functional mock-up unit: local, the default, an output, or left out (none)."
-KEEP = "Only these states and outputs, with what they depend on."
+FOLDER = "The folder for the files. Without it, a target that has one text file prints it."
+MODE = "The number of the mode in a functional mock-up unit: a local variable (default), an output, or none."
+KEEP = "Keep only these states and outputs, and what they depend on."
 
 
 def export(
@@ -87,8 +87,8 @@ def only_text(files: Mapping[str, bytes], to: str) -> tuple[str, str]:
 
 
 FILE = "A model of SpaceEx or SBML (.xml)."
-CFG = "The configuration of a SpaceEx model; left out, the file of the same name that ends in .cfg."
-WRITTEN_TO = "The model's file (.yaml); left out, the model is printed."
+CFG = "The configuration of a SpaceEx model. Default: the file of the same name that ends in .cfg."
+WRITTEN_TO = "The model's file (.yaml). Without it, the model is printed."
 URGENT = "SpaceEx: make a transition as soon as its guard holds, where SpaceEx may wait."
 
 
@@ -102,7 +102,7 @@ def import_(
     file: Annotated[Path, Argument(metavar="FILE", help=FILE)],
     cfg: Annotated[Path | None, option("FILE", CFG)] = None,
     out: Annotated[Path | None, option("FILE", WRITTEN_TO)] = None,
-    force: Annotated[bool, Option("--force", help="Replace a file that is there.")] = False,
+    force: Annotated[bool, Option("--force", help="Replace an existing file.")] = False,
     urgent: Annotated[bool, Option("--urgent", help=URGENT)] = False,
     at: Annotated[list[str] | None, option("POINT", AT)] = None,
     until: Until = None,
@@ -110,7 +110,7 @@ def import_(
     quiet: Quiet = False,
     limit: Limit = None,
 ) -> None:
-    """Import a model of SpaceEx or SBML: write it as a model that runs, or say what cannot be kept."""
+    """Import a model of SpaceEx or SBML: write a model that runs, or name what this language lacks."""
     with answering(json, None, limit):
         check_target(out, "--out", (".yaml", ".yml"))
         if out is not None and out.exists() and not force:
@@ -160,10 +160,10 @@ NOTHING = (
 def complete(
     model: Model,
     *,
-    out: Annotated[Path | None, option("FILE", "Write it there (.yaml) rather than to standard output.")] = None,
+    out: Annotated[Path | None, option("FILE", "Write the model to this file (.yaml), not to standard output.")] = None,
     answer: Answer,
 ) -> None:
-    """Write a model with a mode for each motion along a guard, and for each surface that two modes press on.
+    """Write a model with a mode for each motion along a guard, and for each surface on which two modes slide.
 
     A model that has neither is refused (exit code 2).
     """
@@ -188,7 +188,7 @@ def complete(
 
 
 def schema(json: Json = False) -> None:
-    """Print the JSON Schema of the language (draft 7), which is one JSON object as it is."""
+    """Print the JSON Schema (draft 7) of the language, one JSON object."""
     from json import dumps
 
     from hsdsl.language.schema.jsonschema import json_schema

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from hsdsl.analysis.orbits.sampling import OrbitalStability
 
 
-AT = "Only the derivatives of the end, of transition times, or of states and outputs at the run's samples."
-STABILITY = "Run from nearby as well, and tell whether the execution is orbitally stable, as far as was sampled."
+AT = "Print only the derivatives of the end, of transition times, or of states and outputs at the run's samples."
+STABILITY = "Also start runs nearby, and say whether the execution is orbitally stable as far as they show."
 At = Literal["final", "transitions", "outputs"]
 
 
@@ -69,10 +69,10 @@ def _nearby(model: Any, wrt: str, call: dict[str, Any], hidden: bool) -> Orbital
         return model.orbital_stability(wrt, progress=tell, **call)
 
 
-SECTION = "The transition that the orbit is cut at, by its name."
-LAPS = "How many transitions of the section close the orbit."
+SECTION = "The name of the transition at which the orbit is cut."
+LAPS = "Number of transitions of the section after which the orbit closes."
 FOLLOW = "Follow the orbit in a parameter from A to B, and mark folds, flips and grazing."
-PERIOD = "The period of the forcing, an expression of parameters; left out, that of sines and cosines of t."
+PERIOD = "The period of the forcing, an expression of parameters. Default: that of the sines and cosines of t."
 
 
 def orbit(
@@ -83,9 +83,9 @@ def orbit(
     period: Annotated[str | None, option("T", PERIOD)] = None,
     follow: Annotated[str | None, option("PARAM=A:B", FOLLOW, "--continue")] = None,
     overrides: Annotated[list[str] | None, overriding(AS_RUN)] = None,
-    until: Annotated[str | None, option("T", "End of the run that the first guess is from.")] = None,
+    until: Annotated[str | None, option("T", "End of the run that gives the first guess.")] = None,
     located: Located,
-    plot: Annotated[Path | None, option("FILE", "Draw it: .png or .svg.")] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw the orbit: .png or .svg.")] = None,
     answer: Answer,
 ) -> None:
     """Find a periodic orbit near the model's run, with its Floquet multipliers."""
@@ -113,11 +113,11 @@ def _range(text: str) -> tuple[str, str, str]:
 
 
 SET_OF_FITS = (
-    "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first value."
+    "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first guess."
 )
 SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
-WEIGHT = "The weight of a column; left out, one over its largest size. May be repeated."
-Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file: t or time, and states and outputs.")]
+WEIGHT = "The weight of a column. Default: one over its largest size. May be repeated."
+Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file with columns t or time, states and outputs.")]
 
 
 def fit(

@@ -167,17 +167,17 @@ else:
 
 Model = Annotated[Path, Argument(metavar="MODEL", help="The model file.", autocompletion=model_files)]
 Models = Annotated[list[Path], Argument(metavar="MODEL...", help="Model files.", autocompletion=model_files)]
-Formatted = Annotated[Format, Option("--format", metavar="|".join(Format.__args__), help="Form of the findings.")]
+Formatted = Annotated[Format, Option("--format", metavar="|".join(Format.__args__), help="Format of the findings.")]
 Json = Annotated[bool, Option("--json", help="Print one JSON object on standard output.")]
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print no summary and no progress.")]
-FOLDER = "Let models read data files from here too. May be repeated."
-LIMIT = f"Let a model ask for more: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated."
+FOLDER = "Let models also read data files from this folder. May be repeated."
+LIMIT = f"Raise a limit of what a model may use: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated."
 SET = (
     "Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
     " (experiment.step=1e-3). May be repeated; values are expressions of parameters."
 )
 AS_RUN = "Override a parameter, an initial value or a setting, as `hsdsl run` does. May be repeated."
-PAIR = "Draw one state or output against another, in one of the pictures. May be repeated."
+PAIR = "Draw one state or output against another. May be repeated."
 
 
 def setting(name: str) -> Any:
@@ -197,7 +197,7 @@ def overriding(help: str) -> Any:
     return option("NAME=VALUE", help, "--set", complete=override_names)
 
 
-WRT = "Parameters by name and initial states as initial.NAME, with commas between them."
+WRT = "Parameters (NAME) and initial states (initial.NAME), separated by commas."
 
 
 class Experiment(NamedTuple):

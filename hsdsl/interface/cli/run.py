@@ -35,14 +35,14 @@ if TYPE_CHECKING:
 
 
 STOPPED = 3
-PRECISION = "Compute with this many decimal digits (mpmath); the default tolerance of taylor follows."
-EXPLAIN = "Give every reason of the verdict, not the conclusion alone."
-ESTIMATE = "Run again, finer, and give the distance of the runs."
-SAMPLES = "Rows of tables: every=TIME or count=N; jumps are always written. Else the file's, or the integrator's."
-EVERY = "Write every K-th step to --out (.csv) during the run, in constant memory; jumps are always written."
-DRAW = "Draw it: .png, .svg, or .html, an interactive page; with --outputs only these."
-FILM = "Write the scene of a second run with the same settings as a film: .gif, or .mp4 where ffmpeg is there."
-SPEED = "Of the film: time of the run by seconds; else 1 where the film then lasts 4 to 20 s."
+PRECISION = "Compute with this many decimal digits (mpmath). The default tolerance of taylor follows."
+EXPLAIN = "Print every reason of the verdict."
+ESTIMATE = "Run again with smaller steps, and print the distance between the two runs."
+SAMPLES = "Rows of tables: every=TIME or count=N; jumps have both sides. Default: the file's samples, or all steps."
+EVERY = "Write each K-th step and each jump to --out (.csv) during the run, in constant memory."
+DRAW = "Draw the run: .png, .svg, or .html (an interactive page). --outputs chooses what is drawn."
+FILM = "Run again and write a film of the model's scene: .gif, or .mp4 if ffmpeg is installed."
+SPEED = "Speed of the film: model time per second. Default: 1 if the film then lasts 4 to 20 s."
 EVERY_ALONE = "--every streams to --out FILE.csv, without --plot, --animate, --estimate or --precision"
 WRITES = {  # the suffixes of the files that options write
     "--out": (".csv", ".parquet", ".npz"),
@@ -57,7 +57,7 @@ def run(
     experiment: Experiment,
     engine: EngineName = "auto",
     precision: Annotated[int | None, option("DIGITS", PRECISION)] = None,
-    outputs: Annotated[str | None, option("A,B", "Only these states and outputs in files and final outputs.")] = None,
+    outputs: Annotated[str | None, option("A,B", "The states and outputs in files and final outputs.")] = None,
     estimate: Annotated[bool, Option("--estimate", help=ESTIMATE)] = False,
     out: Annotated[Path | None, option("FILE", "Save the execution: .csv, .parquet or .npz.")] = None,
     samples: Annotated[str | None, option("N", SAMPLES)] = None,

@@ -35,12 +35,12 @@ if TYPE_CHECKING:
     from hsdsl.interface.model import Model
 
 
-RUNS = "Saved runs (.npz), or model files, each of which is run as its own experiment says."
+RUNS = "Saved runs (.npz) or model files. A model file is run with its own experiment."
 DRAWN = "The picture: .png, .svg, or .html, an interactive page."
-OUTPUTS = "Only these states and outputs over time, in this order."
-LABEL = "The name of a run in the legend, in the order of the runs; else its file's. Once for each run."
-OF_MODEL = "The model of saved runs: for units, levels of guards where all runs have one, and outputs."
-TITLE = "The title; else that of the model."
+OUTPUTS = "Draw only these states and outputs over time, in this order."
+LABEL = "The name of a run in the legend; give it once for each run, in their order. Default: the file's name."
+OF_MODEL = "The model of saved runs. It gives units, outputs, and the levels of guards that all runs share."
+TITLE = "The title. Default: that of the model."
 
 
 def plot(
@@ -99,14 +99,14 @@ def _labels(runs: list[Path]) -> list[str]:
 
 
 SET_PARAMETERS = "Override a parameter. May be repeated."
-FIRST = "The model file, or a run: a saved one (.npz), or a model's own experiment."
+FIRST = "The model file; or a run: a saved one (.npz), or a model file, run with its own experiment."
 FROM = 'A mode and all its states: "free x=13 v=5"; values are expressions.'
 _OF_RUNS = [name for name in CURVE_METRICS.own if name not in POINT_METRICS]
 METRIC = f"Between states: {' or '.join(POINT_METRICS)}. Between runs: {', '.join(_OF_RUNS[:-1])} or {_OF_RUNS[-1]}."
-DEPTH = "Depth of the strips, for the relaxed metric; else the file's."
+DEPTH = "The relaxation of the relaxed metric. Default: the file's."
 PLOT = "Draw the distance of two runs over time, or the shortest path in the plane: .png or .svg."
-HOPS = "The most passages of a path; else eight more than the fewest that connect the modes."
-SECONDS = "About how long the search may take; it then returns the bounds it has."
+HOPS = "Largest number of passages of a path. Default: eight more than the fewest that connect the modes."
+SECONDS = "Approximate time limit of the search in seconds. It then returns the bounds that it has."
 
 
 def distance(

@@ -15,41 +15,41 @@ from hsdsl.interface.cli.console import progress, say
 from hsdsl.interface.cli.options import Answer, EngineName, Experiment, check_target, model_files, names_of, option
 
 Model = Annotated[
-    Path | None, Argument(metavar="[MODEL]", help="The model file; none with --show.", autocompletion=model_files)
+    Path | None, Argument(metavar="[MODEL]", help="The model file; not with --show.", autocompletion=model_files)
 ]
 VARY = (
-    "What varies, a parameter or initial.NAME: c=FROM:TO:COUNT, with :log in logarithms, c=A,B,C, or a draw as"
-    " 'c~normal(0.9, 0.02)'. May be repeated: the product is run."
+    "Vary a parameter or initial.NAME: c=FROM:TO:COUNT (with :log evenly in the logarithm), c=A,B,C, or a random draw,"
+    " 'c~normal(0.9, 0.02)'. May be repeated: every combination is run."
 )
-RECORD = "What is kept of a run: final, transitions, outputs:every=TIME, outputs:count=N, verdict."
-OF = "What --plot draws: a column, such as final.x or transitions; before.v and sample.x give a bifurcation diagram."
-OVER = "Draw samples, such as --of sample.x, over time: a curve for each row, in colours of what varies."
-CHUNK = "Rows of a file; left out, it follows from a few runs that are timed."
-TAIL = "The share of each run, at its end, whose transitions and samples are in the bifurcation diagram."
+RECORD = "What to keep of each run: final, transitions, outputs:every=TIME, outputs:count=N, verdict."
+OF = "The column that --plot draws, such as final.x or transitions. before.v and sample.x give a bifurcation diagram."
+OVER = "Draw samples, such as --of sample.x, over time: one curve per row, coloured by what varies."
+CHUNK = "Rows per file. Default: hsdsl times a few runs and chooses."
+TAIL = "The last share of each run, whose transitions and samples a bifurcation diagram shows."
 
 
 def sweep(
     model: Model = None,
     *,
     vary: Annotated[list[str] | None, option("NAME=VALUES", VARY)] = None,
-    out: Annotated[Path | None, option("DIR", "The folder of the dataset; the same command goes on with it.")] = None,
-    random: Annotated[int | None, option("N", "Rows at each point, where something is drawn.")] = None,
-    seed: Annotated[int, option("S", "Of the draws.")] = 0,
+    out: Annotated[Path | None, option("DIR", "The folder of the dataset. The same command resumes it.")] = None,
+    random: Annotated[int | None, option("N", "Rows at each point of the grids, for random draws.")] = None,
+    seed: Annotated[int, option("S", "Seed of the random draws.")] = 0,
     record: Annotated[str, option("A,B", RECORD)] = "final",
-    outputs: Annotated[str | None, option("A,B", "Only these states and outputs.")] = None,
+    outputs: Annotated[str | None, option("A,B", "Keep only these states and outputs.")] = None,
     experiment: Experiment,
     engine: EngineName = "auto",
     cluster: Annotated[str | None, option("ADDRESS", "The scheduler of a Dask cluster.")] = None,
-    processes: Annotated[int | None, option("N", "How many here; else as many as there are cores.")] = None,
+    processes: Annotated[int | None, option("N", "Number of processes on this machine. Default: one per core.")] = None,
     chunk: Annotated[int | None, option("ROWS", CHUNK)] = None,
     show: Annotated[Path | None, option("DIR", "Summarise and draw a dataset, without running anything.")] = None,
-    plot: Annotated[Path | None, option("FILE", "Draw it: .png or .svg; --show draws to DIR/_picture.png.")] = None,
+    plot: Annotated[Path | None, option("FILE", "Draw the dataset: .png or .svg.")] = None,
     of: Annotated[str | None, option("COLUMN", OF)] = None,
     over: Annotated[str | None, option("time", OVER)] = None,
     tail: Annotated[float, option("SHARE", TAIL)] = 0.5,
     answer: Answer,
 ) -> None:
-    """Run a model over many values, into a dataset of Parquet files."""
+    """Run a model for many values, and write a dataset of Parquet files."""
     with answer.reporting():
         check_target(plot, "--plot")
         _check(model, vary, out, show)
