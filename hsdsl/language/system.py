@@ -178,21 +178,15 @@ class Edge:
         return replace(self, **{part: tuple(getattr(self, part)[k] for k in kept) for part in parts})
 
 
-SIZES = {"point": (), "line": (), "circle": ("radius",), "spring": (), "box": ("width", "height", "angle")}
-
-
 class Shape(NamedTuple):
-    """A shape of the scene: a key of :data:`SIZES`, and how many points it has.
+    """A shape of the scene: its kind, how many points it has, and how many ``numbers``.
 
-    Its numbers are the coordinates x, y of each point, and then its sizes.
+    These are the coordinates x, y of each point, and then its sizes.
     """
 
     kind: str
     points: int
-
-    @property
-    def numbers(self) -> int:
-        return 2 * self.points + len(SIZES[self.kind])
+    numbers: int
 
 
 class Queue(NamedTuple):

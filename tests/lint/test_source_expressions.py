@@ -56,6 +56,7 @@ scene:
   - {spring: [[xm + xs, xm - xs], [xm + xs, xm - xs]]}
   - {circle: [xm + xs, xm - xs], radius: xs + xm}
   - {box: [xm + xs, xm - xs], width: xs + xm, height: xs + xm, angle: xs + xm}
+  - {view: [xm + xs, xm - xs], width: xs + xm, height: xs + xm}
 units: {xm: m, xs: s, t: s}
 initial: {mode: m, x: START}
 experiment:

@@ -17,11 +17,11 @@ from matplotlib.figure import Figure
 
 import hsdsl
 from hsdsl.analysis.plot import View, analyses, plot
-from hsdsl.analysis.plot.animation import FPS, MOST, Drawn, frame_times, shapes_at
+from hsdsl.analysis.plot.animation import FPS, MOST, Drawn, Stage, frame_times, shapes_at
 from hsdsl.analysis.plot.curves import curves
 from hsdsl.analysis.plot.figure import picture
 from hsdsl.analysis.plot.page import page, thinned
-from hsdsl.analysis.plot.style import fills, looks
+from hsdsl.analysis.plot.style import fills, looks, styled
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Stop
 from hsdsl.language.system import Shape
@@ -206,7 +206,7 @@ def test_shapes_have_the_numbers_of_the_run(staged):
     for row, t in enumerate(times):
         x = t if t <= 2 else 4 - t
         a = 2 * min(t, 2)
-        point, line, circle, spring, box = shapes_at(samples, model.system.scene, row)
+        point, line, circle, spring, box = dict(shapes_at(samples, model.system.scene, row)).values()
         assert np.allclose(point.points, [[x, 0]]) and np.allclose(line.points, [[0, 0], [x, 1]])
         assert np.allclose(circle.points, [[x, 1]]) and circle.sizes == (0.5,)
         assert np.allclose(spring.outline[[0, -1]], [[0, 2], [x, 2]])
@@ -219,7 +219,8 @@ def test_a_shape_without_a_number_is_left_out():
         pass
 
     values = Samples({f"scene {k}": np.array([float("nan") if k == 1 else 1.0]) for k in range(4)})
-    assert [s.points.tolist() for s in shapes_at(values, [Shape("point", 1), Shape("point", 1)], 0)] == [[[1.0, 1.0]]]
+    there = shapes_at(values, [Shape("point", 1, 2), Shape("point", 1, 2)], 0)
+    assert [(k, drawn.points.tolist()) for k, drawn in there] == [(1, [[1.0, 1.0]])]
 
 
 def test_a_spring_of_no_length_is_a_point():
@@ -264,6 +265,61 @@ def test_a_film_has_its_frames(tmp_path):
         first = np.asarray(film.convert("L"), dtype=int)
         film.seek(6)
         assert np.abs(np.asarray(film.convert("L"), dtype=int) - first).max() > 100  # shapes have moved
+
+
+FOLLOWED = """hsdsl: 1
+modes:
+  near:
+    flow: {x: 1, h: 1}
+    transitions: [{when: x >= 2, to: far}]
+  far: {flow: {x: 1}}
+scene:
+  - line: [[0, 0], [8, 0]]
+  - point: [x, 1]
+  - {view: [x, h], width: 2, height: 1 - x/16}
+initial: {mode: near, x: 0, h: 1}
+experiment: {until: 4}
+"""
+
+
+def staged_at(text, times):
+    model = hsdsl.loads(text)
+    run = model._staged.simulate(engine="python")
+    with styled():
+        return Stage(run, run.sample(np.array(times)), model.system.scene, None)
+
+
+def test_a_film_shows_its_view_and_else_everything():
+    """The axes keep the shape of the first view, 2 by 1; a mode without h has none."""
+    stage = staged_at(FOLLOWED, [0.0, 1.0, 3.0])
+    for row, (x, y, width) in enumerate([(0, 1, 2), (1, 2, 2), (4, 0.5, 8 * 1.12)]):
+        stage.frame(row)
+        ends = np.array([stage.scene.get_xlim(), stage.scene.get_ylim()])
+        assert np.allclose(ends.mean(axis=1), (x, y)) and np.allclose(np.ptp(ends, axis=1), (width, width / 2))
+
+
+def test_a_view_without_size_is_refused():
+    with pytest.raises(UsageError, match=r"expected a view with a positive size, got 2 by 0 at t = 1"):
+        staged_at(FOLLOWED.replace("1 - x/16", "1 - x"), [0.0, 1.0]).frame(1)
+
+
+def test_a_frame_does_not_depend_on_those_before_it():
+    stage = staged_at(SCENE, np.linspace(0, 5, 6))
+    forwards = [stage.frame(row) for row in range(6)]
+    assert all(np.array_equal(stage.frame(row), forwards[row]) for row in reversed(range(6)))
+    assert not np.array_equal(forwards[0], forwards[5])
+
+
+def test_the_colours_of_a_film_are_those_of_the_picture(tmp_path):
+    from PIL import Image
+
+    hsdsl.loads(SCENE).animate(tmp_path / "film.gif", speed=10, engine="python")
+    own = staged_at(SCENE, np.linspace(0, 5, round(5 / 10 * FPS) + 1))
+    with Image.open(tmp_path / "film.gif") as film:
+        for row in (0, 4, 12):
+            film.seek(row)
+            off = np.abs(np.asarray(film.convert("RGB"), dtype=int) - own.frame(row))
+            assert off.max() <= 32 and np.mean(off == 0) > 0.98
 
 
 def test_what_cannot_be_a_film_is_refused(tmp_path, monkeypatch):

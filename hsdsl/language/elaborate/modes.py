@@ -128,8 +128,8 @@ def elaborate_scene(symbols: SymbolTable, scope: Scope | None = None) -> tuple[t
     numbers: Numbers = []
     scope = scope or output_scope(symbols)
     for document in symbols.document.scene:
-        shapes.append(Shape(document.kind, len(document.points)))
         scalars = [*(scalar for point in document.points for scalar in point), *document.sizes]
+        shapes.append(Shape(document.kind, len(document.points), len(scalars)))
         numbers += [(s, None if s is None else symbols.number(s, scope)) for s in scalars]
     return tuple(shapes), numbers
 

@@ -45,7 +45,7 @@ from hsdsl.language.schema.fields import (
 )
 from hsdsl.language.source.nodes import ABSENT, Key, Mapping, Node, Scalar, Sequence, absent
 
-KINDS = ("point", "line", "circle", "spring", "box")
+KINDS = ("point", "line", "circle", "spring", "box", "view")
 
 
 def _is_reported(value: Any) -> bool:
@@ -80,7 +80,7 @@ Ends = Annotated[
 
 
 class ShapeDocument(Document):
-    """A shape: its ``kind``, its ``points``, and its ``sizes`` in the order of `hsdsl.language.system.SIZES`."""
+    """A shape: its ``kind``, its ``points``, and its ``sizes`` in the order of ``sized_by``."""
 
     kind: ClassVar[str]
     sized_by: ClassVar[tuple[str, ...]] = ()
@@ -138,6 +138,16 @@ class BoxShape(ShapeDocument):
     angle: OptionalExpression = None
 
 
+class ViewShape(ShapeDocument):
+    """What a film shows at a time: a camera that follows."""
+
+    kind = "view"
+    sized_by = ("width", "height")
+    view: Pair
+    width: Expression
+    height: Expression
+
+
 def _kind(value: Any) -> str:
     """The tag of a shape; the kind is checked before."""
     return next((f"<{kind}>" for kind in KINDS if kind in value), "<point>")
@@ -150,7 +160,7 @@ def _with_kind(value: Any) -> Any:
         near = (did_you_mean(str(key), KINDS) for key in value)  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
         keys = ", ".join(f"'{shown(str(key))}'" for key in value) or "nothing"  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
         hint = next((hint for hint in near if hint), None)
-        raise refuse("HS203", f"expected a point, a line, a circle, a spring or a box, got {keys}", hint)
+        raise refuse("HS203", f"expected a point, a line, a circle, a spring, a box or a view, got {keys}", hint)
     return value  # pyright: ignore[reportUnknownVariableType]
 
 
@@ -159,7 +169,8 @@ Shape = Annotated[
     | Annotated[LineShape, Tag("<line>")]
     | Annotated[CircleShape, Tag("<circle>")]
     | Annotated[SpringShape, Tag("<spring>")]
-    | Annotated[BoxShape, Tag("<box>")],
+    | Annotated[BoxShape, Tag("<box>")]
+    | Annotated[ViewShape, Tag("<view>")],
     Discriminator(_kind),
     BeforeValidator(_with_kind),
 ]
@@ -501,6 +512,7 @@ SHAPES: dict[tuple[str, ...], tuple[type[Document], str]] = {
     ("scene", "*", "<circle>"): (CircleShape, "a circle"),
     ("scene", "*", "<spring>"): (SpringShape, "a spring"),
     ("scene", "*", "<box>"): (BoxShape, "a box"),
+    ("scene", "*", "<view>"): (ViewShape, "a view"),
     ("initial",): (InitialDocument, "`initial`"),
     ("initial", "*", "<mapping>"): (RangeDocument, "a range"),
     ("experiment",): (ExperimentDocument, "`experiment`"),

@@ -1,7 +1,7 @@
 // The scene at a time: shapes whose numbers are the last columns of a run.
 
 const COILS = 8;
-let view; // the box that all of the run's shapes are in
+let whole; // the box that all of the run's shapes are in
 
 function numbersOf(run, i, next, share) {
   const first = model.columns.length, found = [];
@@ -23,6 +23,7 @@ function shapesOf(numbers) {
 
 function reach({kind, points, sizes}) {
   const [x, y] = points[0], [a, b] = sizes;
+  if (kind === "view") return [[x - a / 2, y - b / 2], [x + a / 2, y + b / 2]];
   const half = kind === "circle" ? Math.abs(a) : kind === "box" ? Math.hypot(a, b) / 2 : 0;
   return half ? [[x - half, y - half], [x + half, y + half]] : points;
 }
@@ -31,8 +32,8 @@ function reach({kind, points, sizes}) {
 function measureScene(run) {
   const step = Math.max(1, Math.floor(run.times.length / 1000)), corners = [];
   for (let i = 0; i < run.times.length; i += step)
-    for (const shape of shapesOf(numbersOf(run, i, i, 0))) if (shape.whole) corners.push(...reach(shape));
-  view = [rangeOf(corners.map(([x]) => x)), rangeOf(corners.map(([, y]) => y))];
+    for (const shape of shapesOf(numbersOf(run, i, i, 0))) if (shape.whole && shape.kind !== "view") corners.push(...reach(shape));
+  whole = [rangeOf(corners.map(([x]) => x)), rangeOf(corners.map(([, y]) => y))];
 }
 
 function spring(context, [[x, y], [u, v]], width) {
@@ -70,14 +71,16 @@ function drawShape(context, {kind, points, sizes}, place, scale) {
 // `share` is how far the time is from the point to the next one of the same arc.
 function drawScene(run, i, share = 0) {
   if (!model.scene.length) return;
-  const {context, width, height} = canvasOf($("scene")), [[left, right], [low, high]] = view;
+  const {context, width, height} = canvasOf($("scene")), next = run.arcOf[i + 1] === run.arcOf[i] ? i + 1 : i;
+  const shapes = shapesOf(numbersOf(run, i, next, share)).filter(shape => shape.whole);
+  const view = shapes.filter(({kind, sizes: [a, b]}) => kind === "view" && a > 0 && b > 0).pop();
+  const [[left, low], [right, high]] = view ? reach(view) : [[whole[0][0], whole[1][0]], [whole[0][1], whole[1][1]]];
   const scale = Math.min((width - 16) / (right - left), (height - 16) / (high - low));
   const middle = [(left + right) / 2, (low + high) / 2];
   const place = ([x, y]) => [width / 2 + (x - middle[0]) * scale, height / 2 - (y - middle[1]) * scale];
-  const next = run.arcOf[i + 1] === run.arcOf[i] ? i + 1 : i;
   context.strokeStyle = palette.ink;
   context.fillStyle = palette.curve;
   context.lineWidth = 2;
   context.lineJoin = "round";
-  for (const shape of shapesOf(numbersOf(run, i, next, share))) if (shape.whole) drawShape(context, shape, place, scale);
+  for (const shape of shapes) if (shape.kind !== "view") drawShape(context, shape, place, scale);
 }
