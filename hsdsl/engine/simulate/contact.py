@@ -308,9 +308,9 @@ def period(made: Sequence[Transition]) -> int:
 
 
 def round_flights(made: Sequence[Transition]) -> list[Number]:
-    """How long the last few rounds of edges that take turns lasted, in order; none where fewer than two do."""
+    """How long the last few rounds lasted, in order; none where there is no :func:`period`."""
     n = period(made)
-    times = [one.time for one in made[-LEAST_FLIGHTS * n - 1 :: n]] if n > 1 else []
+    times = [one.time for one in made[-LEAST_FLIGHTS * n - 1 :: n]] if n else []
     return [b - a for a, b in pairwise(times)]
 
 
@@ -458,19 +458,18 @@ def at_limit(run: Run, here: ModeState) -> Stop | None:
     A round leads through all of them, through other modes with the same states, too: the limit is on all their guards.
     """
     made = run.recorder.transitions
-    flights = round_flights(made)
-    found = shrinking(flights)
-    if found is None:
+    found, turns = contraction(made), period(made)
+    if found is None or turns < 2:
         return None
     left = found[0] * found[1] / (1 - found[1])
     end = here.t + left
     if not left <= run.settings.relaxation or not end < here.segment.end:
         return None
-    stages = stages_of(run, here, made[-period(made) :])
+    stages = stages_of(run, here, made[-turns:])
     if stages is None:
         return None
     try:
-        q = end_of_rounds(run, here, stages, made, left / flights[-1], end)
+        q = end_of_rounds(run, here, stages, made, left / found[0], end)
     except DOMAIN_ERRORS:
         return None
     if q is None:

@@ -383,18 +383,13 @@ static int period(const hs_run *run) {
   return 0;
 }
 
-/* How long the last few rounds of edges that take turns lasted, the last one first; 0 where fewer than two do. */
-static int round_flights(const hs_run *run, hs_real *flight) {
-  const int n = period(run);
-  for (int i = 0; n > 1 && i < LEAST_FLIGHTS; i++)
-    flight[i] = made_before(run, i * n)->time - made_before(run, (i + 1) * n)->time;
-  return n > 1;
-}
-
 /* Whether the last few flights, of rounds or of the last edge, shrink: the last one, and the largest ratio of them. */
 static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *ratio) {
   hs_real flights[LEAST_FLIGHTS];
-  if (!round_flights(run, flights) && !last_flights(run, of_flow, flights)) return 0;
+  const int n = period(run);
+  for (int i = 0; n && i < LEAST_FLIGHTS; i++)
+    flights[i] = made_before(run, i * n)->time - made_before(run, (i + 1) * n)->time;
+  if (!n && !last_flights(run, of_flow, flights)) return 0;
   *flight = flights[0], *ratio = 0.0;
   for (int i = 0; i < LEAST_FLIGHTS; i++) {
     if (!(flights[i] > 0)) return 0;
@@ -816,8 +811,8 @@ static int end_of_rounds(hs_run *run, hs_real share, hs_time end) {
    leads through all of them, through other modes with the same states, too: the limit is on all their guards. */
 static int at_limit(hs_run *run) {
   hs_mode_state *const here = &run->here;
-  hs_real flights[LEAST_FLIGHTS], flight, ratio;
-  if (!round_flights(run, flights) || !shrinking(run, 0, &flight, &ratio)) return GOES_ON;
+  hs_real flight, ratio;
+  if (!contraction(run, &flight, &ratio) || period(run) < 2) return GOES_ON;
   const hs_time left = flight * ratio / (1 - ratio), end = here->t + left;
   if (!(left <= run->epsilon) || !(end < segment_end(run)) || end > run->pause) return GOES_ON;
   if (!rounds_alike(run) || end_of_rounds(run, left / flight, end) != 1) return GOES_ON;

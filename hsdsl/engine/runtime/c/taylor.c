@@ -68,8 +68,9 @@ HS_INLINE void taylor_error(hs_run *run, const int n, hs_real h) {
   left_of(run, n, h);
 }
 
-/* What is done for each of the states s to s + 3, the last one again where there are fewer. */
-#define OF_FOUR(what) what(0) what(1) what(2) what(3)
+/* What is done for each of the states s to s + 1, or s + 3, the last one again where there are fewer. */
+#define OF_TWO(what) what(0) what(1)
+#define OF_FOUR(what) OF_TWO(what) what(2) what(3)
 #define BEGIN(i)                                       \
   const int s##i = s + i < n ? s + i : n - 1;          \
   const hs_real *const line##i = series_of(run, s##i); \
@@ -82,21 +83,25 @@ HS_INLINE void taylor_error(hs_run *run, const int n, hs_real h) {
   moved##i = factor * part##i + moved##i;
 #define END(i) run->z[s##i] = run->x[s##i] + z##i, run->error[s##i] = moved##i;
 
+#define SPAN_OF(each)                                  \
+  {                                                    \
+    hs_real *c = piece->c + (order - 1) * w, factor = order; \
+    each(BEGIN) each(KEEP_LAST)                        \
+    for (int m = order - 1; m > 0; m--) {              \
+      c -= w, factor -= 1;                             \
+      each(ADD)                                        \
+    }                                                  \
+    each(END)                                          \
+  }
+
 /* The same step, of coefficients that are known: its polynomial to `piece`, its end to run->z, and h X' there to
-   run->error. Four states go together, since the sums of one wait for each other. */
+   run->error. Up to four states go together, since the sums of one wait for each other. */
 HS_INLINE void taylor_span(hs_run *run, const int n, hs_real h, hs_polynomial *piece) {
   const int order = run->method->order, w = run->width;
   hs_real powers[HS_MOST_ORDER + 1];
   fill_powers(powers, order, h);
   piece->degree = order;
-  for (int s = 0; s < n; s += 4) {
-    hs_real *c = piece->c + (order - 1) * w, factor = order;
-    OF_FOUR(BEGIN)
-    OF_FOUR(KEEP_LAST)
-    for (int m = order - 1; m > 0; m--) {
-      c -= w, factor -= 1;
-      OF_FOUR(ADD)
-    }
-    OF_FOUR(END)
-  }
+  int s = 0;
+  for (; s + 2 < n; s += 4) SPAN_OF(OF_FOUR)
+  if (s < n) SPAN_OF(OF_TWO)
 }
