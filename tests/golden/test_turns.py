@@ -7,6 +7,7 @@ mpmath at 40 digits; flights are summed until one is below 1e-30.
 from __future__ import annotations
 
 from fractions import Fraction
+from functools import cache
 
 import mpmath as mp
 import pytest
@@ -70,6 +71,7 @@ def swing(foot: mp.mpf, top: mp.mpf, w: mp.mpf) -> mp.mpf:
     )
 
 
+@cache  # for both engines
 def rocks(feet: tuple[mp.mpf, mp.mpf], start: mp.mpf, w: mp.mpf, kept: mp.mpf) -> mp.mpf:
     """When a body on two feet comes to rest that starts at rest at an angle; impacts leave a share of its speed.
 

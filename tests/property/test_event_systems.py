@@ -12,7 +12,7 @@ import hsdsl
 
 CLOSE = 1e-6  # of times, which are below 30
 BEFORE_A_TAIL = 1e-3  # impacts of a ball, of which each run resolves its own
-FEW, MANY = range(24), range(24, 324)
+FEW, MANY = range(8), range(8, 324)
 MULTIPLES = 58, 77, 91, 312  # with events as p <= -1.4 and -0.5*p >= 0.7, of different priorities
 
 

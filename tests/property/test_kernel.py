@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import mpmath
 import pytest
 from hypothesis import given, settings
@@ -38,7 +40,7 @@ def _grown(inner):
     )
 
 
-EXPRESSIONS = st.recursive(LEAVES, _grown, max_leaves=5)
+FEW_LEAVES, EXPRESSIONS = (st.recursive(LEAVES, _grown, max_leaves=most) for most in (3, 5))
 POINTS = st.tuples(*[st.floats(-2, 2).map(lambda v: round(v, 6) + 1e-4) for _ in range(3)])
 
 
@@ -60,14 +62,13 @@ experiment: {{until: 1}}
     for arithmetic in (FLOAT64, MANY):
         kernel = PythonKernel(program, arithmetic)
         data = [kernel.constant("parameter_0", ())[0], *(arithmetic.zero + n for n in (1, 0, 0))]
-        data[2] = arithmetic.constant(__import__("fractions").Fraction(1, 5))
+        data[2] = arithmetic.constant(Fraction(1, 5))
         bound.append(kernel.bind(0, [*data, *(arithmetic.zero + 1 for _ in program.switches)]))
     return bound
 
 
-@settings(max_examples=25, deadline=None)
-@given(EXPRESSIONS, EXPRESSIONS, POINTS)
-def test_floats_agree_with_forty_digits_whose_gradients_are_slopes_and_rates_follow_the_flow(flow, guard, point):
+def check(flow, guard, point):
+    """Floats agree with forty digits, whose gradients are slopes and whose rates follow the flow."""
     quick, exact = kernels(flow, guard)
     at = tuple(MANY.zero + p for p in point)
     for name in ("flow", "surfaces", "magnitudes", "outputs"):
@@ -84,6 +85,19 @@ def test_floats_agree_with_forty_digits_whose_gradients_are_slopes_and_rates_fol
         assert abs((exact.surfaces(*up)[0] - exact.surfaces(*down)[0]) / (2 * h) - slope) < 1e-9
     f = exact.flow(*at)
     assert abs(gradient[0] + gradient[1] * f[0] + gradient[2] * f[1] - rate) < 1e-30
+
+
+@settings(max_examples=8, deadline=None)
+@given(FEW_LEAVES, FEW_LEAVES, POINTS)
+def test_routines_of_small_expressions_are_right(flow, guard, point):
+    check(flow, guard, point)
+
+
+@pytest.mark.campaign
+@settings(max_examples=200, deadline=None)
+@given(EXPRESSIONS, EXPRESSIONS, POINTS)
+def test_routines_of_many_expressions_are_right(flow, guard, point):
+    check(flow, guard, point)
 
 
 NAMES = ["E", "I", "S", "beta", "lambda", "None_", "exec", "import_", "q_1_2", "x0", "p0", "w0", "nan", "e", "class"]

@@ -122,7 +122,7 @@ def test_as_many_wait_as_a_delay_needs(waits):
 def test_engines_agree_on_what_waits(scheme):
     if not COMPILER:
         pytest.skip("no compiler")
-    made = sawtooth("9 + 7*sin(3*k)", "60")
+    made = sawtooth("9 + 7*sin(3*k)", "20")
     python, c = (made.simulate(engine=engine, scheme=scheme) for engine in ("python", "c"))
     assert [(m.edge, m.time, m.after) for m in python.transitions] == [(m.edge, m.time, m.after) for m in c.transitions]
     assert python.final.state == c.final.state and python.verdict.theorem == c.verdict.theorem

@@ -35,7 +35,7 @@ def nested(depth: int) -> dict[str, tuple[str, str]]:
 
 
 LARGE = {
-    **nested(20),
+    **nested(16),
     "a product": ("*".join(f"(1 + sin(x*{i} + v)/{i}0)" for i in range(1, 100)), "{}"),
     "a sum of products": ("+".join(f"sin(x/{i})*cos(v*{i})" for i in range(1, 100)), "{}"),
     "squares of squares": ("l9", doubling("", "L**2/2 + 0.3", 10)),
