@@ -245,6 +245,13 @@ def test_csv_tells_not_a_number_from_no_state(tmp_path):
     assert _read(tmp_path / "run.csv")[-1] == ["1.0", "m", "0", "inf", "nan"]
 
 
+def test_csv_tells_zeros_of_both_signs_that_follow_each_other(tmp_path):
+    draft, values = hand_made.Draft(), [0.0, -0.0, -0.0, hand_made.NAN, hand_made.NAN, 0.0, 0.1, 0.1]
+    draft.arc("m", ("x",), 0, [(float(k), [value], [], 0.0, []) for k, value in enumerate(values)])
+    draft.make().save(tmp_path / "run.csv")
+    assert [row[3] for row in _read(tmp_path / "run.csv")[1:]] == list(map(repr, values))
+
+
 def test_csv_writes_every_digit(tmp_path):
     run = fifty_digits()
     run.save(tmp_path / "run.csv")

@@ -11,7 +11,7 @@ import io
 import json
 import os
 import platform
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
@@ -28,6 +28,7 @@ from hsdsl.engine.execution.records import optional
 from hsdsl.engine.execution.run import evaluate, find, within
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
+BLOCK = 2**14  # rows of which the text is made at once
 
 
 def at_samples(execution: Execution, samples: Any) -> Samples:
@@ -55,15 +56,23 @@ def write_csv(samples: Samples, file: BinaryIO, header: bool = True) -> None:
     A text that a spreadsheet reads as a formula (a mode may be called ``=1+1``) follows an apostrophe. A cell is empty
     where the mode lacks the state or does not define the output; a state that is not a number is ``nan``.
     """
-    text = io.TextIOWrapper(file, encoding="utf-8", newline="")
-    writer = csv.writer(text, lineterminator="\n")
     if header:
-        writer.writerow(samples.labels)
+        file.write((",".join(map(_quoted, samples.labels)) + "\n").encode())
     number = _writer_of(samples)
-    cells = [_cells(values, present, number) for _, values, present in samples.columns()]
-    writer.writerows(zip(*cells, strict=True))
-    text.flush()
-    text.detach()
+    for start in range(0, len(samples), BLOCK):
+        rows = slice(start, start + BLOCK)
+        cells = (
+            _cells(values[rows], present if present is None else present[rows], number)
+            for _, values, present in samples.columns()
+        )
+        file.write("".join([f"{line}\n" for line in map(",".join, zip(*cells, strict=True))]).encode())
+
+
+def _quoted(text: str) -> str:
+    """A text as a cell."""
+    row = io.StringIO()
+    csv.writer(row, lineterminator="\n").writerow((f"'{text}" if text.startswith(FORMULA) else text, ""))
+    return row.getvalue()[: -len(",\n")]
 
 
 def _writer_of(samples: Samples) -> Callable[[Any], str]:
@@ -75,13 +84,18 @@ def _writer_of(samples: Samples) -> Callable[[Any], str]:
     return lambda x: decimals.text(x, precision)
 
 
-def _cells(values: Array, present: Array | None, number: Callable[[Any], str]) -> Iterable[str]:
-    listed = values.tolist()
-    if values.dtype.kind in "Ui":
-        return (f"'{value}" if str(value).startswith(FORMULA) else str(value) for value in listed)
-    if present is None or present.all():
-        return map(number, listed)
-    return [number(x) if there else "" for x, there in zip(listed, present.tolist(), strict=True)]
+def _cells(values: Array, present: Array | None, number: Callable[[Any], str]) -> list[str]:
+    """The cells of a column; equal numbers that follow each other, as at jumps, are written once."""
+    if values.dtype.kind == "U":
+        listed: list[str] = values.tolist()
+        texts = {text: _quoted(text) for text in set(listed)}
+        return [texts[text] for text in listed]
+    alike = values if values.dtype.kind in "Oui" else np.ascontiguousarray(values).view(np.int64)
+    fresh = np.append(True, alike[1:] != alike[:-1])
+    cells = np.array([number(x) for x in values[fresh].tolist()], object)[np.cumsum(fresh) - 1]
+    if present is not None:
+        cells[~present] = ""
+    return cells.tolist()
 
 
 def write_parquet(samples: Samples, file: BinaryIO) -> None:
