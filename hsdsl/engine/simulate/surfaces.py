@@ -105,7 +105,8 @@ def roundoff(unit: Number, magnitude: Number, gradient: Vector, t: Number, x: St
     """
     total = magnitude + abs(gradient[0]) * abs(t)
     for g, a, s in zip(gradient[1:], x, scale, strict=True):
-        total = total + abs(g) * max(abs(a), abs(s))
+        if g:
+            total = total + abs(g) * max(abs(a), abs(s))
     return ROUNDOFF_UNITS * unit * total
 
 
@@ -220,6 +221,8 @@ class Surfaces:
                 continue
             try:
                 r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
+                if not rate > 0:
+                    continue
                 noise = self.roundoff_bound(k, t, x)
                 near = abs(r) <= max(noise, rate * since)
                 if not (near and self._points_out(k, t, x, rate)) or self._turns_back(k, t, x, since, noise - r):

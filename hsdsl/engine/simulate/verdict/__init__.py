@@ -35,7 +35,7 @@ from hsdsl.engine.execution import INCOMPLETE, LEFT, Execution, Verdict
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stalls import SHORT
 from hsdsl.engine.simulate.stops import Diagnostics, show
-from hsdsl.engine.simulate.verdict.commutation import choices, together, waiting_orders
+from hsdsl.engine.simulate.verdict.commutation import choices, first_of_many, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
 from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_the_end, remarked
 from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
@@ -101,6 +101,8 @@ def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
             return Verdict("left", _once(diagnostics.departures)), run
         return Verdict("unknown", _once(diagnostics.undecided, _unchecked(run))), run
     noted = diagnostics.departures or diagnostics.undecided
+    if not noted and (matters := first_of_many(run)):
+        return Verdict("left", (matters,)), run
     if not (noted or run.against or run.followed) and has_shadow(run.problem, run.execution):
         by_shadow = replace(run, by_shadow=True)
         if by_shadow.screen is not None or not is_compiled(run.execution):
@@ -111,6 +113,7 @@ def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
 
 
 def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
+    """The verdict; of a shadow run it has the findings of the first hypothesis that does not hold."""
     left, unknown = list(_departures(run, diagnostics)), [*diagnostics.undecided, *waiting_orders(run)]
     if left:
         return Verdict("left", _once(left, unknown))
@@ -154,6 +157,8 @@ def _findings_of(run: RunView) -> tuple[list[Finding], list[str]]:
 
     found, margins = list(reliability(run)), list[str]()
     for hypothesis in (crossings, choices, entries, landings, misses, flows):
+        if found and run.by_shadow:
+            break
         findings, reasons = hypothesis(run)
         found += findings
         margins += reasons

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
@@ -21,6 +22,7 @@ from hsdsl.mathematics.program import ModeProgram, Queue
 
 SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
+MOST_CHOICES = 256  # that a verdict looks at once one matters
 TIES = 4  # how much delays that are the same may differ by
 
 Landed = tuple[str, State]
@@ -32,22 +34,45 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
         return [], together(run.screen.commuting)
     found: list[Finding] = []
     commuting: list[Number] = []
-    for made in run.reliable_transitions:
-        if not made.alternatives:
-            continue
-        place, k = run.before(made)
+    tied = [made for made in run.reliable_transitions if made.alternatives]
+    for i, made in enumerate(tied):
+        place = run.before(made)[0]
         error = tuple(abs(x) for x in place.x) if run.errors is None else run.error_before(made)
-        rivals = {name: run.edge_at(place, name) for name in made.alternatives}
-        rivals = {name: other for name, other in rivals.items() if not place.outranks(k, other, error)}
-        if not rivals:
-            continue
-        if commute(run, place, [k, *rivals.values()], run.tails_before(made)):
+        rivals, matters = _choice(run, made, error)
+        if matters:
+            enough = len(found) == MOST_CHOICES or run.by_shadow  # which a finer run confirms
+            found.append(Finding("choice", "left", _and_later(matters, len(tied) - i - 1) if enough else matters))
+            if enough:
+                break
+        elif rivals:
             commuting.append(made.time)
-            continue
-        others = " or ".join(rivals)
-        choice = f"at t = {show(made.time)} the choice of {made.edge} rather than {others} matters"
-        found.append(Finding("choice", "left", f"{choice}: they lead to different points"))
     return found, together(commuting)
+
+
+def first_of_many(run: RunView) -> str:
+    """Say of a run with many choices that one of the first matters, whatever its error; nothing for other runs."""
+    if run.screen_made is not None and not run.screen_made.undecided("choice"):
+        return ""
+    tied = [made for made in run.transitions if made.alternatives]
+    for i, made in enumerate(tied[:MOST_CHOICES] if len(tied) > MOST_CHOICES else ()):
+        if matters := _choice(run, made, (0.0,) * len(made.before))[1]:
+            return _and_later(matters, len(tied) - i - 1)
+    return ""
+
+
+def _and_later(sentence: str, count: int) -> str:
+    return f"{sentence}; {count:,} later choices were not looked at" if count else sentence
+
+
+def _choice(run: RunView, made: Transition, error: State) -> tuple[bool, str]:
+    """Whether others could go in the place of a transition, within an error, and a sentence where that matters."""
+    place, k = run.before(made)
+    rivals = {name: run.edge_at(place, name) for name in made.alternatives}
+    rivals = {name: other for name, other in rivals.items() if not place.outranks(k, other, error)}
+    if not rivals or commute(run, place, [k, *rivals.values()], run.tails_before(made)):
+        return bool(rivals), ""
+    choice = f"at t = {show(made.time)} the choice of {made.edge} rather than {' or '.join(rivals)} matters"
+    return True, f"{choice}: they lead to different points"
 
 
 def together(commuting: Sequence[Number]) -> list[str]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import groupby
 from math import inf, isfinite
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +75,8 @@ class RunView:
     def __post_init__(self) -> None:
         self._tails = 0, Tails(self.problem.waits)
         self._bound: dict[tuple[int, Number], ModeKernel] = {}
+        self._before: dict[int, tuple[Place, int]] = {}  # of the last few transitions that were asked for
+        self._nearby: tuple[Any, list[Place]] = None, []  # the last answer of `landed_nearby`
 
     # What was recorded
 
@@ -170,13 +172,12 @@ class RunView:
         piece: Polynomial = tuple(tuple(c[:d]) for c in self.execution.coefficients[row].tolist())
         if not piece:
             piece = (tuple(b - a for a, b in zip(x, self.state(arc, row + 1), strict=True)),)
-        index, start, end = self.index(arc.mode), t, self.times[row + 1]
+        index, end = self.index(arc.mode), self.times[row + 1]
+        step = self.place(index, t, x)  # its end belongs to the step's own segment
 
         def along(s: Number) -> Place:
-            time = min(t + s * h, end)
-            inner = self.place(index, start, x) if time == end else None  # the end belongs to the step's own segment
-            place = self.place(index, time, at(x, piece, s))
-            return place if inner is None else replace(inner, t=time, x=place.x)
+            time, inner = min(t + s * h, end), at(x, piece, s)
+            return replace(step, t=time, x=inner) if time == end else self.place(index, time, inner)
 
         return along
 
@@ -210,8 +211,12 @@ class RunView:
 
     def before(self, made: Transition) -> tuple[Place, int]:
         """The state that a transition was made from, and the surface that it crossed."""
-        place = self.place(made.source, made.time, tuple(made.before.values()))
-        return place, self.edge_at(place, made.edge, made.entry)
+        if made.index not in self._before:
+            if len(self._before) > FOLLOWED:
+                self._before.clear()
+            place = self.place(made.source, made.time, tuple(made.before.values()))
+            self._before[made.index] = place, self.edge_at(place, made.edge, made.entry)
+        return self._before[made.index]
 
     def edge_at(self, place: Place, name: str, entry: bool = False) -> int:
         """The edge of a name at a place; of several the closest to its guard, on ``entry`` the furthest beyond.
@@ -267,9 +272,12 @@ class RunView:
 
     def landed_nearby(self, chain: Sequence[Transition], error: State) -> list[Place]:
         """Where states land that an error moves along the guard of the first of some transitions; none of too many."""
-        before, edge = self.before(chain[0])
-        near = before.moved_by(error) if chain[0].entry else before.along_guard(edge, error)
-        return [self.behind(chain, x) for x in near] if len(chain) <= FOLLOWED else []
+        asked = chain[0].index, len(chain), error
+        if self._nearby[0] != asked:
+            before, edge = self.before(chain[0])
+            near = before.moved_by(error) if chain[0].entry else before.along_guard(edge, error)
+            self._nearby = asked, [self.behind(chain, x) for x in near] if len(chain) <= FOLLOWED else []
+        return self._nearby[1]
 
     def remembered_alike(self, chain: Sequence[Transition], names: Sequence[str], error: State) -> bool:
         """Whether some states are memory of events that is the same behind transitions from all states nearby."""
@@ -444,7 +452,7 @@ class Place:
         """The state, and with each component moved by its error either way."""
         yield self.x
         for i, e in enumerate(error):
-            for way in (-1, 1):
+            for way in (-1, 1) if e else ():
                 yield (*self.x[:i], self.x[i] + way * e, *self.x[i + 1 :])
 
     def along_guard(self, k: int, error: State) -> Iterator[State]:
