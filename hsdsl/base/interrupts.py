@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     import signal
     from collections.abc import Callable
     from types import FrameType
-    from typing import Any
+    from typing import Any, TypeVar
+
+    T = TypeVar("T")
 else:
     try:  # without the enumerations that `signal` wraps around them, which cost as much as a short run
         import _signal as signal
@@ -43,27 +45,22 @@ def _ignore() -> None:
         _signal(_SIGINT, signal.SIG_IGN)
 
 
-class Noted:
-    """Call ``press`` at Ctrl-C while the block runs, where this thread would else raise KeyboardInterrupt.
+def noting(press: Callable[[int, FrameType | None], None], work: Callable[[], T]) -> T:
+    """Do some work, and call ``press`` at Ctrl-C meanwhile, where this thread would else raise KeyboardInterrupt.
 
     A handler that somebody else has installed stays.
     """
-
-    def __init__(self, press: Callable[[int, FrameType | None], None]) -> None:
-        self._press = press
-
-    def __enter__(self) -> None:
-        before = _getsignal(_SIGINT)
-        self._before = before if before in (signal.default_int_handler, _pressed) else None
-        if self._before is not None:
-            try:
-                _signal(_SIGINT, self._press)
-            except ValueError:  # only the main thread sets handlers, and gets KeyboardInterrupt
-                self._before = None
-
-    def __exit__(self, *_: object) -> None:
-        if self._before is not None:
-            _signal(_SIGINT, self._before)
+    before = _getsignal(_SIGINT)
+    if before is not _pressed and before is not signal.default_int_handler:
+        return work()
+    try:
+        _signal(_SIGINT, press)
+    except ValueError:  # only the main thread sets handlers, and gets KeyboardInterrupt
+        return work()
+    try:
+        return work()
+    finally:
+        _signal(_SIGINT, before)
 
 
 def _pressed(number: int, frame: FrameType | None) -> None:

@@ -23,7 +23,7 @@ def runtime() -> ctypes.CDLL:
     """
     library = loop()
     library.hs_workspace.restype = ctypes.c_int64
-    library.hs_simulate.argtypes, library.hs_simulate.restype = (ctypes.c_void_p,), None
+    library.hs_run_whole.argtypes, library.hs_run_whole.restype = (ctypes.c_void_p,), ctypes.c_int64
     library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
     sampling = *(ctypes.c_void_p,) * 5, ctypes.c_int64, *(ctypes.c_int32,) * 3, ctypes.c_void_p
     library.hs_sample_record.argtypes, library.hs_sample_record.restype = sampling, ctypes.c_int64

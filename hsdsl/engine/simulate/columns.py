@@ -97,7 +97,8 @@ class Gathered:
     def _record(self) -> Any:
         of, names = self, ("times", "values", "outputs", "coefficients", "arc", *BY_TRANSITION)
         rows, degree, width = of["coefficients"].shape
-        sizes = rows, len(of["arc"]), len(of["transition"]), width, degree, of["outputs"].shape[1]
+        counts = (len(of[name]) for name in ("arc", "transition", "note", "alternatives"))
+        sizes = rows, *counts, width, degree, of["outputs"].shape[1]
         return structures.Record(*sizes, *(of[name].ctypes.data for name in names))
 
     @property
@@ -115,32 +116,31 @@ class Packed:
     Parameters
     ----------
     pack : callable
-        Copies the columns to an address, and returns how many states a row has there.
-    counts : Counts
+        Copies the columns to an address.
+    size : int
+        How many numbers they take.
     shape : Shape
         With the states of the model's largest mode, of which the run may not have been in one.
     """
 
-    def __init__(self, pack: Callable[[int], int], counts: Counts, shape: Shape) -> None:
-        rows, arcs, transitions, notes, alternatives = counts
-        by_row = 2 + shape.outputs + shape.width * (1 + shape.degree)
-        self._counts, self._shape = counts, shape
-        self._memory = np.empty(
-            HEAD
-            + rows * by_row
-            + transitions * 2 * shape.width
-            + ARC_NUMBERS * arcs
-            + TRANSITION_NUMBERS * transitions
-            + NOTE_NUMBERS * notes
-            + (alternatives + 1) // 2
-        )
+    def __init__(self, pack: Callable[[int], None], size: int, shape: Shape) -> None:
+        self._shape, self._memory = shape, np.empty(size)
         self.record = structures.start_of(self._memory)  # where the ``hs_record`` is
-        self._width = pack(self.record)
+        pack(self.record)
+
+    @cached_property
+    def _counts(self) -> Counts:
+        found = self._record
+        return Counts(found.rows, found.arcs, found.transitions, found.notes, found.others)
+
+    @cached_property
+    def _record(self) -> Any:
+        return structures.Record.from_address(self.record)
 
     @cached_property
     def _sizes(self) -> tuple[int, ...]:
         """How many numbers each column takes, in the order of `ORDER`."""
-        (n, arcs, k, notes, alternatives), w, there = self._counts, self._width, self._shape.width
+        (n, arcs, k, notes, alternatives), w, there = self._counts, self._record.width, self._shape.width
         by_row = n, n * w, n * self._shape.outputs, n, n * self._shape.degree * w
         records = ARC_NUMBERS * arcs, TRANSITION_NUMBERS * k, k * there, k * there, NOTE_NUMBERS * notes
         return (*by_row, *records, (alternatives + 1) // 2)
@@ -155,10 +155,10 @@ class Packed:
             return raw.view(np.int32)[: self._counts.alternatives]
         n, k, shape = self._counts.rows, self._counts.transitions, self._shape
         if name in ("values", "outputs"):
-            return raw.reshape(n, self._width if name == "values" else shape.outputs)
+            return raw.reshape(n, self._record.width if name == "values" else shape.outputs)
         if name in ("before", "after"):
             return raw.reshape(k, shape.width)
-        return raw.reshape(n, shape.degree, self._width) if name == "coefficients" else raw
+        return raw.reshape(n, shape.degree, self._record.width) if name == "coefficients" else raw
 
     @property
     def rows(self) -> int:

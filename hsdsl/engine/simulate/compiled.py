@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.base.interrupts import Noted
+from hsdsl.base.interrupts import noting
 from hsdsl.base.numbers.arithmetic import FLOAT64, Number
 from hsdsl.engine.execution import Array, Stop
 from hsdsl.engine.runtime import structures
@@ -182,9 +182,9 @@ class CompiledRun:
 
     def follow(self) -> Stop:
         """Run to the end: why it stopped."""
-        self._run()
+        size = self._run()
         self._counted = self._counts
-        self.columns = self.workspace.chunks.whole(self.workspace.pack, self.plan.layouts)
+        self.columns = self.workspace.chunks.whole(self.workspace.pack, size, self.plan.layouts)
         return self._stop()
 
     def stream(self, sink: Sink) -> tuple[Stop, dict[str, Array]]:
@@ -200,16 +200,16 @@ class CompiledRun:
         self._note(rest["note"], self.diagnostics)
         return self._stop(), rest
 
-    def _run(self) -> None:
+    def _run(self) -> int:
         self.plan.lay(self.workspace, self.review)
-        with Noted(self.workspace.press):
-            self.workspace.simulate()
+        size = noting(self.workspace.press, self.workspace.simulate)
         if self.workspace.failed:
             raise self.workspace.failed[0]
         if self.plan.queued:
             program = self.plan.problem.program
             sizes = {queue.name: len(queue.values) for mode in program.modes for queue in mode.queues}
             self.waits = Tails(self.workspace.waits(program.queues, sizes)).states(program.modes)
+        return size
 
     def _note(self, notes: Array, diagnostics: Diagnostics) -> None:
         if len(notes):

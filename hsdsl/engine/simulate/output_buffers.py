@@ -145,14 +145,14 @@ class OutputBuffers:
         used["alternatives"] = self._columns["alternatives"][:alternatives]
         return used
 
-    def whole(self, pack: Callable[[int], int], layouts: StateLayouts) -> Columns:
+    def whole(self, pack: Callable[[int], None], size: int, layouts: StateLayouts) -> Columns:
         """Take away every column from the start of the run, or copy them where the chunk can be used again.
 
         ``pieces`` become ``coefficients``: while a run is under way a row's piece leads to it, in an execution it
-        leaves it. ``pack`` copies the chunk to an address, and returns how many states a row has.
+        leaves it. ``pack`` copies the chunk to an address, where it takes ``size`` numbers.
         """
         if not self._full and self._rows * self._row_bytes <= MOST_KEPT:
-            return Packed(pack, self.counts, self._shape)
+            return Packed(pack, size, self._shape)
         chunks = [*self._full, self._written()]
         rows = sum(len(chunk["times"]) for chunk in chunks)
         if len(chunks) > 1:

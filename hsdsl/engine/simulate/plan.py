@@ -114,7 +114,7 @@ class Prepared(Problem):
 
     @cached_property
     def _about(self) -> dict[str, Any]:
-        return {**about(self, "python" if self.plan is None else "c"), **self.links}
+        return {**about(self, "python" if self.plan is None else "c"), "repetition": self.again, **self.links}
 
     def _run(self, review: Review | None, watch: Watch | None, spent: dict[str, float]) -> Execution:
         if self.plan is not None:
@@ -154,7 +154,7 @@ class Prepared(Problem):
         except OutOfRoom:
             stop = memory(self.settings.memory, run.recorder.now)
         spent["simulate"] = time.perf_counter() - began
-        return from_recorder(self._about, run, stop, spent, self.again)
+        return from_recorder(self._about, run, stop, spent)
 
     def _by_compiled_loop(
         self, plan: CompiledPlan, review: Review | None, watch: Watch | None, spent: dict[str, float]
@@ -167,7 +167,7 @@ class Prepared(Problem):
         spent["simulate"] = time.perf_counter() - began
         if watch is None:  # else someone may look at the workspace for longer than the run lasts
             plan.workspaces.leave(under_way.workspace)
-        return written(self._about, under_way, stop, spent, self.again)
+        return written(self._about, under_way, stop, spent)
 
 
 def prepare(problem: Problem, code: CompiledModel | None = None) -> Prepared:

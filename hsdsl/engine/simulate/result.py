@@ -21,14 +21,11 @@ from hsdsl.engine.simulate.run import Run
 from hsdsl.engine.simulate.settings import Settings
 from hsdsl.engine.simulate.stops import LEFT_OUT, TWO_STEP, Diagnostics, noted, warnings_of
 
-Repetition = Callable[[Execution], Execution]
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 
 
-def from_recorder(
-    known: dict[str, Any], run: Run, stop: Stop, seconds: dict[str, float], again: Repetition
-) -> Execution:
-    """Make the execution of what the Python loop has recorded; ``again`` makes the run finer."""
+def from_recorder(known: dict[str, Any], run: Run, stop: Stop, seconds: dict[str, float]) -> Execution:
+    """Make the execution of what the Python loop has recorded."""
     columns, transitions = run.recorder.columns(), tuple(run.recorder.transitions)
     execution = Execution.deferred(
         {"verdict": _verdict},
@@ -37,7 +34,6 @@ def from_recorder(
         seconds=seconds,
         assessment=partial(_assessment, run, lambda: run.diagnostics),
         noted=partial(noted, run.program, run.diagnostics),
-        repetition=again,
         settings=described(run.settings, run.program.left_out),
         transitions=transitions,
         final=_final(columns["arcs"][-1], columns, run.program.outputs, run.tails.states(run.program.modes)),
@@ -47,9 +43,7 @@ def from_recorder(
     return execution
 
 
-def written(
-    known: dict[str, Any], run: CompiledRun, stop: Stop, seconds: dict[str, float], again: Repetition
-) -> Execution:
+def written(known: dict[str, Any], run: CompiledRun, stop: Stop, seconds: dict[str, float]) -> Execution:
     """Make the execution of what the compiled loop has written, ``known`` being what all such runs have in common.
 
     Arrays and objects are made on first use: for a short run they would take longer than the run.
@@ -68,7 +62,6 @@ def written(
         seconds=seconds,
         states=states,
         assessment=partial(_assessment_of, run),
-        repetition=again,
         sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
         compiled=run,
     )

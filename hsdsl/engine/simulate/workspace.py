@@ -71,13 +71,13 @@ class Workspace:
             moves = (structures.Moves * 1)((ctypes.addressof(formulas.table), registers.ctypes.data))
             self._moves, self.task.moves = (moves, registers), ctypes.addressof(moves)
 
-    def simulate(self) -> None:
-        """Run the task to its end; the interpreter is free meanwhile."""
-        self._runtime.hs_simulate(self._where)
+    def simulate(self) -> int:
+        """Run the task to its end; the interpreter is free meanwhile. Returns how many numbers :meth:`pack` writes."""
+        return self._runtime.hs_run_whole(self._where)
 
-    def pack(self, to: int) -> int:
-        """Copy what the task has written to an address; returns how many states a row has there."""
-        return self._runtime.hs_pack(self._where, to)
+    def pack(self, to: int) -> None:
+        """Copy what the task has written to an address."""
+        self._runtime.hs_pack(self._where, to)
 
     def run_ensemble(self, ensemble: Any) -> None:
         """Run instances to their end, their task being the workspace's; the interpreter is free meanwhile."""

@@ -234,13 +234,13 @@ typedef struct hs_task {
 
 /* The columns of a run. A row's piece leaves it. */
 typedef struct {
-  int64_t rows, arcs, transitions;
+  int64_t rows, arcs, transitions, notes, others; /* others: alternatives of all transitions */
   int32_t width, degree, outputs;
   const double *times, *values, *recorded, *pieces;
   const hs_arc *arc;
   const hs_transition *transition;
   const double *before, *after; /* (transitions, model->width) */
-  const int32_t *alternatives;  /* of all transitions */
+  const int32_t *alternatives;
 } hs_record;
 
 /* Take part in a reset from x to z, which gets the first executions that wait then; the number of a queue of the mode in
@@ -252,6 +252,7 @@ HS_EXPORT void hs_forget_waits(const hs_model *model, hs_tail *tail);
 HS_EXPORT int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme);
 HS_EXPORT void hs_simulate(hs_task *task);
 HS_EXPORT int64_t hs_pack(const hs_task *task, double *to);
+HS_EXPORT int64_t hs_run_whole(hs_task *task);
 
 /* A run's values at many times: what a caller gives, all of it the caller's own memory. */
 typedef struct {
