@@ -52,7 +52,8 @@ def unplaced(path: str | os.PathLike[str]) -> Generator[New]:
         with part_in(target.parent) as (part, descriptor), os.fdopen(descriptor, "wb") as file:
             yield New(file, part, target)
     except OSError as error:
-        raise UsageError(_sentence(path, target, error)) from error
+        folder = None if target.parent.is_dir() else f"there is no folder {Path(path).parent}"
+        raise UsageError(f"cannot write {os.fspath(path)}: {folder or error.strerror or error}") from error
 
 
 @contextmanager
@@ -76,11 +77,6 @@ def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:
         raise UsageError(f"cannot write {os.fspath(path)}: {kind}")
 
 
-def _sentence(path: str | os.PathLike[str], target: Path, error: OSError) -> str:
-    folder = None if target.parent.is_dir() else f"there is no folder {Path(path).parent}"
-    return f"cannot write {os.fspath(path)}: {folder or error.strerror or error}"
-
-
 try:
     import fcntl
 except ImportError:  # Windows, where a file that is open cannot be removed
@@ -97,7 +93,10 @@ def part_in(folder: Path) -> Generator[tuple[Path, int]]:
 
     Raises OSError: it cannot be made.
     """
-    _remove_left(folder)
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.name.startswith(BEFORE) and entry.name.endswith(AFTER) and entry.is_file(follow_symlinks=False):
+                _remove_unless_written(entry.path)
     path, descriptor = _claimed(folder)
     lock = None if fcntl is None else os.dup(descriptor)  # until the file has its name
     try:
@@ -144,13 +143,6 @@ def _lock(descriptor: int) -> None:
     """Lock a file; OSError where somebody else has, or where that cannot be known."""
     if fcntl is not None:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-
-
-def _remove_left(folder: Path) -> None:
-    with suppress(OSError), os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.name.startswith(BEFORE) and entry.name.endswith(AFTER) and entry.is_file(follow_symlinks=False):
-                _remove_unless_written(entry.path)
 
 
 def _remove_unless_written(path: str) -> None:

@@ -42,10 +42,11 @@ def model_html(system: HybridSystem, program: Program) -> str:
     modes = [_mode(system, mode, math, len(written) <= MOST_OPEN) for mode in written[:MOST_MODES]]
     left = len(written) - MOST_MODES
     more = [f"<p>{left} more modes</p>"] if left > 0 else []
+    rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts]
     parts = [
         heading,
         _parameters(system),
-        _parts(system),
+        _table(("part", "modes", "starts in"), rows),
         _shared(system, math),
         mode_graph.graph_of(visited_part(program, None)),
         *modes,
@@ -72,12 +73,6 @@ def _start(system: HybridSystem, math: Mathematics) -> str:
 def _parameters(system: HybridSystem) -> str:
     rows = [(p.name, p.text, p.unit or "", p.about or "") for p in system.parameters]
     return _table(("parameter", "value", "unit", "meaning"), rows)
-
-
-def _parts(system: HybridSystem) -> str:
-    """The parts of a composed model, with their modes: its product modes are as many as their product."""
-    rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts]
-    return _table(("part", "modes", "starts in"), rows)
 
 
 def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -145,12 +145,10 @@ _PLAIN = frozenset(map(chr, range(0x20, 0x7F))) - set('"\\?')
 
 def string(text: str) -> str:
     """A string literal of UTF-8: all but plain ASCII are octal escapes, a question mark too (trigraphs)."""
-    signs = (sign if sign in _PLAIN else "".join(f"\\{byte:03o}" for byte in _bytes(sign)) for sign in text)
+    signs = (
+        sign if sign in _PLAIN else "".join(f"\\{byte:03o}" for byte in sign.encode(errors="replace")) for sign in text
+    )
     return f'"{"".join(signs)}"'
-
-
-def _bytes(sign: str) -> bytes:
-    return sign.encode(errors="replace")
 
 
 def comment(lines: Iterable[str]) -> str:

@@ -19,7 +19,9 @@ def fixed_parameters(program: Program) -> dict[str, str]:
     found = {i: SWITCHES for i in parameters_in(*definitions(program.switching).values())}
     for i, given in enumerate(program.inputs):
         if given.times is None:
-            values = _results(routines[f"input_{i}"])
+            last = routines[f"input_{i}"].body[-1]
+            assert isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
+            values = last.value.elts
             times = ast.Module([*routines[f"input_{i}"].body[:-1]], [])
             named = parameters_in(times, *values[: len(values) // 2])
             found |= {k: SAMPLES for k in named if k not in found}
@@ -27,12 +29,6 @@ def fixed_parameters(program: Program) -> dict[str, str]:
         if i in found:
             found |= {k: found[i] for k in parameters_in(routines[f"parameter_{i}"]) if k not in found}
     return {program.parameters[i]: why for i, why in sorted(found.items())}
-
-
-def _results(routine: ast.FunctionDef) -> list[ast.expr]:
-    last = routine.body[-1]
-    assert isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
-    return last.value.elts
 
 
 def timeline_text(source: Source) -> str:

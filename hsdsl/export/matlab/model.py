@@ -257,11 +257,8 @@ MATLAB = Language(
 
 def body(definition: ast.FunctionDef, names: Mapping[str, str]) -> str:
     """The statements of a routine, indented; ``out`` has its values."""
-    return "\n".join(f"  {_PLAIN.sub(_without_prefix, line)}" for line in MATLAB.body(definition, names))
-
-
-def _without_prefix(match: re.Match[str]) -> str:
-    return f"{match[1]}("
+    lines = (_PLAIN.sub(r"\1(", line) for line in MATLAB.body(definition, names))
+    return "\n".join(f"  {line}" for line in lines)
 
 
 def reserved(source: str) -> frozenset[str]:

@@ -13,7 +13,7 @@ from hsdsl.base.names import visible
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel
-from hsdsl.engine.simulate import Problem, prepare
+from hsdsl.engine.simulate import prepare
 from hsdsl.export.source import Source
 from hsdsl.export.web.model import model_of
 from hsdsl.export.web.wasm import PARTS, wasm_module
@@ -46,20 +46,7 @@ def with_scene(source: Source) -> Source:
     from hsdsl.mathematics.lower import lower
 
     system = scene_as_outputs(system)
-    given = source.problem
-    program = lower(system)
-    problem = Problem(
-        program,
-        given.kernel,
-        given.settings,
-        given.timeline,
-        given.mode,
-        given.states,
-        given.x,
-        given.waits,
-        given.moved,
-    )
-    return replace(source, system=system, problem=problem)
+    return replace(source, system=system, problem=replace(source.problem, program=lower(system)))
 
 
 def page(model: dict[str, Any], module: bytes) -> str:

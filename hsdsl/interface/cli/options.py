@@ -215,7 +215,7 @@ class Experiment(NamedTuple):
     def settings(self, **more: Any) -> dict[str, Any]:
         """Arguments of `Model.simulate`."""
         given = self._asdict()
-        return values_of(given.pop("overrides")) | as_texts(given) | more
+        return values_of(given.pop("overrides")) | {name: value and str(value) for name, value in given.items()} | more
 
 
 class Located(NamedTuple):
@@ -274,8 +274,3 @@ def split(overrides: list[str] | None) -> tuple[dict[str, str], dict[str, str], 
 def values_of(overrides: list[str] | None) -> dict[str, Any]:
     """Parameters, initial values and settings of ``--set``, as arguments of `Model.simulate`."""
     return dict(zip(("parameters", "initial", "settings"), split(overrides), strict=True))
-
-
-def as_texts(settings: dict[str, Any]) -> dict[str, Any]:
-    """Settings with each word of a list as plain text."""
-    return {name: value and str(value) for name, value in settings.items()}

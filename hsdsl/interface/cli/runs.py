@@ -235,12 +235,8 @@ def drawn(path: Path, model: Model | None, columns: list[str] | None) -> Executi
     if run.output_function is not None or not outputs:
         return run
     try:
-        return (model or _recorded(run.model, other)).with_outputs(run)
+        return (model or hsdsl.load(other if isinstance(other, Path) else run.model)).with_outputs(run)
     except (UsageError, ModelError) as error:
         first = str(error).splitlines()[0]
         say(f"hsdsl: {path}: outputs are drawn straight from row to row: {first}; give its model with --model")
         return run
-
-
-def _recorded(path: str, other: Model | Path | None) -> Model:
-    return hsdsl.load(other if isinstance(other, Path) else path)

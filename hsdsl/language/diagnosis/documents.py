@@ -192,11 +192,6 @@ class _Fault:
         message = f"the key '{key}' is missing in {SHAPES[self.pattern][1]}"
         return place.text.diagnostic("HS202", message, span, hint)
 
-    @property
-    def _is_mapping(self) -> bool:
-        """Whether an item of a list should have been a mapping."""
-        return not _LISTS_OF_MAPPINGS.isdisjoint(self.plain[-2:-1])
-
     def taken_out(self) -> bool:
         """Take the fault out of the nodes, in place; False where nothing sensible would be left."""
         path, parent = self.plain, descend(self.root, self.plain[:-1])

@@ -132,7 +132,6 @@ class Truth:
 
 
 Tree = Number | Name | Negative | Sum | Product | Power | Call | Comparison | Logic | Not | Truth
-CONDITIONS = (Comparison, Logic, Not, Truth)
 
 
 def children(tree: Tree) -> tuple[Tree, ...]:

@@ -54,13 +54,13 @@ def imported(
     Raises ModelError: a file that is none of SpaceEx, or what a model cannot keep.
     Raises UsageError: a file that cannot be read, no end of the run, or a point that is none.
     """
-    chosen = choice(at)
+    corner, values = choice(at)
     cfg = cfg or (path.with_suffix(".cfg") if path.with_suffix(".cfg").is_file() else None)
     known = components(str(path), read_bytes(path))
     configured = configuration(str(cfg), read_bytes(cfg)) if cfg else Configuration()
     system = _system(known, configured)
-    network = with_inputs(flattened(known, system), configured, system.name, chosen)
-    begin = start(network, configured, system.name, chosen)
+    network = with_inputs(flattened(known, system), configured, system.name, corner, values)
+    begin = start(network, configured, system.name, corner)
     constants = {s: v for s, v in begin.numbers.items() if s.name in network.constants}
     first, others = _first(network, configured, system, begin, constants)
     found = automaton(network, first)

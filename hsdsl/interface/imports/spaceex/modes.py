@@ -55,23 +55,14 @@ def _draft(network: Network, place: Place, arrows: list[Arrow], constants: Mappi
     for name, text in lets.items():
         values[symbol(name)] = replaced(value(text), values, {})
     flow = {symbol(name): replaced(value(place.flow[name].right), values, {}) for name in states}
-    draft = ModeDraft(place, states, lets, flow, [], [], values)
+    draft = ModeDraft(place, states, lets, flow, {}, [], values)
     for relation in rest:
         if relation.operator == "==":
             _keep(draft, relation)
             draft.equalities.append(draft.excess(relation))
         else:
-            draft.facets.append(Facet(relation, draft.excess(relation)))
-    _merge(draft)
+            draft.facets.setdefault(draft.excess(relation), relation)
     return draft
-
-
-def _merge(draft: ModeDraft) -> None:
-    """Leave one of facets that are the same set."""
-    found: dict[Any, Facet] = {}
-    for facet in draft.facets:
-        found.setdefault(facet.excess, facet)
-    draft.facets = list(found.values())
 
 
 def _definitions(network: Network, place: Place) -> tuple[dict[str, str], list[Relation]]:
@@ -128,14 +119,6 @@ def _keep(draft: ModeDraft, relation: Relation) -> None:
     draft.comments.append(f"`{relation.text}` holds all along")
 
 
-@dataclass(frozen=True)
-class Facet:
-    """An inequality of an invariant, and its excess: at most zero inside."""
-
-    relation: Relation
-    excess: Any
-
-
 @dataclass
 class ModeDraft:
     """A location as a mode of a model: ``lets`` are its variables that an equality of the invariant gives."""
@@ -144,7 +127,7 @@ class ModeDraft:
     states: list[str]
     lets: dict[str, str]
     flow: dict[Any, Any]  # of symbols
-    facets: list[Facet]
+    facets: dict[Any, Relation]  # inequalities of the invariant by their excess, which is at most zero inside
     equalities: list[Any]  # of states, which the flow keeps
     values: dict[Any, Any]  # of constants and lets, by symbol
     comments: list[str] = field(default_factory=list[str])
@@ -160,26 +143,26 @@ class ModeDraft:
     @property
     def inside(self) -> list[Constraint]:
         """The invariant."""
-        return [*(at_most_zero(f.excess) for f in self.facets), *map(zero, self.equalities)]
+        return [*map(at_most_zero, self.facets), *map(zero, self.equalities)]
 
-    def kept(self, facet: Facet) -> bool:
+    def kept(self, facet: Any) -> bool:
         """Whether the flow leads back inside all over a facet, or moves nothing across it."""
-        rate = lie_derivative(facet.excess, self.flow)
-        return rate == 0 or decide([*self.inside, zero(facet.excess), at_most_zero(-rate)]).never
+        rate = lie_derivative(facet, self.flow)
+        return rate == 0 or decide([*self.inside, zero(facet), at_most_zero(-rate)]).never
 
 
 @dataclass
 class TransitionDraft:
     """A transition of a model, at a surface ``when`` or where all of ``event`` begins to hold.
 
-    ``facet`` is None where its surface is none of the invariant, by choice.
+    ``facet`` is the excess of the facet; None where its surface is none of the invariant, by choice.
     """
 
     arrow: Arrow
     when: Relation | None
     condition: list[str]
     guard: list[Constraint]
-    facet: Facet | None
+    facet: Any | None
     comments: list[str]
     event: list[str] = field(default_factory=list[str])
 
@@ -203,7 +186,8 @@ class Judge:
 
         A jump is made only to where the target's invariant holds: that counts as a part of its guard.
         """
-        landed = _landed(arrow, target)
+        texts = {name: within(relation.right) for name, relation in arrow.reset.items()}
+        landed = [relation.renamed(texts) for relation in target.facets.values()]  # of values before the jump
         relations = [side for relation in (*arrow.guard, *landed) for side in _sides(relation, source)]
         guard = [closed(relation, source.excess(relation)) for relation in relations]
         if decide([*source.inside, *guard]).never:
@@ -219,7 +203,7 @@ class Judge:
             drafts = self.on_facet(arrow, source, facet, guard, relations)
         else:
             drafts = self.at_once(arrow, source, guard, relations)
-        known = {relation.text: old.relation.text for old, relation in zip(target.facets, landed, strict=True)}
+        known = {new.text: old.text for old, new in zip(target.facets.values(), landed, strict=True)}
         for draft in drafts:
             kept = [f"`{known[text]}`" for text in (*draft.condition, *draft.event) if text in known]
             if kept:
@@ -228,12 +212,12 @@ class Judge:
 
     def facet(
         self, relations: Sequence[Relation], source: ModeDraft, guard: list[Constraint]
-    ) -> tuple[Facet | None, Answer | None]:
+    ) -> tuple[Any | None, Answer | None]:
         """The facet that the guard lies on; else a point where the guard holds off one."""
         witness: Answer | None = None
         mentioned = {name for relation in relations for name in relation.names}
-        for facet in sorted(source.facets, key=lambda f: not f.relation.names <= mentioned):
-            answer = decide([*source.inside, *guard, negative(facet.excess)])
+        for facet in sorted(source.facets, key=lambda f: not source.facets[f].names <= mentioned):
+            answer = decide([*source.inside, *guard, negative(facet)])
             if answer.never:
                 return facet, None
             witness = answer if answer.somewhere or witness is None else witness
@@ -247,12 +231,12 @@ class Judge:
         self.refuse(arrow, message, hint)
 
     def on_facet(
-        self, arrow: Arrow, source: ModeDraft, facet: Facet, guard: list[Constraint], relations: Sequence[Relation]
+        self, arrow: Arrow, source: ModeDraft, facet: Any, guard: list[Constraint], relations: Sequence[Relation]
     ) -> list[TransitionDraft]:
         """The transition of an arrow whose guard lies on a facet: made where the invariant ends."""
-        on = [*source.inside, zero(facet.excess)]
-        rate = lie_derivative(facet.excess, source.flow)
-        draft = TransitionDraft(arrow, facet.relation.mirrored(), [], guard, facet, [])
+        on = [*source.inside, zero(facet)]
+        rate = lie_derivative(facet, source.flow)
+        draft = TransitionDraft(arrow, source.facets[facet].mirrored(), [], guard, facet, [])
         self.conditions(draft, source, [*on, at_most_zero(-rate)], relations)
         if not decide([*on, *guard, negative(rate)]).never:
             draft.comments.append(INWARD)
@@ -331,10 +315,10 @@ class Judge:
         """Whether two transitions are possible in a region."""
         if not source.place.passing:
             return not decide([*source.inside, *draft.guard, *other.guard]).never
-        if draft.facet is None or other.facet is None or draft.facet.excess != other.facet.excess:
+        if draft.facet is None or draft.facet != other.facet:
             return False
-        on = zero(draft.facet.excess)
-        region = [negative(f.excess) for f in source.facets if f.excess != draft.facet.excess]
+        on = zero(draft.facet)
+        region = [negative(facet) for facet in source.facets if facet != draft.facet]
         held = [c for c in (*draft.guard, *other.guard) if not _implied(c, [*source.inside, on])]
         if any(c.relation == "= 0" for c in held):
             return False
@@ -352,12 +336,6 @@ def _sides(relation: Relation, source: ModeDraft) -> list[Relation]:
     """A relation; two inequalities for an equation that no flow changes, as of a counter."""
     still = relation.operator == "==" and lie_derivative(source.excess(relation), source.flow) == 0
     return [replace(relation, operator=operator) for operator in (">=", "<=")] if still else [relation]
-
-
-def _landed(arrow: Arrow, target: ModeDraft) -> list[Relation]:
-    """The inequalities of the target's invariant, of values before the jump."""
-    texts = {name: within(relation.right) for name, relation in arrow.reset.items()}
-    return [facet.relation.renamed(texts) for facet in target.facets]
 
 
 def closed(relation: Relation, excess: Any) -> Constraint:

@@ -34,16 +34,8 @@ from hsdsl.mathematics.decisions.search import at_most_zero, negative, positive
 CORNERS = {"centre": "({0} + {1})/2", "lower": "{0}", "upper": "{1}"}
 
 
-@dataclass(frozen=True)
-class Choice:
-    """What --at chooses of an initial set: a corner or the centre, and values by name."""
-
-    corner: str | None = None
-    values: Mapping[str, str] = field(default_factory=dict[str, str])
-
-
-def choice(given: Sequence[str]) -> Choice:
-    """Read the texts of --at.
+def choice(given: Sequence[str]) -> tuple[str | None, dict[str, str]]:
+    """What the texts of --at choose of an initial set: a corner or the centre, and values by name.
 
     Raises UsageError: one that is neither a word for a point nor NAME=VALUE.
     """
@@ -59,7 +51,7 @@ def choice(given: Sequence[str]) -> Choice:
             raise UsageError(f"--at: expected {', '.join(CORNERS)} or NAME=VALUE, got '{shown(text, 40)}'")
         corner = corner if constant else text
         values |= {name: number} if constant else {}
-    return Choice(corner, values)
+    return corner, values
 
 
 @dataclass(frozen=True)
@@ -107,19 +99,21 @@ def _place_of(configured: Configuration, element: Element, message: str, hint: s
     return element.fault("HS333", message, hint)
 
 
-def with_inputs(network: Network, configured: Configuration, system: str, chosen: Choice) -> Network:
+def with_inputs(
+    network: Network, configured: Configuration, system: str, corner: str | None, values: Mapping[str, str]
+) -> Network:
     """The network in which variables that nothing moves are constants, where --at chooses their values.
 
     Raises UsageError: --at names nothing of the model.
     """
     given: dict[str, str | None] = {}
-    for name, text in chosen.values.items():
+    for name, text in values.items():
         known = network.qualified.get(name.removeprefix(f"{system}."), name)
         if known not in network.params or network.params[known].kind == "label":
             near = did_you_mean(name, [*network.constants, *network.variables])
             raise UsageError(f"--at: the model has no variable or constant '{shown(name)}'", near)
         given[known] = text
-    if chosen.corner:
+    if corner:
         named = {name for relation in configured.values for name in _named_place(relation, network, system).names}
         given = dict.fromkeys(sorted(named & {*network.variables} - given.keys())) | given
     moved = network.moved
@@ -133,13 +127,13 @@ def with_inputs(network: Network, configured: Configuration, system: str, chosen
     )
 
 
-def start(network: Network, configured: Configuration, system: str, chosen: Choice) -> Start:
+def start(network: Network, configured: Configuration, system: str, corner: str | None) -> Start:
     """The values that `initially`, maps and --at give.
 
     Raises ModelError: a name that does not exist, a set that is neither a point nor a box, a constant without a value.
     """
     relations = [_named_place(relation, network, system) for relation in configured.values]
-    work = _Solving(network, relations, chosen.corner).solved()
+    work = _Solving(network, relations, corner).solved()
     for name in network.constants:
         if name not in work.texts:
             message = f"the constant '{name}' has no value"
@@ -299,7 +293,7 @@ class _Solving:
 
 def admits(draft: ModeDraft, begin: Start) -> bool:
     """Whether an invariant holds at the point, as far as its values are given."""
-    inside = (replaced(draft.placed(facet.excess), begin.numbers, {}) for facet in draft.facets)
+    inside = (replaced(draft.placed(facet), begin.numbers, {}) for facet in draft.facets)
     equal = (replaced(equality, begin.numbers, {}) for equality in draft.equalities)
     return not any(e.free_symbols == set() and bool(e > 0) for e in inside) and not any(
         e.free_symbols == set() and e != 0 for e in equal
@@ -316,9 +310,9 @@ def refuse_outside(draft: ModeDraft, begin: Start, configured: Configuration, el
             message = f"where '{name}' starts is not given"
             hint = f"write {name} == and a number under `initially`, or give --at {name}=NUMBER"
             raise ModelError([_place_of(configured, element, message, hint)])
-    for facet in draft.facets:
-        if bool(replaced(draft.placed(facet.excess), begin.numbers, {}) > 0):
-            raise ModelError([facet.relation.fault("the run starts where this invariant does not hold")])
+    for facet, relation in draft.facets.items():
+        if bool(replaced(draft.placed(facet), begin.numbers, {}) > 0):
+            raise ModelError([relation.fault("the run starts where this invariant does not hold")])
     for equality in draft.equalities:
         if replaced(equality, begin.numbers, {}) != 0:
             message = "the run starts where an equation of the invariant does not hold"

@@ -81,11 +81,11 @@ def _mode(draft: ModeDraft, transitions: Sequence[TransitionDraft], drafts: Mapp
     lines += _indented(_section("let", {name: text for name, text in draft.lets.items() if name not in inner}))
     flow = {name: renamed(place.flow[name].right, inner) for name in draft.states}
     lines += _indented(_section("flow", flow)) if flow else ["  flow: {}"]
-    covered = [t.facet.excess for t in transitions if t.facet and not t.condition]
+    covered = [t.facet for t in transitions if t.facet is not None and not t.condition]
     walls = [
-        facet.relation.renamed(inner).text
-        for facet in draft.facets
-        if facet.excess not in covered and not draft.kept(facet)
+        relation.renamed(inner).text
+        for facet, relation in draft.facets.items()
+        if facet not in covered and not draft.kept(facet)
     ]
     if not place.passing and not any(ALWAYS in t.event for t in transitions):
         walls.append(NEVER)
