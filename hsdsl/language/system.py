@@ -11,10 +11,10 @@ sampled input stays as its symbol.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
@@ -124,6 +124,58 @@ class Event:
     at_execution: bool = False
 
 
+@lru_cache(maxsize=16)  # of a large mode once, not for each of its edges
+def symbols_of(states: tuple[str, ...]) -> tuple[sp.Symbol, ...]:
+    """The symbols of some states."""
+    return tuple(map(symbol, states))
+
+
+@lru_cache(maxsize=16)
+def places_of(states: tuple[str, ...]) -> dict[str, int]:
+    """The numbers of some states."""
+    return {name: i for i, name in enumerate(states)}
+
+
+class Altered(Sequence[Any]):
+    """The entries of ``kept`` but for those in ``changes``, by number.
+
+    An edge of a large system keeps nearly all states: what it has of its own is as long as what it changes.
+    """
+
+    __slots__ = ("changes", "kept")
+
+    def __init__(self, kept: tuple[Any, ...], changes: Mapping[int, Any]) -> None:
+        self.kept = kept
+        self.changes = {i: changes[i] for i in sorted(changes) if changes[i] != kept[i]}
+
+    def __len__(self) -> int:
+        return len(self.kept)
+
+    def __getitem__(self, i: Any) -> Any:
+        return tuple(self)[i] if isinstance(i, slice) else self.changes.get(range(len(self))[i], self.kept[i])
+
+    def __iter__(self) -> Iterator[Any]:
+        if not self.changes:
+            return iter(self.kept)
+        entries = list(self.kept)
+        for i, entry in self.changes.items():
+            entries[i] = entry
+        return iter(entries)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Altered) and self.kept is other.kept:
+            return self.changes == other.changes
+        return isinstance(other, (Altered, tuple)) and tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+
+def changes_of(entries: tuple[Any, ...], change: Callable[[Any], Any]) -> dict[int, Any]:
+    """The entries that are changed, by number."""
+    return {i: new for i, entry in enumerate(entries) if (new := change(entry)) is not entry}
+
+
 @dataclass(frozen=True)
 class Edge:
     """A transition: its surface, condition and reset.
@@ -142,8 +194,8 @@ class Edge:
     surface: Surface
     condition: Any | None  # a SymPy Boolean, None where there is no `if`
     target_states: tuple[str, ...]
-    reset: tuple[sp.Expr, ...]
-    reset_texts: tuple[str, ...]
+    reset: Altered
+    reset_texts: Sequence[str]
     priority: int = 0
     derived: int = 0
     condition_text: str | None = None
@@ -153,6 +205,11 @@ class Edge:
     part: tuple[str, int] | None = None
     strict: bool = False
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.reset, Altered):
+            altered = Altered(symbols_of(self.target_states), dict(enumerate(self.reset)))
+            object.__setattr__(self, "reset", altered)
+
     @property
     def values(self) -> dict[str, sp.Expr]:
         """The value that each state of the target gets."""
@@ -161,14 +218,14 @@ class Edge:
     @property
     def changes(self) -> dict[Any, sp.Expr]:
         """The values that are not those before, by the symbols of their states."""
-        return {symbol(name): value for name, value in self.values.items() if value != symbol(name)}
+        return {self.reset.kept[i]: value for i, value in self.reset.changes.items()}
 
-    def mapped(
-        self, change: Callable[[Any], Any], each: Callable[[Sequence[Any]], tuple[Any, ...]] | None = None
-    ) -> Edge:
-        """The edge with changed expressions; ``each`` changes several."""
+    def mapped(self, change: Callable[[Any], Any], renamed: Mapping[int, Any] | None = None) -> Edge:
+        """The edge with changed expressions; ``renamed`` are those of symbols that it keeps, where they are known."""
         condition = None if self.condition is None else change(self.condition)
-        reset = tuple(map(change, self.reset)) if each is None else each(self.reset)
+        kept = self.reset.kept
+        values = changes_of(kept, change) if renamed is None else renamed
+        reset = Altered(kept, {**values, **{i: change(value) for i, value in self.reset.changes.items()}})
         return replace(self, surface=self.surface.mapped(change), condition=condition, reset=reset)
 
     def of_states(self, names: Container[str]) -> Edge:
@@ -250,22 +307,25 @@ class Mode:
 
     def mapped(self, change: Callable[[Any], Any]) -> Mode:
         """The mode with changed expressions, but those of its scene; each is changed once."""
-        done: dict[int, Any] = {}  # by the objects: resets have the same symbols of the states that they keep
+        done: dict[int, Any] = {}  # by the objects, which last as long as this mode does
+        renamed: dict[int, dict[int, Any]] = {}
 
         def once(expr: Any) -> Any:
-            return each((expr,))[0]
+            if id(expr) not in done:
+                done[id(expr)] = change(expr)
+            return done[id(expr)]
 
-        def each(expressions: Sequence[Any]) -> tuple[Any, ...]:
-            places = list(map(id, expressions))
-            new = dict(zip(places, expressions, strict=True))
-            done.update({k: change(new[k]) for k in new if k not in done})
-            return tuple(map(done.__getitem__, places))
+        def edge(of: Edge) -> Edge:
+            kept = of.reset.kept
+            if id(kept) not in renamed:
+                renamed[id(kept)] = changes_of(kept, change)
+            return of.mapped(once, renamed[id(kept)])
 
         return replace(
             self,
             flow=tuple(map(once, self.flow)),
             walls=tuple(wall.mapped(once) for wall in self.walls),
-            edges=tuple(edge.mapped(once, each) for edge in self.edges),
+            edges=tuple(map(edge, self.edges)),
             outputs=tuple(None if output is None else once(output) for output in self.outputs),
         )
 
@@ -306,7 +366,7 @@ class Initial:
 
 def started(mode: str, names: Iterable[str], in_order: Sequence[tuple[str, sp.Expr]]) -> Initial:
     """Where a run starts, of values over parameters and earlier ones; ``names`` are the states in file order."""
-    names, known = tuple(names), dict[Any, Any]()
+    names, known = dict.fromkeys(names), dict[Any, Any]()
     others, written = dict[Any, Any](), list[tuple[str, Any]]()
     for name, value in in_order:
         known[symbol(name)] = sp.sympify(value).xreplace(known)

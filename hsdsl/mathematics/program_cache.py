@@ -108,14 +108,16 @@ def _rows(program: Program) -> list[Row]:
     """A program as rows of JSON data: the name of a piece's type and its fields, after the rows that they name."""
     rows: list[Row] = []
     numbers: dict[str, int] = {}
+    long: dict[int, int] = {}  # lists, by the objects: every edge has the states of its target
 
     def plain(value: Any) -> Any:
         if isinstance(value, Fraction):
             return f"{value.numerator}/{value.denominator}"
         if isinstance(value, (tuple, list)):
-            items = [plain(item) for item in value]  # pyright: ignore[reportUnknownVariableType]
-            return items if len(items) < LONG else kept([LIST, *items])
-        if not is_dataclass(value):
+            if len(value) >= LONG and id(value) not in long:  # pyright: ignore[reportUnknownArgumentType]
+                long[id(value)] = kept([LIST, *map(plain, value)])  # pyright: ignore[reportUnknownArgumentType]
+            return long[id(value)] if id(value) in long else [*map(plain, value)]  # pyright: ignore[reportUnknownArgumentType]
+        if type(value) in (str, int, float, bool) or not is_dataclass(value):
             return value
         return kept([type(value).__name__, *(plain(getattr(value, field.name)) for field in fields(value))])
 

@@ -210,7 +210,7 @@ def with_timers(system: HybridSystem) -> HybridSystem:
 def _uses_timer(mode: Mode) -> bool:
     parts = [*mode.flow, *mode.outputs, *mode.scene]
     parts += [side for s in mode.surfaces for side in (s.residual, s.left, s.right)]
-    parts += [part for edge in mode.edges for part in (edge.condition, *edge.reset)]
+    parts += [part for edge in mode.edges for part in (edge.condition, *edge.reset.changes.values())]
     return any(_TIMER in getattr(part, "free_symbols", ()) for part in parts)
 
 

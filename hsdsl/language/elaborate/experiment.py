@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections import ChainMap
 from typing import Any
 
 from hsdsl.base.errors import STEP_AND_TOLERANCE
@@ -38,15 +39,16 @@ def elaborate_initial(symbols: SymbolTable) -> tuple[Initial, tuple[tuple[str, A
     ranges = {name: _range(symbols, side) for name, side in document.ranges.items()}
     given = {name: scalar for name, scalar in given.items() if ranges.get(name, ...) is not None}
     texts = {str(key): scalar for key, scalar in given.items()}
-    values, written = dict[str, Value | None](), list[tuple[str, Any]]()
-    scope = symbols.parameter_scope("an initial value is an expression of parameters and of other initial values")
+    values, own, written = dict[str, Value | None](), dict[str, Value](), list[tuple[str, Any]]()
+    outer = symbols.parameter_scope("an initial value is an expression of parameters and of other initial values")
+    known, symbolic = (Scope(ChainMap(earlier, outer.values)) for earlier in (values, own))  # pyright: ignore[reportArgumentType]
     for name in _in_order(symbols, given):
-        values[name] = symbols.number(texts[name], Scope({**scope.values, **values}), finite_now=True)
-        own = {other: state(other) for other, value in values.items() if value is not None and other != name}
-        value = None if values[name] is None else symbols.number(texts[name], Scope({**scope.values, **own}))
+        values[name] = symbols.number(texts[name], known, finite_now=True)
+        value = None if values[name] is None else symbols.number(texts[name], symbolic)
         written += [(name, value.expr)] if value is not None else []
-    known = {name for name, _ in written}
-    initial = started(mode or "", [name for name in texts if name in known], written)
+        own |= {} if values[name] is None else {name: state(name)}
+    made = {name for name, _ in written}
+    initial = started(mode or "", [name for name in texts if name in made], written)
     return initial, tuple((str(name), *ends) for name, ends in ranges.items() if ends is not None)
 
 
@@ -78,9 +80,9 @@ def _in_order(symbols: SymbolTable, given: dict[Key, Scalar]) -> list[str]:
         symbols.report(place, "HS302", message, "give one of them by numbers and parameters")
         for name in found:
             del uses[name]
-    ordered: list[str] = []
-    while waiting := [name for name in uses if name not in ordered]:
-        ordered += [name for name in waiting if not {*uses[name]} & {*waiting}]
+    ordered: dict[str, None] = {}
+    while waiting := dict.fromkeys(name for name in uses if name not in ordered):
+        ordered |= {name: None for name in waiting if not any(other in waiting for other in uses[name])}
     return [name for name in ordered if trees[name] is not None]
 
 

@@ -24,7 +24,7 @@ from hsdsl.language.expression.conditions import Trigger, comparisons
 from hsdsl.language.expression.scope import Refusal, Scope, Value, state, symbol
 from hsdsl.language.schema.documents import ModeDocument, TransitionDocument
 from hsdsl.language.source import ABSENT, Key, Scalar
-from hsdsl.language.system import ZERO, Edge, Event, HybridSystem, Mode, Shape, Surface
+from hsdsl.language.system import ZERO, Altered, Edge, Event, HybridSystem, Mode, Shape, Surface, places_of, symbols_of
 
 
 def elaborate_modes(symbols: SymbolTable, outputs: dict[Key, Value | None]) -> tuple[Mode, ...]:
@@ -209,6 +209,7 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
         return None
     resets = dict(zip(map(str, transition.reset), values, strict=True))
     texts = {str(key): scalar.value for key, scalar in transition.reset.items()}
+    places = places_of(states)
     return Edge(
         name=name,
         source=source,
@@ -216,8 +217,8 @@ def _edge(symbols: SymbolTable, source: str, name: str, transition: TransitionDo
         surface=crossed,
         condition=condition,
         target_states=states,
-        reset=tuple(resets[s].expr if s in resets else symbol(s) for s in states),
-        reset_texts=tuple(texts.get(s, s) for s in states),
+        reset=Altered(symbols_of(states), {places[s]: value.expr for s, value in resets.items() if s in places}),
+        reset_texts=Altered(states, {places[s]: text for s, text in texts.items() if s in places}),
         priority=transition.priority if isinstance(transition.priority, int) else 0,
         condition_text=None if transition.condition is None else transition.condition.value,
         event=None if event is None else replace(event, given=tuple(resets)),
@@ -326,8 +327,9 @@ def known_mode(symbols: SymbolTable, label: Scalar) -> str | None:
 def _check_reset(
     symbols: SymbolTable, source: str, target: str, states: tuple[str, ...], transition: TransitionDocument
 ) -> None:
+    places = places_of(states)
     for key in transition.reset:
-        if key not in states and key not in symbols.undeclared:  # those are reported under `initial`
+        if str(key) not in places and key not in symbols.undeclared:  # those are reported under `initial`
             name, equals, value = (part.strip() for part in key.partition("="))
             hint = f"write {name}: {value}" if equals and name in states and value else did_you_mean(key, states)
             if key == SINCE and symbols.timed:
@@ -335,7 +337,7 @@ def _check_reset(
             message = f"the mode '{target}' has no state '{shown(key)}' to reset"
             symbols.report(key.place, "HS306", message, hint)
     own = symbols.states[source]
-    for name in states:
+    for name in states if own is not states else ():
         if name not in transition.reset and name not in own:
             message = (
                 f"the transition to '{target}' gives its state '{name}' no value, and '{source}' has no such state"

@@ -22,7 +22,7 @@ from hsdsl.base.functions import absolute, maximum, minimum, power, rewritten, s
 from hsdsl.base.names import memory, without_memory
 from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.plain import text_of
-from hsdsl.language.system import TIME, Edge, Mode, Surface
+from hsdsl.language.system import TIME, Altered, Edge, Mode, Surface
 from hsdsl.mathematics.completion.nearby import (
     NO_SLOPES,
     Nearby,
@@ -40,7 +40,6 @@ from hsdsl.mathematics.completion.nearby import (
     rank,
     size_at,
     solved,
-    symbols,
     value_at,
 )
 
@@ -71,7 +70,7 @@ class Contact:
     further: tuple[Edge, ...]
     rate: sp.Expr
     push: sp.Expr
-    landing: tuple[sp.Expr, ...]
+    landing: Altered
     ends: tuple[sp.Basic, ...]
     near: Nearby
     counts: tuple[int, ...] = ()
@@ -117,7 +116,7 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO
     if order is None:
         return None
     release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
-                      reset=symbols(mode.states), reset_texts=mode.states)  # fmt: skip
+                      reset=Altered(near.states, {}), reset_texts=mode.states)  # fmt: skip
     atoms = sorted(edge.condition.atoms(Relational), key=str) if edge.condition is not None else ()
     kept = tuple(atom for atom in atoms if _is_kept(_falling(atom), near, rows, push, at))
     further, ends = _ends_of_condition(release, edge.condition, [atom for atom in atoms if atom not in kept])
@@ -166,10 +165,9 @@ def _constrained(near: Nearby):
     for i, shares in zip(near.changed, part.tolist(), strict=True):
         found = {x: cancelled(share / size) for x, share in zip(among, shares, strict=True)}
         projection[i] = {x: share for x, share in found.items() if share != 0}
-    landing = list[sp.Expr](near.states)
-    for i, correction in zip(near.changed, away, strict=True):
-        landing[i] = cancelled(landing[i] - correction / size)
-    return rows, projection, tuple(landing), at
+    steps = zip(near.changed, away, strict=True)
+    landing = {i: cancelled(near.states[i] - correction / size) for i, correction in steps}
+    return rows, projection, Altered(near.states, landing), at
 
 
 def _sided(own: sp.Matrix, count: int, at: Point) -> sp.Expr:
@@ -274,12 +272,13 @@ def branched(near: Nearby) -> Nearby | None:
         return near
     branch = _Branch(near, impacts)
     try:
-        reset = tuple(branch.of(r) if i in near.changed else r for i, r in enumerate(near.edge.reset))
+        changes = near.edge.reset.changes
+        values = {i: branch.of(value) if i in near.changed else value for i, value in changes.items()}
     except Undecided:
         return None
-    if reset == near.edge.reset:
+    if values == changes:
         return near
-    return near.by(replace(near.edge, reset=reset), impacts[0][0])
+    return near.by(replace(near.edge, reset=Altered(near.edge.reset.kept, values)), impacts[0][0])
 
 
 def _impact(near: Nearby, speed: float, seed: int) -> Point | None:

@@ -7,9 +7,10 @@ States that impacts only count with are left out: nothing else depends on them, 
 from __future__ import annotations
 
 import random
+from collections import ChainMap, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
-from functools import lru_cache, reduce
+from functools import reduce
 from operator import mul, sub
 from typing import Any
 
@@ -19,7 +20,7 @@ from hsdsl.base.functions import below
 from hsdsl.base.numbers.arithmetic import Number, multiprecision
 from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.scope import slope_symbol, symbol
-from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
+from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, symbols_of
 
 NUMBERS = multiprecision(60)  # of random points: units of states, guards and time may be far apart
 NAN = NUMBERS.functions["nan"]
@@ -34,11 +35,6 @@ Slopes = Mapping[sp.Symbol, sp.Symbol]
 NO_SLOPES: Slopes = {}
 Sized = tuple[Number, Number]  # a number, and the size of the terms that it is computed from
 Row = Sequence[Sized]
-
-
-@lru_cache(maxsize=16)  # of a large mode once, not for each of its edges
-def symbols(states: tuple[str, ...]) -> tuple[sp.Symbol, ...]:
-    return tuple(map(symbol, states))
 
 
 def slopes_of_inputs(system: HybridSystem) -> Slopes:
@@ -64,11 +60,10 @@ class Nearby:
         moving: Slopes = NO_SLOPES,
     ) -> None:
         self._here, self.mode, self.impact, self._moving, self._counts = here, mode, impact, moving, counts
-        self.states, self.edge = symbols(mode.states), edge
+        self.states, self.edge = symbols_of(mode.states), edge
         self.guard = edge.surface.residual.xreplace(here)
-        self._flow = {**mode.vector_field, **moving}
-        pairs = zip(self.states, edge.reset, strict=True)
-        self.changed = [i for i, (x, r) in enumerate(pairs) if r is not x and r != x and i not in counts]
+        self._flow = ChainMap[sp.Symbol, Any](dict(moving), mode.vector_field)
+        self.changed = [i for i in edge.reset.changes if i not in counts]
         self.own = tuple(self.states[i] for i in self.changed)
         self.moved = sp.Matrix([edge.reset[i].xreplace(here) - self.states[i] for i in self.changed])
 
@@ -324,16 +319,19 @@ _last: list[tuple[Mode, frozenset[int]]] = []  # of a mode all edges in turn; to
 
 def _unused(mode: Mode) -> frozenset[int]:
     """The states without a flow that no flow, surface, `if` or other state depends on while the mode lasts."""
-    states = dict(zip(symbols(mode.states), range(len(mode.states)), strict=True))
+    states = dict(zip(symbols_of(mode.states), range(len(mode.states)), strict=True))
     loops = [edge for edge in mode.edges if edge.target == mode.name and edge.target_states == mode.states]
     conditions = [edge.condition for edge in mode.edges if edge.condition is not None]
     waiting = [*mode.flow, *conditions, *(s.residual for s in mode.surfaces)]
     used = {i for i, f in enumerate(mode.flow) if f != 0}
-    waiting += [edge.reset[i] for edge in loops for i in used]
+    values = defaultdict[int, list[Any]](list)
+    for i, value in (change for edge in loops for change in edge.reset.changes.items()):
+        values[i].append(value)
+    waiting += [value for i in used for value in values[i]]
     while waiting:
         for x in sp.sympify(waiting.pop()).free_symbols:
             i = states.get(x)
             if i is not None and i not in used:
                 used.add(i)
-                waiting += [edge.reset[i] for edge in loops]
+                waiting += values[i]
     return frozenset(range(len(mode.states))) - used

@@ -101,16 +101,16 @@ def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp
             for i in contacts[first].rows:
                 other = sp.Add(*(1 - off[j] for j in sorted(near[first])))
                 flow[i] = below(flags[first], HELD, flow[i], below(other, 1, flow[i], _NAN))
-    return flow, [_push(mode, found, flow, flag) if near[k] else
+    places = dict(zip(mode.vector_field, flow, strict=True))
+    return flow, [_push(found, places, flag) if near[k] else
                   (found.push, _size(found, found.near.rates(found.last)))
                   for k, (found, flag) in enumerate(zip(contacts, flags, strict=True))]  # fmt: skip
 
 
-def _push(mode: Mode, found: Contact, flow: Sequence[sp.Expr], flag: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
+def _push(found: Contact, flow: Mapping[sp.Symbol, sp.Expr], flag: sp.Symbol) -> tuple[sp.Expr, sp.Expr]:
     """The push on a guard along the flow that the others leave, and the size of its terms."""
-    places = dict(zip(found.near.states, flow, strict=True))
     left = {x: rate for x, rate in found.near.rates(found.last).items() if x != TIME}
-    left |= {x: places[x].xreplace({flag: sp.S.Zero}) for x in left if x in places}
+    left |= {x: flow[x].xreplace({flag: sp.S.Zero}) for x in left if x in flow}
     return lie_derivative(found.last, left), _size(found, left)
 
 

@@ -14,8 +14,6 @@ from collections import ChainMap, defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
-from itertools import compress
-from operator import is_not
 from typing import Any
 
 import sympy as sp
@@ -177,9 +175,7 @@ def changed_by(edge: Edge, mode: Mode) -> tuple[int, ...]:
     """The states that an edge's reset changes, by their numbers in the target; all of another mode's."""
     if edge.target_states != mode.states:
         return tuple(range(len(edge.target_states)))
-    symbols = list(mode.vector_field)
-    others = compress(range(len(symbols)), map(is_not, symbols, edge.reset))
-    return tuple(i for i in others if edge.reset[i] != symbols[i])
+    return tuple(edge.reset.changes)
 
 
 def _edge(edge: Edge, mode: Mode, indices: dict[str, int]) -> lowered.EdgeProgram:

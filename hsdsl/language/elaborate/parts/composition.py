@@ -23,7 +23,7 @@ from hsdsl.language.expression.algebra import ONE, ZERO, either, is_mode, pick, 
 from hsdsl.language.expression.scope import Refusal, symbol
 from hsdsl.language.schema.documents import PartTransitionDocument
 from hsdsl.language.source import ABSENT, Key, Scalar
-from hsdsl.language.system import Edge, Mode, Surface
+from hsdsl.language.system import Altered, Edge, Mode, Surface, places_of, symbols_of
 from hsdsl.language.system import Event as Rising
 
 MODE, FINAL = "system", "final"
@@ -41,8 +41,7 @@ def composed(board: Board, outputs: tuple[Any | None, ...], scene: tuple[Any, ..
     numbers = numbered([one.part for one in instances])
     states = (*(one.full(state) for one in instances for state in one.states), *timers, *numbers)
     broadcast = Broadcast(board, [t for t in transitions if t.listens])
-    kept = {state: symbol(state) for state in states}
-    edges = [_edge(broadcast, kept, t) for t in transitions if not t.listens]
+    edges = [_edge(broadcast, states, t) for t in transitions if not t.listens]
     flow += [*[(ONE, "1")] * len(timers), *[(ZERO, "0")] * len(numbers)]
     exprs, texts = zip(*flow, strict=True) if flow else ((), ())
     whole = Mode(MODE, states, exprs, texts, tuple(walls), tuple(edges), outputs, scene=scene)
@@ -98,18 +97,18 @@ def _walls(board: Board, one: Instance) -> Iterator[Surface]:
                 yield _surface(board, one, k, found)
 
 
-def _edge(broadcast: Broadcast, kept: dict[str, Any], made: PartTransition) -> Edge:
-    """The edge of a transition; ``kept`` has the symbols of all states."""
-    one = made.one
+def _edge(broadcast: Broadcast, states: tuple[str, ...], made: PartTransition) -> Edge:
+    """The edge of a transition of a system with these states."""
+    one, places = made.one, places_of(states)
     return Edge(
         name=one.full(made.name),
         source=MODE,
         target=FINAL if one.part.final[made.target] else MODE,
         surface=_surface(broadcast.board, one, made.source, made.surface) if made.surface else NOWHERE,
         condition=made.condition,
-        target_states=tuple(kept),
-        reset=tuple((kept | broadcast.changes(made)).values()),
-        reset_texts=tuple((dict(zip(kept, kept, strict=True)) | made.texts).values()),
+        target_states=states,
+        reset=Altered(symbols_of(states), {places[name]: v for name, v in broadcast.changes(made).items()}),
+        reset_texts=Altered(states, {places[name]: text for name, text in made.texts.items()}),
         priority=made.priority,
         condition_text=made.condition_text,
         event=made.rising,
