@@ -317,6 +317,10 @@ def test_what_tells_the_time_is_shown_only_by_name():
     counted = CLOCKED.replace("way: 1", "way: 0").replace("way/2", "way + 1")
     run = hsdsl.loads(counted).simulate(engine="python")
     assert View(**run.view()).pairs([run]) == [("x", "v")] and "way" in View(**run.view()).names([run])
+    for rate, shown in {"2": False, "1/T": False, "-sqrt(4*pi)": False, "1 + t": True, "v": True}.items():
+        text = "parameters: {T: 2}\nmodes:" + CLOCKED.split("modes:")[1].replace("clock: 1", f"clock: {rate}")
+        run = hsdsl.loads("hsdsl: 1\n" + text).simulate(engine="python")
+        assert ("clock" in View(**run.view()).names([run])) is shown, rate
     run = flat.simulate(engine="python")
     assert View().names([run]) == ["x", "clock", "v"]  # of a saved run nothing else is known
     timer = hsdsl.loads(

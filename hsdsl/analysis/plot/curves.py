@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -245,7 +247,8 @@ class View:
         known = names_of(runs)
         if self.phases is not None:
             return [(checked(across, known), checked(up, known)) for across, up in dict.fromkeys(self.phases)]
-        without = self._timers(known) | self._with_flow(0)  # counters, and what a controller holds
+        held = {name for name, rate in self._rates().items() if number_of(rate) == 0}
+        without = self._timers(known) | held  # counters, and what a controller holds
 
         def moving(states: Sequence[str]) -> list[str]:
             return [name for name in without_memory(states) if name not in without]
@@ -259,11 +262,12 @@ class View:
     def _timers(self, known: Sequence[str]) -> set[str]:
         """Names that only tell the time: `since`, and clocks that transitions set back; none where no other is known.
 
-        A clock has the flow 1 wherever it flows, and a transition that sets it to a number.
+        A clock has one constant rate wherever it flows, and a transition that sets it to a constant.
         """
         made = [(edge.target_states[k], text) for mode in self._modes for edge in mode.edges
                 for k, text in zip(edge.changes, edge.change_texts, strict=True)]  # fmt: skip
-        clocks = {name for name, text in made if number_of(text) is not None} & self._with_flow(1)
+        running = {name for name, rate in self._rates().items() if number_of(rate) != 0}
+        clocks = {name for name, text in made if self._is_constant(text)} & running
         found = {name for name in known if name.rpartition(".")[2] == SINCE or name in clocks}
         return found if found < set(known) else set()
 
@@ -271,10 +275,21 @@ class View:
     def _modes(self) -> Sequence[ModeProgram]:
         return () if self.program is None else self.program.modes
 
-    def _with_flow(self, number: float) -> set[str]:
-        """States whose flow is a number wherever they flow."""
-        flows = [(name, text) for mode in self._modes for name, text in zip(mode.states, mode.flow_texts, strict=False)]
-        return {name for name, _ in flows} - {name for name, text in flows if number_of(text) != number}
+    def _rates(self) -> dict[str, str]:
+        """States whose flow is one constant wherever they flow, with its text."""
+        flows = {(name, text) for mode in self._modes for name, text in zip(mode.states, mode.flow_texts, strict=False)}
+        different = Counter(name for name, _ in flows)
+        return {name: text for name, text in flows if different[name] == 1 and self._is_constant(text)}
+
+    def _is_constant(self, text: str) -> bool:
+        """Whether a text is an expression of numbers and parameters alone."""
+        known = ("pi", *(self.program.parameters if self.program else ()))
+        try:
+            nodes = list(ast.walk(ast.parse(text, mode="eval")))
+        except SyntaxError:
+            return False
+        called = [node.func for node in nodes if isinstance(node, ast.Call)]
+        return all(n.id in known for n in nodes if isinstance(n, ast.Name) and n not in called)
 
     def called(self, runs: Sequence[Execution]) -> list[str]:
         """Return a label for each run.
