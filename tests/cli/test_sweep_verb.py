@@ -44,6 +44,9 @@ def test_a_sweep_that_has_no_picture_is_summarised(command, model, tmp_path):
     assert command("sweep", "--show", tmp_path / "s", "--of", "final.x").code == 2
 
 
+PLOTTED = ["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--plot", "p.svg"]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -55,7 +58,18 @@ def test_a_sweep_that_has_no_picture_is_summarised(command, model, tmp_path):
         (["MODEL", "--vary", "rate=1:x:3", "--out", "OUT"], "--vary rate"),
         (["MODEL", "--vary", "rate=1", "--out", "OUT", "--record", "all"], "--record"),
         (["MODEL", "--vary", "rate=1", "--out", "OUT", "--plot", "p.pdf"], "the name must end in .png or .svg"),
-        (["MODEL", "--show", "OUT"], "takes neither MODEL"),
+        (["MODEL", "--show", "OUT"], "takes no MODEL"),
+        (["--show", "OUT", "--until", "3", "--set", "rate=2"], "takes no --set, --until"),
+        (["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--of", "final.x"], "--of is of a picture"),
+        (["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--cluster", "a", "--processes", "2"], "leave one out"),
+        (["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--seed", "2"], "--seed: nothing is drawn"),
+        ([*PLOTTED, "--of", "final.y"], "no column 'final.y' to draw"),
+        ([*PLOTTED, "--of", "sample.x"], "record it: --record outputs"),
+        ([*PLOTTED, "--vary", "low=1,2", "--vary", "initial.x=1,2"], "hint: draw a slice: --slice initial.x=1"),
+        ([*PLOTTED, "--slice", "rate"], "--slice: expected NAME=NUMBER, got 'rate'"),
+        ([*PLOTTED, "--slice", "rate=1"], "nothing varies in this slice"),
+        ([*PLOTTED, "--worst", "mode"], "'mode' has no numbers"),
+        ([*PLOTTED, "--best", "final.z"], "'final.z' is no column of the sweep"),
         (["--show", "OUT"], "is not a sweep"),
     ],
 )
@@ -65,6 +79,18 @@ def test_what_cannot_be_served_is_refused(command, model, tmp_path, words, messa
     answer = command("sweep", *(names.get(word, word) for word in words))
     assert answer.code == 2 and message in answer.err
     assert not (tmp_path / "out").exists()
+
+
+def test_the_worst_rows_are_listed_with_the_command_of_the_first(command, model, tmp_path):
+    pytest.importorskip("pyarrow")
+    words = ["--vary", "rate=0.1,3,0.5", "--processes", 1, "--out", tmp_path / "s"]
+    answer = command("sweep", model(DECAY), *words, "--worst", "final.x", "--best", "time")
+    table = answer.out.partition("worst rows by final.x\n")[2].splitlines()
+    assert [line.split()[:2] for line in table[:4]] == [["row", "rate"], ["0", "0.1"], ["2", "0.5"], ["1", "3"]]
+    again = table[4].partition("again: hsdsl ")[2].split()
+    assert "0.818730753" in table[1] and "x = 0.8187307531" in command(*again).out
+    shown = command("sweep", "--show", tmp_path / "s", "--best", "final.x", "--json")
+    assert [row["rate"] for row in shown.json["best"]] == [3, 0.5, 0.1]
 
 
 def test_without_pyarrow_there_is_a_hint(command, model, tmp_path, monkeypatch):

@@ -12,6 +12,7 @@ from engines import ENGINES, needs_compiler
 from shipped import MODELS, shipped
 
 import hsdsl
+from hsdsl.analysis.plot.ensembles import Spread
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution.records import same
@@ -204,6 +205,34 @@ def test_what_cannot_be_served_is_refused():
     assert lengths.value.hint == "for every combination give columns and rows: c as array[:, None]"
     with pytest.raises(IndexError, match="expected an index of an ensemble of shape"):
         oscillator.ensemble(parameters={"c": [0.5, 0.6]}, **FAST).run(2)
+
+
+def test_bands_of_an_ensemble_hold_their_shares():
+    """The quantiles of 0, 1, ..., 100 are these numbers; a run that has ended has none."""
+    values = np.column_stack(
+        [np.arange(101.0), np.where(np.arange(101) < 51, np.arange(101.0), np.nan), [np.nan] * 101]
+    )
+    spread = Spread.of(values, [0.5, 0.9])
+    assert spread.median[:2].tolist() == [50, 25] and np.isnan(spread.median[2])
+    assert [*spread.bands] == [0.9, 0.5]
+    assert [float(side[0]) for side in spread.bands[0.9]] == pytest.approx([5, 95])
+    assert [float(side[1]) for side in spread.bands[0.5]] == pytest.approx([12.5, 37.5])
+
+
+def test_an_ensemble_is_drawn_or_refused(tmp_path):
+    model = hsdsl.load(MODELS / "bouncing-ball.yaml")
+    found = model.ensemble(initial={"h": np.linspace(1, 2, 6).reshape(2, 3)}, samples=20, until=1)
+    found.plot(tmp_path / "p.svg", ["v"], shares=[0.8])
+    assert (tmp_path / "p.svg").stat().st_size > 1000
+    uneven = model.ensemble(parameters={"e": [0.5, 0.8]}, samples=20, until="e")
+    for ensemble, options, sentence in (
+        (model.ensemble(until=1), {}, "has no samples"),
+        (found, {"columns": ["w"]}, "no state or output is called w"),
+        (found, {"shares": [1]}, "between 0 and 1, got 1"),
+        (uneven, {}, "the sample times of the instances differ"),
+    ):
+        with pytest.raises(UsageError, match=sentence):
+            ensemble.plot(tmp_path / "q.svg", **options)
 
 
 def test_nothing_varied_is_one_run():

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 import os
+from dataclasses import replace
 
+import hand_made
 import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.analysis.sweep import Recording, dataset, load, variation
+from hsdsl.analysis.sweep import Recording, load, manifest, picture, variation
 from hsdsl.analysis.sweep.dataset import damaged
 from hsdsl.base.errors import UsageError
+from hsdsl.engine.execution import Stop
 
 parquet = pytest.importorskip("pyarrow.parquet")
 
@@ -316,7 +319,7 @@ def test_pictures(model, tmp_path, vary, of, kind):
 def test_samples_are_drawn_over_time(model, tmp_path, vary):
     random = 4 if "~" in vary[0] else None
     found = model.sweep(vary, tmp_path / "s", record="final,outputs:count=7", random=random, processes=1)
-    curves = dataset._curves(found, "sample.x")
+    curves = picture._curves(found, "sample.x")
     assert len(curves) == found.rows
     for k, (times, values) in enumerate(curves):
         assert times[0] == 0 and len(times) == len(values)
@@ -331,11 +334,86 @@ def test_samples_are_drawn_over_time(model, tmp_path, vary):
 
 
 def test_where_no_column_is_named_the_most_telling_one_is_drawn(model, tmp_path):
-    telling = dataset.telling
+    telling = picture.telling
     one = {"c": [0.7, 0.8]}
     assert telling(model.sweep(one, tmp_path / "a", processes=1, record="transitions")) == "before.v"  # x stays
     assert telling(model.sweep(one, tmp_path / "b", processes=1)) == "transitions"
     assert telling(model.sweep(VARY, tmp_path / "c", processes=1, record="transitions")) == "transitions"
+
+
+def test_slices_of_more_names_than_axes(model, tmp_path, monkeypatch):
+    """Values are the nearest of their grids."""
+    from hsdsl.analysis.plot import analyses
+
+    vary = {"c": [0.7, 0.8], "initial.v": [4, 6, 8], "g": [9, 10]}
+    found, drawn = model.sweep(vary, tmp_path / "s", record="final,transitions", processes=1), {}
+    for name in ("plot_curve", "plot_map", "plot_dots"):
+        monkeypatch.setattr(analyses, name, lambda path, *given, name=name: drawn.update({name: given}))
+    table = found.to_pandas()
+    found.plot("p.svg", "final.x", at={"g": 9.4})
+    c, v, of, title = drawn["plot_map"]
+    rows = table[table.g == 9]
+    assert (c.values.tolist(), v.values.tolist()) == (rows.c.tolist(), rows["initial.v"].tolist())
+    assert of.values.tolist() == rows["final.x"].tolist() and title == "A ball that is thrown, g = 9"
+    found.plot("p.svg", "final.x", at={"g": 9.6, "initial.v": 6.0})
+    rows = table[(table.g == 10) & (table["initial.v"] == 6)]
+    assert drawn["plot_curve"][1].values.tolist() == rows["final.x"].tolist()
+    found.plot("p.svg", "before.v", at={"g": 9.6, "initial.v": 6.0}, tail=1)
+    c, of, where, _ = drawn["plot_dots"]
+    assert of.values.tolist() == np.concatenate([*rows["before.v"]]).tolist()
+    assert c.values[where].tolist() == np.repeat(rows.c, rows.transitions).tolist()
+    for at, sentence in (
+        ({"h": 1}, "no grid varies 'h'"),
+        ({"g": 11}, "expected 9 to 10"),
+        (dict.fromkeys(vary, 8), "c: exp"),
+    ):
+        with pytest.raises(UsageError, match=f"--slice.*{sentence}"):
+            found.plot("p.svg", "final.x", at=at)
+    with pytest.raises(UsageError, match=r"a map shows two varied names, got c, initial.v, g") as refusal:
+        found.plot("p.svg", "final.x")
+    assert refusal.value.hint == "draw a slice: --slice g=9"
+
+
+def test_the_worst_and_the_best_rows(model, tmp_path):
+    found = model.sweep(VARY | {"g": [9.81, -1]}, tmp_path / "s", processes=1, until=1, outputs=["x"])
+    ends = found["final.x"]
+    known = np.flatnonzero(np.isfinite(ends))
+    assert 0 < len(known) < len(ends)  # a negative g is refused
+    for rows, order in ((found.worst("final.x", 5), -ends[known]), (found.best("final.x", 5), ends[known])):
+        assert [row["row"] for row in rows] == known[np.argsort(order, kind="stable")][:5].tolist()
+        assert all(row["final.x"] == ends[row["row"]] and row["c"] == found["c"][row["row"]] for row in rows)
+    assert len(found.best("final.x", 1000)) == len(known)
+    assert found.command(2).endswith("--until=1 --set c=0.7 --set initial.v=6.0 --set g=9.81")
+    for column, sentence in (
+        ("mode", "'mode' has no numbers"),
+        ("final.y", "'final.y' is no column"),
+        ("row", "no numb"),
+    ):
+        with pytest.raises(UsageError, match=sentence):
+            found.worst(column)
+
+
+def test_a_zeno_row_names_its_edges_in_few_words(tmp_path):
+    relay = hsdsl.loads(
+        "hsdsl: 1\nparameters: {a: 1}\nmodes:\n"
+        "  plus: {flow: {x: -a}, transitions: [{name: down, when: x <= 0, to: minus}]}\n"
+        "  minus: {flow: {x: a}, transitions: [{name: up, when: x >= 0, to: plus}]}\n"
+        "initial: {mode: plus, x: 1}\nexperiment: {until: 3, completion: none}\n"
+    )
+    found = relay.sweep({"a": [0.1, 1, 2]}, tmp_path / "s", processes=1)
+    assert found["stop"].tolist() == ["until", "zeno", "zeno"]
+    _, one, two = found["message"].tolist()
+    assert one == "transitions of down, up accumulate at t = 1; no motion is known there"
+    assert "t = 0.5;" in two and all(len(text.split()) <= 20 for text in (one, two))
+
+
+def test_a_reason_names_at_most_three_edges():
+    run = hand_made.bouncing_ball()
+    made = [replace(run.transitions[0], edge=name) for name in ["other", *"abcde" * 2]]
+    zeno = replace(run, transitions=made, stop=Stop("zeno", 1.25, ""))
+    text = manifest.accumulating(zeno)
+    assert text == "transitions of a, b, c and 2 more accumulate at t = 1.25; no motion is known there"
+    assert manifest.accumulating(replace(zeno, transitions=made[:6])) is None
 
 
 def test_pictures_that_cannot_be_drawn_are_refused(model, tmp_path):

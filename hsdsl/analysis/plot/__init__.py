@@ -2,7 +2,7 @@
 """Pictures of runs: states over time with mode bands, jumps not joined, guards as dotted levels; phase plots.
 
 `curves` has what a picture shows and the points that it draws; `figure` has the panels, in the colours of `style`, and
-`page` is the same as HTML. `analyses` are pictures of other subjects; `animation` draws a scene, `notebook` is what
+`page` is the same as HTML. `analyses` and `ensembles` are other pictures; `animation` draws a scene, `notebook` is what
 notebooks display.
 """
 

@@ -3,7 +3,8 @@
 =============  ============================================================================================
 `variation`    what varies: grids and random draws
 `manifest`     what a dataset is of: model, values, settings, what is recorded; its columns, and their rows
-`dataset`      a folder with a manifest and a file for each chunk of rows: made, read, summed up, drawn
+`dataset`      a folder with a manifest and a file for each chunk of rows: made, read, summed up
+`picture`      what is drawn of it
 `cluster`      chunks to the workers of Dask
 =============  ============================================================================================
 

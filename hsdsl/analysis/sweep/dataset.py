@@ -3,37 +3,32 @@
 
 Each file appears complete, under its final name, and has the tag of its manifest. Its pages have checksums. Processes
 of this machine make chunks, each written as soon as it is there.
-
-A picture of a column of lists is a bifurcation diagram over one name; samples give curves over time. A column of
-numbers or words gives a curve over one name, a map over two. More names are refused: their rows would lie on each
-other.
 """
 
 from __future__ import annotations
 
 import math
 import os
+import shlex
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hsdsl.analysis.sweep import manifest as manifests
-from hsdsl.analysis.sweep.manifest import LISTS, TAG, Manifest, column_of, library, schema
+from hsdsl.analysis.sweep.manifest import TAG, Manifest, column_of, library, schema
 from hsdsl.base.atomic import replacing
 from hsdsl.base.errors import WARNINGS, UsageError
-from hsdsl.base.names import SINCE, called, checks_arguments, checks_methods, counted, did_you_mean, shown, visible
+from hsdsl.base.names import INITIAL, called, checks_arguments, checks_methods, counted, did_you_mean, shown, visible
 from hsdsl.base.processes import Lost, in_processes
 from hsdsl.engine.execution import Array
-
-if TYPE_CHECKING:
-    from hsdsl.analysis.plot.analyses import Axis
+from hsdsl.engine.preparation.values import whole
 
 
 @checks_methods
@@ -137,7 +132,13 @@ class Sweep:
         return dict(counts.most_common())
 
     def plot(
-        self, path: str | os.PathLike[str], of: str | None = None, *, tail: float = 0.5, over: str | None = None
+        self,
+        path: str | os.PathLike[str],
+        of: str | None = None,
+        *,
+        tail: float = 0.5,
+        over: str | None = None,
+        at: Mapping[str, float] | None = None,
     ) -> None:
         """Draw a column over the varied names to a .png or .svg file: a curve, a map, or a bifurcation diagram.
 
@@ -153,10 +154,49 @@ class Sweep:
         over : {"time"}, optional
             Whether to draw a column of samples, such as ``sample.x``, over time: a curve for each row, coloured by the
             varied value.
+        at : mapping, optional
+            A slice: only the rows in which these names have the values of their grids that are nearest to those given.
 
         Raises UsageError: no such column, or more names that vary than a picture has axes.
         """
-        draw(self, path, of, tail, over)
+        from hsdsl.analysis.sweep.picture import Picture
+
+        Picture(of, tail, over, at or {}).draw(self, path)
+
+    def worst(self, of: str, count: int = 10) -> list[dict[str, Any]]:
+        """Return the rows with the largest numbers in a column, the largest first; :meth:`best` has the least.
+
+        Parameters
+        ----------
+        of : str
+            A column of numbers, such as ``final.J``, a criterion to minimise.
+        count : int
+            How many rows.
+
+        Returns
+        -------
+        list of dict
+            ``row``, the varied names, ``stop``, and the number. Rows without a number are left out.
+
+        Raises UsageError: no such column, or one without numbers.
+        """
+        return extreme_rows(self, of, -1, count)
+
+    def best(self, of: str, count: int = 10) -> list[dict[str, Any]]:
+        """Return the rows with the least numbers in a column; see :meth:`worst`."""
+        return extreme_rows(self, of, 1, count)
+
+    def command(self, row: int) -> str:
+        """The command that runs a row by itself."""
+        varied = {name: float(column[0]) for name, column in self.manifest.variation.values(row, row + 1).items()}
+        shared = self.manifest.arguments
+        groups = {"parameters": "", "initial": INITIAL, "settings": "experiment."}
+        sets = {
+            prefix + k: v for group, prefix in groups.items() for k, v in (shared.get(group) or {}).items()
+        } | varied
+        words = [f"--{k}={v}" for k, v in shared.items() if k not in groups and v is not None]
+        words += [part for k, v in sets.items() for part in ("--set", f"{k}={v}")]
+        return shlex.join(["hsdsl", "run", self.manifest.model, *words])
 
     def as_json(self) -> dict[str, Any]:
         """Return the numbers of the dataset, and its folder."""
@@ -250,6 +290,24 @@ def damaged(sweep: Sweep) -> Iterator[int]:
 KEPT = ("model", "sha256", "title", "random", "seed", "record", "settings", "rows", "chunk", "hsdsl")
 
 
+def extreme_rows(sweep: Sweep, of: str, sign: int, count: int) -> list[dict[str, Any]]:
+    """The rows of the least (``sign`` 1) or the largest (-1) numbers."""
+    check_ranked(sweep.manifest, of)
+    numbers, names = sweep[of].astype(float), sweep.manifest.variation.names
+    first = [k for k in np.argsort(sign * numbers, kind="stable").tolist() if np.isfinite(numbers[k])]
+    kept = list(dict.fromkeys(["row", *map(column_of, names), "stop", of]))
+    return sweep.table(kept).take(first[: whole(count, "count", least=1)]).to_pylist()
+
+
+def check_ranked(manifest: Manifest, of: str) -> None:
+    """Refuse a column that is none, or has no numbers."""
+    columns = {field.name: str(field.type) for field in schema(manifest)}
+    if columns.get(of) not in ("double", "int64") or of == "row":
+        known = [name for name, kind in columns.items() if kind in ("double", "int64") and name != "row"]
+        reason = "has no numbers" if of in columns else "is no column of the sweep"
+        raise UsageError(f"'{shown(of)}' {reason}", did_you_mean(of, known) or f"known here: {', '.join(known)}")
+
+
 def _failures(sweep: Sweep) -> Iterator[str]:
     """The first message of each reason why runs did not get to their end."""
     messages: dict[str, str] = {}
@@ -277,127 +335,6 @@ def _ranges(sweep: Sweep) -> Iterator[str]:
             low, high, total, count = np.transpose(parts)
             span = f"{low.min():<12.6g} to {high.max():<12.6g}"
             yield f"{visible(name):{wide}} {span} mean {total.sum() / count.sum():.6g}"
-
-
-TIME, SAMPLED = "time", "sample.time"
-TIMES = {"transition": "transition.time", "before": "transition.time", "after": "transition.time"}
-
-
-def draw(sweep: Sweep, path: str | os.PathLike[str], of: str | None, tail: float, over: str | None = None) -> None:
-    """Draw a column of a sweep; left out, the one of :func:`telling`. ``over`` may be ``time``, for samples.
-
-    Raises UsageError: no such column, one that cannot be drawn, or more than two names that vary.
-    """
-    from hsdsl.analysis.plot import analyses as plots
-
-    if over not in (None, TIME):
-        raise UsageError(f"--over: expected {TIME}, got '{shown(over)}'", "pictures are over what varies without it")
-    column = of or (next((c for c in sweep.columns if _is_sampled(c)), "sample.x") if over else telling(sweep))
-    names = sweep.manifest.variation.names
-    if column not in sweep.columns or column in ("row", "message", "verdict.reasons", *map(column_of, names)):
-        raise UsageError(f"--of: the sweep has no column '{column}' to draw", _hint(sweep, column))
-    listed = column.partition(".")[0] in LISTS
-    if over and not _is_sampled(column):
-        raise UsageError(f"--over {TIME}: '{column}' has no samples", "choose one with --of sample.NAME")
-    if not over and len(names) > (1 if listed else 2):
-        most = "a bifurcation diagram shows one varied name" if listed else "a map shows two varied names"
-        raise UsageError(f"{most}, got {', '.join(names)}", "read the dataset with pandas, and draw a part")
-    if not 0 < tail <= 1:
-        raise UsageError(f"--tail: expected a share above 0 and up to 1, got {tail:g}")
-    title = called(sweep.manifest.title, sweep.manifest.model)
-    unit = sweep.manifest.units.get("t" if column.endswith(".time") else column.rpartition(".")[2])
-    label = f"{column} [{unit}]" if unit else column
-    axes = [_axis(sweep, name) for name in names]
-    if over:
-        plots.plot_family(path, _curves(sweep, column), axes[0], label, title)
-        return
-    if listed:
-        values, where = _dots(sweep, column, tail)
-        if not len(values):
-            hint = "draw whole runs with --tail 1" if tail < 1 else ""
-            raise UsageError(f"--of {column}: there is none in the last {tail:g} of each run", hint)
-        plots.plot_dots(path, axes[0], plots.Quantity(label, values), where, title)
-        return
-    numbers = sweep[column]
-    quantity = plots.Quantity(label, numbers if numbers.dtype == object else numbers.astype(float))
-    if len(axes) == 1:
-        plots.plot_curve(path, axes[0], quantity, title)
-    else:
-        plots.plot_map(path, axes[0], axes[1], quantity, title)
-
-
-def telling(sweep: Sweep) -> str:
-    """The column that is drawn where none is named.
-
-    Where transitions were recorded over one name, it is the state before them that they change most, relative to its
-    size, but no time in a mode, and none of whole numbers, as of modes and counters; else the number of transitions.
-    """
-    states = [name for name in sweep.manifest.states if name.rpartition(".")[2] != SINCE]
-    if not (sweep.manifest.recording.transitions and len(sweep.manifest.variation.names) == 1 and states):
-        return "transitions"
-    changes, whole = np.zeros(len(states)), np.ones(len(states), dtype=bool)
-    for table in sweep.batches([f"{side}.{state}" for state in states for side in ("before", "after")]):
-        for k, state in enumerate(states):
-            before, after = (_flat(table, f"{side}.{state}") for side in ("before", "after"))
-            known = np.isfinite(before) & np.isfinite(after) & (before != after)
-            whole[k] &= bool((before[known] % 1 == 0).all() and (after[known] % 1 == 0).all())
-            before, after = before[known], after[known]
-            changes[k] += (np.abs(after - before) / np.maximum(np.abs(before), np.abs(after))).sum()
-    changes[whole] = 0.0
-    return f"before.{states[int(np.argmax(changes))]}" if changes.any() else "transitions"
-
-
-def _flat(table: Any, column: str) -> Array:
-    """The numbers in all lists of a column."""
-    return table.column(column).combine_chunks().flatten().to_numpy(zero_copy_only=False)
-
-
-def _hint(sweep: Sweep, column: str) -> str | None:
-    first = column.partition(".")[0]
-    if first in LISTS:
-        return f"record it: --record {'outputs:every=TIME' if first == 'sample' else 'transitions'}"
-    return did_you_mean(column, sweep.columns)
-
-
-def _axis(sweep: Sweep, name: str) -> Axis:
-    from hsdsl.analysis.plot.analyses import Axis
-
-    manifest: Manifest = sweep.manifest
-    grid = next((grid for grid in manifest.variation.grids if grid.name == name), None)
-    drawn = next((each for each in manifest.variation.draws if each.name == name), None)
-    unit = manifest.units.get(name.removeprefix("initial."))
-    logarithmic = grid.logarithmic if grid else drawn is not None and drawn.distribution.startswith("log")
-    label = f"{name} [{unit}]" if unit else name
-    return Axis(label, sweep[name], grid and grid.values, logarithmic)
-
-
-def _is_sampled(column: str) -> bool:
-    return column.startswith("sample.") and column != SAMPLED
-
-
-def _curves(sweep: Sweep, column: str) -> list[tuple[Array, Array]]:
-    """The times and the values of the samples of each row."""
-    found: list[tuple[Array, Array]] = []
-    for table in sweep.batches([SAMPLED, column]):
-        counts = table.column(SAMPLED).combine_chunks().value_lengths().fill_null(0).to_numpy().astype(int)
-        ends = np.cumsum(counts)[:-1]
-        found += zip(np.split(_flat(table, SAMPLED), ends), np.split(_flat(table, column), ends), strict=True)
-    return found
-
-
-def _dots(sweep: Sweep, column: str, tail: float) -> tuple[Array, Array]:
-    """The numbers of lists in the last part of each run, and the row of each among those that there are."""
-    times = TIMES.get(column.partition(".")[0], SAMPLED)
-    values: list[Any] = [np.empty(0)]
-    where, rows = [np.empty(0, int)], 0
-    for table in sweep.batches(list(dict.fromkeys([column, times, "time"]))):
-        counts = table.column(times).combine_chunks().value_lengths().fill_null(0).to_numpy().astype(int)
-        row, ends = np.repeat(np.arange(table.num_rows), counts), table.column("time").to_numpy()
-        late = _flat(table, times) >= (1 - tail) * ends[row]
-        values.append(_flat(table, column)[late])
-        where.append(row[late] + rows)
-        rows += table.num_rows
-    return np.concatenate(values), np.concatenate(where)
 
 
 Work = Callable[[int], bytes]

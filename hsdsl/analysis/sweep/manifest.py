@@ -47,9 +47,9 @@ from hsdsl.base.atomic import replacing
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean, shown
 from hsdsl.base.numbers.arithmetic import TIE
-from hsdsl.engine.execution import LEFT, Array, Ensemble
+from hsdsl.engine.execution import LEFT, Array, Ensemble, Execution
 from hsdsl.engine.execution.records import optional
-from hsdsl.engine.simulate.stops import limit
+from hsdsl.engine.simulate.stops import limit, show
 
 FILE, FORMAT, VERSION = "_sweep.json", "hsdsl sweep", 1
 
@@ -361,7 +361,7 @@ def _words(manifest: Manifest, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
             messages[k] = limit(int(ensemble.transitions[k]), float(ensemble.time[k])).message
         else:
             run = ensemble.run(k)
-            messages[k] = None if run.stop.complete else run.stop.message
+            messages[k] = None if run.stop.complete else accumulating(run) or run.stop.message
             if judged:
                 verdicts[k], reasons[k] = run.verdict.theorem, run.verdict.reasons
                 warnings[k] = " ".join(sorted({each.code for each in run.warnings if each.time is not None}))
@@ -369,6 +369,20 @@ def _words(manifest: Manifest, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
     yield "verdict", verdicts
     yield "warnings", warnings
     yield "verdict.reasons", reasons
+
+
+NAMED, LATEST = 3, 64  # transitions that a reason names, and the last ones, among which they are sought
+
+
+def accumulating(run: Execution) -> str | None:
+    """The transitions that a run repeats up to a Zeno point, in a short sentence; None where none is repeated."""
+    made = [each.edge for each in run.transitions[-LATEST:]]
+    spans = (n for n in range(1, len(made) // 2 + 1) if made[-n:] == made[-2 * n : -n])
+    if run.stop.reason != "zeno" or not (span := next(spans, 0)):
+        return None
+    edges = [*dict.fromkeys(made[-span:])]
+    named = ", ".join(edges[:NAMED]) + f" and {len(edges) - NAMED} more" * (len(edges) > NAMED)
+    return f"transitions of {named} accumulate at t = {show(run.stop.time)}; no motion is known there"
 
 
 def _lists(arrow: Any, column: tuple[Array, Array], kind: Any) -> Any:

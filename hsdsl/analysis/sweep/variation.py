@@ -105,6 +105,8 @@ def read(given: Sequence[str] | Mapping[str, Any], random: int | None, seed: int
     if random is not None and (random < 1 or not draws):
         what = f"expected at least 1, got {random}" if random < 1 else "nothing is drawn"
         raise UsageError(f"--random: {what}", EXAMPLE)
+    if seed and not draws:
+        raise UsageError("--seed: nothing is drawn", EXAMPLE)
     if seed < 0:
         raise UsageError(f"--seed: expected a number from 0 on, got {seed}")
     if not items:

@@ -5,8 +5,9 @@ A DataFrame has a row for each run, each sample, or each transition.
 
 from __future__ import annotations
 
+import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -123,6 +124,28 @@ class Ensemble:
     def _repr_html_(self) -> str:
         """Show the varied values, the ends of the runs, and a picture in notebooks."""
         return shown("ensemble_html", self)
+
+    def plot(
+        self,
+        path: str | os.PathLike[str],
+        columns: Sequence[str] | None = None,
+        *,
+        shares: Sequence[float] = (0.5, 0.9),
+    ) -> None:
+        """Draw samples over time to a .png or .svg file: the median, and bands that hold shares of the runs.
+
+        Parameters
+        ----------
+        path : path
+        columns : sequence of str, optional
+            States and outputs; left out, all of :attr:`samples`.
+        shares : sequence of float
+            Shares between 0 and 1. A band of the share 0.9 is between the quantiles 0.05 and 0.95 of those runs that
+            have a number at the time.
+
+        Raises UsageError: no samples, sample times that differ, an unknown column, or no share.
+        """
+        shown("ensemble_plot", self, path, columns, shares)
 
     def to_pandas(self, what: Literal["runs", "samples", "transitions"] = "runs") -> Any:
         """Make a pandas DataFrame with a row for each run, each sample, or each transition.

@@ -67,6 +67,7 @@ class Deferred:
 HOMES = {
     "axes": "hsdsl.analysis.plot",
     "ensemble_html": "hsdsl.analysis.plot.notebook",
+    "ensemble_plot": "hsdsl.analysis.plot.ensembles",
     "run_html": "hsdsl.analysis.plot.notebook",
     "save": "hsdsl.analysis.store",
 }

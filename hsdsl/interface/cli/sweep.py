@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Exit
 
 import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
+from hsdsl.base.names import visible
+from hsdsl.base.numbers.decimals import number_of
 from hsdsl.interface.cli.console import progress, say
-from hsdsl.interface.cli.options import Answer, EngineName, Experiment, check_target, model_files, names_of, option
+from hsdsl.interface.cli.options import Answer, Engine, Experiment, check_target, model_files, names_of, option
+
+if TYPE_CHECKING:
+    from hsdsl.analysis.sweep import Sweep
+    from hsdsl.analysis.sweep.manifest import Manifest
+    from hsdsl.analysis.sweep.picture import Picture
+
+OPTIONS = {"overrides": "set"}
 
 Model = Annotated[
     Path | None, Argument(metavar="[MODEL]", help="The model file; not with --show.", autocompletion=model_files)
@@ -25,7 +35,10 @@ RECORD = "What to keep of each run: final, transitions, outputs:every=TIME, outp
 OF = "The column that --plot draws, such as final.x or transitions. before.v and sample.x give a bifurcation diagram."
 OVER = "Draw samples, such as --of sample.x, over time: one curve per row, coloured by what varies."
 CHUNK = "Rows per file. Default: hsdsl times a few runs and chooses."
-TAIL = "The last share of each run, whose transitions and samples a bifurcation diagram shows."
+SLICE = "Draw only the rows where a grid has its value nearest to this. May be repeated."
+WORST = "List the ten rows with the largest numbers of a column, such as final.v; --best lists the least."
+BEST = "List the ten rows with the least numbers of a column."
+TAIL = "The last share of each run, whose transitions and samples a bifurcation diagram shows. Default: 0.5."
 
 
 def sweep(
@@ -34,11 +47,11 @@ def sweep(
     vary: Annotated[list[str] | None, option("NAME=VALUES", VARY)] = None,
     out: Annotated[Path | None, option("DIR", "The folder of the dataset. The same command resumes it.")] = None,
     random: Annotated[int | None, option("N", "Rows at each point of the grids, for random draws.")] = None,
-    seed: Annotated[int, option("S", "Seed of the random draws.")] = 0,
-    record: Annotated[str, option("A,B", RECORD)] = "final",
+    seed: Annotated[int | None, option("S", "Seed of the random draws. Default: 0.")] = None,
+    record: Annotated[str | None, option("A,B", RECORD + " Default: final.")] = None,
     outputs: Annotated[str | None, option("A,B", "Keep only these states and outputs.")] = None,
     experiment: Experiment,
-    engine: EngineName = "auto",
+    engine: Annotated[Engine | None, option("ENGINE", "auto, c or python. Default: auto.")] = None,
     cluster: Annotated[str | None, option("ADDRESS", "The scheduler of a Dask cluster.")] = None,
     processes: Annotated[int | None, option("N", "Number of processes on this machine. Default: one per core.")] = None,
     chunk: Annotated[int | None, option("ROWS", CHUNK)] = None,
@@ -46,37 +59,95 @@ def sweep(
     plot: Annotated[Path | None, option("FILE", "Draw the dataset: .png or .svg.")] = None,
     of: Annotated[str | None, option("COLUMN", OF)] = None,
     over: Annotated[str | None, option("time", OVER)] = None,
-    tail: Annotated[float, option("SHARE", TAIL)] = 0.5,
+    tail: Annotated[float | None, option("SHARE", TAIL)] = None,
+    part: Annotated[list[str] | None, option("NAME=VALUE", SLICE, "--slice")] = None,
+    worst: Annotated[str | None, option("COLUMN", WORST)] = None,
+    best: Annotated[str | None, option("COLUMN", BEST)] = None,
     answer: Answer,
 ) -> None:
     """Run a model for many values, and write a dataset of Parquet files."""
     with answer.reporting():
         check_target(plot, "--plot")
-        _check(model, vary, out, show)
-        if show is not None:
-            from hsdsl.analysis.sweep import load
+        drawing = {"of": of, "over": over, "tail": tail, "slice": part}
+        running: dict[str, Any] = {"random": random, "seed": seed, "record": record, "engine": engine}
+        running |= {"cluster": cluster, "processes": processes, "chunk": chunk, "outputs": names_of(outputs) or None}
+        _check(model, out, show, given(vary=vary, out=out, **running, **experiment._asdict()), plot, given(**drawing))
+        from hsdsl.analysis.sweep.dataset import check_ranked, load
+        from hsdsl.analysis.sweep.picture import Picture
 
+        picture = Picture(of, 0.5 if tail is None else tail, over, _numbers_of(part))
+        ranked = {"worst": worst, "best": best}
+
+        def check(manifest: Manifest) -> None:
+            if plot is not None or given(**drawing):
+                picture.check(manifest)
+            for column in filter(None, ranked.values()):
+                check_ranked(manifest, column)
+
+        if show is not None:
             found = load(show)
+            check(found.manifest)
         else:
-            settings = experiment.settings(
-                engine=engine, random=random, seed=seed, record=record, cluster=cluster, processes=processes,
-                chunk=chunk, outputs=names_of(outputs) or None,
-            )  # fmt: skip
             assert model is not None and out is not None
-            found = _run(model, vary or [], out, settings, answer.hidden)
+            settings = experiment.settings(**given(**running))
+            found = _run(model, vary or [], out, settings | {"check": check}, answer.hidden)
         target = plot or (show and show / "_picture.png")
         if target is not None:
-            _draw(found, target, of, {"tail": tail, "over": over}, any(x is not None for x in (plot, of, over)))
-        answer.give(found.as_json, lambda: found.summary)
+            _draw(found, target, picture, plot is not None or bool(given(**drawing)))
+        rows = {how: getattr(found, how)(column) for how, column in ranked.items() if column}
+        answer.give(lambda: found.as_json() | rows, lambda: "\n".join([found.summary, *_listed(found, rows, ranked)]))
 
 
-def _check(model: Path | None, vary: list[str] | None, out: Path | None, show: Path | None) -> None:
-    if show is not None and (model, vary, out) != (None, None, None):
-        raise UsageError("--show shows a dataset that is there, and takes neither MODEL nor --vary nor --out")
+def given(**options: Any) -> dict[str, Any]:
+    """The options that a command line has."""
+    return {name: value for name, value in options.items() if value not in (None, [])}
+
+
+def _check(
+    model: Path | None,
+    out: Path | None,
+    show: Path | None,
+    running: Mapping[str, Any],
+    plot: Path | None,
+    drawing: Mapping[str, Any],
+) -> None:
+    """Refuse options that are for something else."""
+    if show is not None and (model or running):
+        names = ", ".join([*["MODEL"] * bool(model), *(f"--{OPTIONS.get(name, name)}" for name in running)])
+        raise UsageError(f"--show shows a dataset that is there, and takes no {names}")
     if show is None and model is None:
         raise UsageError("expected a model, or --show DIR", "hsdsl sweep MODEL --vary c=0.5:0.9:101 --out DIR")
     if show is None and out is None:
         raise UsageError("expected --out DIR, the folder of the dataset", "for example --out sweep")
+    if show is None and plot is None and drawing:
+        raise UsageError(f"--{next(iter(drawing))} is of a picture, and there is none", "give --plot FILE")
+    if "cluster" in running and "processes" in running:
+        raise UsageError("--processes counts those here, and --cluster uses none of them", "leave one out")
+
+
+def _numbers_of(texts: list[str] | None) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for text in texts or ():
+        name, _, value = (part.strip() for part in text.partition("="))
+        if not name or (number := number_of(value)) is None:
+            raise UsageError(f"--slice: expected NAME=NUMBER, got '{text}'", "for example --slice c=0.8")
+        found[name] = number
+    return found
+
+
+def _listed(found: Sweep, rows: Mapping[str, list[dict[str, Any]]], ranked: Mapping[str, str | None]) -> Iterator[str]:
+    """The rows at one end as a table, and the command that makes the first of them again."""
+    for how, kept in rows.items():
+        yield f"\n{how} rows by {ranked[how]}" + ("" if kept else ": no row has a number")
+        table = [[*map(visible, kept[0])], *([_cell(x) for x in row.values()] for row in kept)] if kept else []
+        widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+        yield from ("  " + "  ".join(map(str.ljust, line, widths)).rstrip() for line in table)
+        if kept:
+            yield f"  again: {found.command(kept[0]['row'])}"
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.9g}" if isinstance(value, float) else visible(str(value))
 
 
 def _run(model: Path, vary: list[str], out: Path, settings: dict[str, Any], quiet: bool) -> Any:
@@ -128,9 +199,9 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
-def _draw(found: Any, plot: Path, of: str | None, options: dict[str, Any], needed: bool) -> None:
+def _draw(found: Sweep, plot: Path, picture: Picture, needed: bool) -> None:
     try:
-        found.plot(plot, of, **options)
+        picture.draw(found, plot)
         say(f"wrote {plot}")
     except UsageError as error:
         if needed:

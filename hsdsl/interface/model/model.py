@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from hsdsl.analysis.orbits.orbit import Orbit
     from hsdsl.analysis.orbits.sampling import OrbitalStability
     from hsdsl.analysis.sweep import Sweep
+    from hsdsl.analysis.sweep.manifest import Manifest
     from hsdsl.interface.model.estimate import Estimate
     from hsdsl.interface.model.stream import Streamed
 
@@ -324,6 +325,7 @@ class Model(Runs):
         processes: int | None = None,
         chunk: int | None = None,
         progress: Callable[[int, int], None] | None = None,
+        check: Callable[[Manifest], None] | None = None,
         **arguments: Any,
     ) -> Sweep:
         """Run the model over many values into a dataset of Parquet files, on all cores or on a Dask cluster.
@@ -354,6 +356,8 @@ class Model(Runs):
             Rows of each file; by default it follows from a few timed runs.
         progress : callable, optional
             Called after each chunk with the number of finished rows and their total number.
+        check : callable, optional
+            Called with what is planned, before the first run; it may raise UsageError.
         **arguments
             Further arguments of :meth:`simulate` for every run, except ``precision``, ``samples`` and ``watch``.
 
@@ -364,7 +368,7 @@ class Model(Runs):
         with in_notebook() as show:
             progress = progress or counted(show, "rows")
             asked = {"vary": vary, "random": random, "seed": seed, "record": record, "outputs": outputs}
-            return sweep(self, Path(out), cluster, processes, chunk, progress, **asked, arguments=arguments)
+            return sweep(self, Path(out), cluster, processes, chunk, progress, check, **asked, arguments=arguments)
 
     def completed(self) -> str | None:
         """Return the text of the model with modes for motion along guards and for sliding; None if there are none.

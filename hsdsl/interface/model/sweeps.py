@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import time
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -39,12 +39,15 @@ def sweep(
     processes: int | None,
     chunk: int | None,
     progress: Progress | None,
+    check: Callable[[Manifest], None] | None = None,
     **asked: Any,
 ) -> Sweep:
-    """Run a sweep, or what is missing of it; what is ``asked`` for is in its manifest."""
+    """Run a sweep, or what is missing of it; what is ``asked`` for is in its manifest, which ``check`` may refuse."""
     library("pyarrow.parquet")
     model = model if asked["outputs"] is None else model.only(asked["outputs"])
     planned = _planned(model, chunk, **asked)
+    if check is not None:
+        check(planned)
     with _place(cluster, processes or cores()) as run:
         work, missing = _begun(model, planned, folder, chunk, processes or cores(), cluster is None)
         _fill(work, folder, missing, run, progress)

@@ -1,0 +1,79 @@
+# pyright: reportUnknownMemberType=false
+"""Pictures of ensembles: medians of samples over time, with bands that hold shares of the runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hsdsl.analysis.plot.curves import checked
+from hsdsl.analysis.plot.style import PALETTE, empty, legend_below, to_file
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import called, counted
+from hsdsl.base.numbers.arithmetic import TIE
+from hsdsl.engine.execution import Array, Ensemble
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class Spread(NamedTuple):
+    """Quantiles of a column at each time: the median, and by share the two that hold it, the widest first."""
+
+    median: Array
+    bands: dict[float, tuple[Array, Array]]
+
+    @classmethod
+    def of(cls, values: Array, shares: Sequence[float]) -> Spread:
+        """The quantiles over the first axis of those runs that have a number; not-a-number where none has."""
+        known = ~np.isnan(values).all(axis=0)
+
+        def quantile(q: float) -> Array:
+            found = np.full(values.shape[1], np.nan)
+            found[known] = np.nanquantile(values[:, known], q, axis=0)
+            return found
+
+        bands = {p: (quantile((1 - p) / 2), quantile((1 + p) / 2)) for p in sorted(shares, reverse=True)}
+        return cls(quantile(0.5), bands)
+
+
+def ensemble_plot(
+    ensemble: Ensemble, path: str | os.PathLike[str], columns: Sequence[str] | None, shares: Sequence[float]
+) -> None:
+    """Draw the samples of an ensemble; see `Ensemble.plot`."""
+    if not ensemble.samples:
+        raise UsageError("the ensemble has no samples", "give samples= to model.ensemble")
+    if wrong := [share for share in shares if not 0 < share < 1]:
+        raise UsageError(f"expected shares between 0 and 1, got {wrong[0]:g}")
+    names = [checked(name, [*ensemble.samples]) for name in (ensemble.samples if columns is None else columns)]
+    times = ensemble.sample_times.reshape(ensemble.stop.size, -1)
+    known = ~np.isnan(times).all(axis=0)
+    latest, earliest = np.nanmax(times[:, known], axis=0), np.nanmin(times[:, known], axis=0)
+    if np.any(latest - earliest > TIE * np.abs(latest)):
+        raise UsageError("the sample times of the instances differ", "give samples= as a list of times")
+    tables = {name: ensemble.samples[name].reshape(len(times), -1)[:, known].astype(float) for name in names}
+    title = f"{called(ensemble.title, ensemble.model)}: {counted(len(times), 'run')}"
+    if failed := int(ensemble.failed.sum()):
+        title += f", {failed:,} of which did not reach the end"
+    _draw(path, latest, {name: Spread.of(table, shares) for name, table in tables.items()}, title)
+
+
+@to_file
+def _draw(times: Array, spreads: dict[str, Spread], title: str) -> Figure:
+    figure = empty(9, 1.3 + 2.4 * len(spreads))
+    axes = figure.subplots(len(spreads), 1, squeeze=False, sharex=True)[:, 0]
+    for axis, (name, spread) in zip(axes, spreads.items(), strict=True):
+        for k, (share, (low, high)) in enumerate(spread.bands.items()):
+            alpha = 0.2 + 0.25 * k / max(1, len(spread.bands) - 1)
+            label = f"{100 * share:.3g} % of the runs"
+            axis.fill_between(times, low, high, color=PALETTE[5], alpha=alpha, linewidth=0, label=label)
+        axis.plot(times, spread.median, color=PALETTE[5], linewidth=1.4, label="median")
+        axis.set_ylabel(name, parse_math=False)
+        axis.margins(x=0)
+    axes[-1].set_xlabel("time t")
+    figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
+    legend_below(figure, axes[0].get_legend_handles_labels()[0], 9.0)
+    return figure
