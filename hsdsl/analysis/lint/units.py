@@ -23,20 +23,7 @@ from hsdsl.analysis.lint.source_expressions import TIME, SourceExpression
 from hsdsl.base.functions import CONSTANTS  # pyright: ignore[reportUnknownVariableType]
 from hsdsl.base.names import SINCE
 from hsdsl.language.expression import ExpressionError, parse
-from hsdsl.language.expression.parse import (
-    Call,
-    Comparison,
-    Logic,
-    Name,
-    Negative,
-    Not,
-    Number,
-    Power,
-    Product,
-    Sum,
-    Tree,
-    Truth,
-)
+from hsdsl.language.expression.parse import Call, Comparison, Logic, Name, Not, Number, Power, Product, Sum, Tree, Truth
 from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, ParameterEntry
 from hsdsl.language.source import Scalar
 
@@ -181,8 +168,8 @@ def exponent_of(tree: Tree) -> Fraction | None:
     match tree:
         case Number():
             return tree.value if abs(tree.value) <= _LARGEST_POWER else None
-        case Negative():
-            inner = exponent_of(tree.operand)
+        case Sum(((True, operand),)):
+            inner = exponent_of(operand)
             return None if inner is None else -inner
         case Product():
             result = Fraction(1)
@@ -253,8 +240,6 @@ class Walk:
                 return "any" if tree.value else "unknown"
             case Name():
                 return "any" if tree.name in CONSTANTS else self.unit_of(tree.name)
-            case Negative():
-                return self.measure(tree.operand)
             case Sum():
                 return self._alike([term for _, term in tree.terms], "added to")
             case Product():
@@ -306,7 +291,12 @@ class Walk:
         return "any" if plain or (free and result.pure) else result
 
     def _number(self, tree: Tree) -> bool:
-        return isinstance(tree, Number) or (isinstance(tree, Negative) and self._number(tree.operand))
+        """Whether a factor is a number, perhaps with signs."""
+        match tree:
+            case Sum(((True, operand),)):
+                return self._number(operand)
+            case _:
+                return isinstance(tree, Number)
 
     def _power(self, tree: Power) -> Measure:
         self._pure(tree.exponent, "an exponent")

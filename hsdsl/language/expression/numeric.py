@@ -12,7 +12,7 @@ from typing import Any
 import mpmath
 import sympy as sp
 
-from hsdsl.language.expression.parse import Call, Negative, Power, Product, Sum, Tree
+from hsdsl.language.expression.parse import Call, Power, Product, Sum, Tree
 from hsdsl.language.expression.scope import Value
 
 _BITS = 200  # far beyond both doubles and the fifty digits of a precise run
@@ -86,8 +86,6 @@ def apply(function: str, arguments: list[Any]) -> Any:
 def of_node(tree: Tree, numbers: list[Any]) -> Any:
     """The number of a node whose parts have these; None where one is unknown, NaN where it has none."""
     match tree:
-        case Negative():
-            return product([*numbers, -1])
         case Sum():
             signed = zip(numbers, tree.terms, strict=True)
             return total([n if n is None or not minus else -n for n, (minus, _) in signed])

@@ -47,17 +47,8 @@ class Name:
 
 
 @dataclass(frozen=True, slots=True)
-class Negative:
-    """``-operand``."""
-
-    operand: Tree
-    start: int
-    end: int
-
-
-@dataclass(frozen=True, slots=True)
 class Sum:
-    """Terms added (False) or subtracted (True), from left to right."""
+    """Terms added (False) or subtracted (True), from left to right; ``-x`` is a sum of one."""
 
     terms: tuple[tuple[bool, Tree], ...]
     start: int
@@ -131,7 +122,7 @@ class Truth:
     end: int
 
 
-Tree = Number | Name | Negative | Sum | Product | Power | Call | Comparison | Logic | Not | Truth
+Tree = Number | Name | Sum | Product | Power | Call | Comparison | Logic | Not | Truth
 
 
 def children(tree: Tree) -> tuple[Tree, ...]:
@@ -139,7 +130,7 @@ def children(tree: Tree) -> tuple[Tree, ...]:
     match tree:
         case Number() | Name() | Truth():
             return ()
-        case Negative() | Not():
+        case Not():
             return (tree.operand,)
         case Sum():
             return tuple(term for _, term in tree.terms)
@@ -167,7 +158,7 @@ def mapped(tree: Tree, change: Callable[[Tree], Tree]) -> Tree:
     match tree:
         case Number() | Name() | Truth():
             return tree
-        case Negative() | Not():
+        case Not():
             return replace(tree, operand=change(tree.operand))
         case Sum():
             return replace(tree, terms=tuple((minus, change(term)) for minus, term in tree.terms))
@@ -345,7 +336,7 @@ class _Parser:
         if first.text in ("-", "+"):
             negative = self.skipped(("-", "+")).count("-") % 2 == 1
             operand = self.expression(_POWER)
-            return Negative(operand, first.start, self.tokens[self.at - 1].end) if negative else operand
+            return Sum(((True, operand),), first.start, self.tokens[self.at - 1].end) if negative else operand
         if first.text == "not":
             denied = len(self.skipped(("not",))) % 2 == 1
             operand = self.expression(_COMPARE)

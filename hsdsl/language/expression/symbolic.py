@@ -18,7 +18,6 @@ from hsdsl.language.expression.parse import (
     ExpressionError,
     Logic,
     Name,
-    Negative,
     Not,
     Number,
     Power,
@@ -87,7 +86,7 @@ class _Builder:
                 value = self.scope.values[tree.name]
                 assert isinstance(value, Value)
                 return value
-            case Negative() | Sum() | Product() | Power() | Call():
+            case Sum() | Product() | Power() | Call():
                 parts = [self.number(part) for part in children(tree)]
                 try:
                     return self.of_parts(tree, parts)
@@ -165,8 +164,6 @@ class _Builder:
 def _made(tree: Tree, exprs: list[Any]) -> Any:
     """What SymPy makes of the parts of a node; it may fail (a sine of 1e308, exactly)."""
     match tree:
-        case Negative():
-            return -exprs[0]
         case Sum():
             return sp.Add(*(-expr if minus else expr for expr, (minus, _) in zip(exprs, tree.terms, strict=True)))
         case Product():

@@ -7,7 +7,6 @@ from hsdsl.language.expression.parse import (
     Comparison,
     ExpressionError,
     Logic,
-    Negative,
     Not,
     Number,
     Power,
@@ -35,10 +34,10 @@ class _Printer:
 
     def written(self, tree: Tree) -> Written:
         match tree:
-            case Negative(Negative(operand)):
+            case Sum(((True, Sum(((True, operand),))),)):
                 return self.written(operand)
-            case Negative():
-                return self.negative(self.written(tree.operand))
+            case Sum(((True, operand),)):
+                return self.negative(self.written(operand))
             case Sum():
                 return self.sum(tree)
             case Product():
@@ -101,6 +100,8 @@ def _enclosed(written: Written, weakest: int) -> str:
 
 def _unit(tree: Tree) -> int:
     """1 or -1 where a factor is that number, else 0."""
-    if isinstance(tree, Negative):
-        return -_unit(tree.operand)
-    return int(isinstance(tree, Number) and tree.value == 1)
+    match tree:
+        case Sum(((True, operand),)):
+            return -_unit(operand)
+        case _:
+            return int(isinstance(tree, Number) and tree.value == 1)

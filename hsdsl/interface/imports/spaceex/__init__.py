@@ -15,7 +15,7 @@ from hsdsl.base.names import did_you_mean, shown
 from hsdsl.interface.imports import end_of_run
 from hsdsl.interface.imports.spaceex.document import Component, Configuration, components, configuration
 from hsdsl.interface.imports.spaceex.modes import Judge, ModeDraft, TransitionDraft, lone_draft, mode_drafts
-from hsdsl.interface.imports.spaceex.network import Automaton, Key, Network, automaton, flattened
+from hsdsl.interface.imports.spaceex.network import Arrow, Key, Network, automaton, flattened
 from hsdsl.interface.imports.spaceex.start import (
     Start,
     admits,
@@ -63,10 +63,10 @@ def imported(
     begin = start(network, configured, system.name, corner)
     constants = {s: v for s, v in begin.numbers.items() if s.name in network.constants}
     first, others = _first(network, configured, system, begin, constants)
-    found = automaton(network, first)
-    drafts = mode_drafts(network, found, constants)
+    places, arrows = automaton(network, first)
+    drafts = mode_drafts(network, places, arrows, constants)
     refuse_outside(drafts[first], begin, configured, system.element)
-    transitions = _transitions(str(path), found, drafts, urgent)
+    transitions = _transitions(str(path), arrows, drafts, urgent)
     horizon = configured.horizon and configured.horizon.text.strip()
     given = until or (None if horizon and horizon.startswith("-") else horizon)  # a negative one: without end
     end = end_of_run(given, "give --until, or time-horizon in the configuration")
@@ -75,7 +75,7 @@ def imported(
         *filter(None, [system.note]),
         *(f"{key} = {text}" for key, text in configured.others.items() if key == "forbidden"),
     ]
-    assumed = list(assumptions(network, begin, found.places[first].name if others else None))
+    assumed = list(assumptions(network, begin, places[first].name if others else None))
     return written(f"SpaceEx model {names}", system.name, notes, assumed, drafts, transitions, begin, first, end)
 
 
@@ -96,12 +96,12 @@ def _first(
 
 
 def _transitions(
-    path: str, found: Automaton, drafts: Mapping[Key, ModeDraft], urgent: bool
+    path: str, arrows: Sequence[Arrow], drafts: Mapping[Key, ModeDraft], urgent: bool
 ) -> dict[Key, list[TransitionDraft]]:
     findings = Findings(path)
     judge = Judge(findings, urgent)
     transitions: dict[Key, list[TransitionDraft]] = {key: [] for key in drafts}
-    for arrow in found.arrows:
+    for arrow in arrows:
         transitions[arrow.source] += judge.transitions(arrow, drafts[arrow.source], drafts[arrow.target])
     for key, leaving in transitions.items():
         judge.choices(leaving, drafts[key])

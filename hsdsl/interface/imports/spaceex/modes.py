@@ -18,23 +18,25 @@ from hsdsl.base.errors import Findings, ModelError
 from hsdsl.base.functions import replaced
 from hsdsl.base.names import shown
 from hsdsl.interface.imports.spaceex.document import Relation, names_in, value, within
-from hsdsl.interface.imports.spaceex.network import Arrow, Automaton, Key, Network, Place, place
+from hsdsl.interface.imports.spaceex.network import Arrow, Key, Network, Place, place
 from hsdsl.interface.imports.spaceex.points import decide
 from hsdsl.language.expression.algebra import lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.mathematics.decisions.search import Answer, Constraint, at_most_zero, negative, positive, zero
 
 
-def mode_drafts(network: Network, found: Automaton, constants: Mapping[Any, Any]) -> dict[Key, ModeDraft]:
+def mode_drafts(
+    network: Network, places: Mapping[Key, Place], arrows: Sequence[Arrow], constants: Mapping[Any, Any]
+) -> dict[Key, ModeDraft]:
     """A mode for each place.
 
     Raises ModelError: a variable without a derivative, or an equation that the flow does not keep.
     """
-    arrows: dict[Key, list[Arrow]] = {}
-    for arrow in found.arrows:
-        arrows.setdefault(arrow.source, []).append(arrow)
-    drafts = {key: _draft(network, place, arrows.get(key, []), constants) for key, place in found.places.items()}
-    for arrow in found.arrows:
+    leaving: dict[Key, list[Arrow]] = {}
+    for arrow in arrows:
+        leaving.setdefault(arrow.source, []).append(arrow)
+    drafts = {key: _draft(network, place, leaving.get(key, []), constants) for key, place in places.items()}
+    for arrow in arrows:
         _refuse_loose(arrow, drafts[arrow.source], drafts[arrow.target])
     return drafts
 

@@ -224,34 +224,25 @@ class Arrow:
     element: Element
 
 
-@dataclass
-class Automaton:
-    """Places that can be reached from the first one, and arrows."""
-
-    places: dict[Key, Place] = field(default_factory=dict[Key, Place])
-    arrows: list[Arrow] = field(default_factory=list[Arrow])
-
-
-def automaton(network: Network, start: Key) -> Automaton:
-    """Follow all transitions from the locations in which the instances start.
+def automaton(network: Network, start: Key) -> tuple[dict[Key, Place], list[Arrow]]:
+    """The places that can be reached from the locations in which the instances start, and the arrows there.
 
     Raises ModelError: too many locations, or instances that contradict each other.
     """
-    found = Automaton()
-    waiting = [start]
+    places, arrows, waiting = dict[Key, Place](), list[Arrow](), [start]
     most = limits.current().modes
     while waiting:
         key = waiting.pop(0)
-        if key in found.places:
+        if key in places:
             continue
-        if len(found.places) >= most or len(found.arrows) > MOST_EDGES:
+        if len(places) >= most or len(arrows) > MOST_EDGES:
             message = f"the network has more than {most:,} locations or {MOST_EDGES:,} transitions"
             raise ModelError([network.instances[0].component.element.fault("HS332", message)])
-        found.places[key] = place(network, key, [known.name for known in found.places.values()])
-        arrows = list(islice(_arrows(network, key), MOST_EDGES))
-        found.arrows += arrows
-        waiting += [arrow.target for arrow in arrows]
-    return found
+        places[key] = place(network, key, [known.name for known in places.values()])
+        leaving = list(islice(_arrows(network, key), MOST_EDGES))
+        arrows += leaving
+        waiting += [arrow.target for arrow in leaving]
+    return places, arrows
 
 
 def place(network: Network, key: Key, taken: Collection[str]) -> Place:
