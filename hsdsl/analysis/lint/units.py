@@ -23,7 +23,7 @@ from hsdsl.analysis.lint.source_expressions import TIME, SourceExpression
 from hsdsl.base.functions import CONSTANTS  # pyright: ignore[reportUnknownVariableType]
 from hsdsl.base.names import SINCE
 from hsdsl.language.expression import ExpressionError, parse
-from hsdsl.language.expression.parse import Call, Comparison, Logic, Name, Not, Number, Power, Product, Sum, Tree, Truth
+from hsdsl.language.expression.parse import Call, Comparison, Logic, Name, Number, Power, Product, Sum, Tree, Truth
 from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, ParameterEntry
 from hsdsl.language.source import Scalar
 
@@ -254,8 +254,6 @@ class Walk:
                 for operand in tree.operands:
                     self.measure(operand)
                 return "unknown"
-            case Not():
-                return self.measure(tree.operand)
             case Truth():
                 return "unknown"
 

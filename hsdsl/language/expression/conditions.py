@@ -16,7 +16,7 @@ from hsdsl.base.functions import absolute, below
 from hsdsl.base.names import shown
 from hsdsl.language.expression import symbolic
 from hsdsl.language.expression.algebra import either
-from hsdsl.language.expression.parse import Comparison, ExpressionError, Logic, Not, Tree, Truth
+from hsdsl.language.expression.parse import Comparison, ExpressionError, Logic, Tree, Truth
 from hsdsl.language.expression.scope import Scope, Value
 
 
@@ -46,7 +46,7 @@ def the_comparison(tree: Tree, key: str, text: str) -> Comparison:
 
     Raises ExpressionError: otherwise, with what to write under ``key``.
     """
-    if isinstance(tree, (Logic, Not)) or (isinstance(tree, Comparison) and len(tree.operands) > 2):
+    if isinstance(tree, Logic) or (isinstance(tree, Comparison) and len(tree.operands) > 2):
         message = f"`{key}` takes one inequality"
         raise ExpressionError("HS116", message, tree.start, tree.end, _apart(tree, key, text))
     if not isinstance(tree, Comparison):
@@ -68,7 +68,11 @@ def _apart(tree: Tree, key: str, text: str) -> str:
     if key != "when":
         return "write each inequality as an item of its own"
     event = f"write event: {_said(tree, text)}, which is made where that turns true"
-    if not (isinstance(tree, Logic) and all(isinstance(operand, Comparison) for operand in tree.operands)):
+    if (
+        not isinstance(tree, Logic)
+        or tree.operator == "not"
+        or not all(isinstance(o, Comparison) for o in tree.operands)
+    ):
         return event
     if tree.operator == "or":
         return "write a transition for each: " + "; ".join(f"when: {_said(o, text)}" for o in tree.operands)
@@ -192,11 +196,11 @@ def trigger_of(tree: Tree, scope: Scope, text: str, positive: bool = True) -> Tr
     match tree:
         case Truth():
             return tree.value == positive
-        case Not():
-            return trigger_of(tree.operand, scope, text, not positive)
+        case Logic("not", (operand,)):
+            return trigger_of(operand, scope, text, not positive)
         case Logic():
-            word = tree.operator if positive else {"and": "or", "or": "and"}[tree.operator]
-            return Joined(word, tuple(trigger_of(part, scope, text, positive) for part in tree.operands))  # pyright: ignore[reportArgumentType]
+            word = "and" if (tree.operator == "and") == positive else "or"
+            return Joined(word, tuple(trigger_of(part, scope, text, positive) for part in tree.operands))
         case Comparison():
             pairs = zip(tree.operators, tree.operands, tree.operands[1:], strict=False)
             parts = tuple(_reached(tree, *pair, scope, text, positive) for pair in pairs)

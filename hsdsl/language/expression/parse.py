@@ -96,19 +96,10 @@ class Comparison:
 
 @dataclass(frozen=True, slots=True)
 class Logic:
-    """Conditions joined by `and` or by `or`."""
+    """Conditions joined by `and` or by `or`, or one with `not` before it."""
 
-    operator: Literal["and", "or"]
+    operator: Literal["and", "or", "not"]
     operands: tuple[Tree, ...]
-    start: int
-    end: int
-
-
-@dataclass(frozen=True, slots=True)
-class Not:
-    """``not operand``."""
-
-    operand: Tree
     start: int
     end: int
 
@@ -122,7 +113,7 @@ class Truth:
     end: int
 
 
-Tree = Number | Name | Sum | Product | Power | Call | Comparison | Logic | Not | Truth
+Tree = Number | Name | Sum | Product | Power | Call | Comparison | Logic | Truth
 
 
 def children(tree: Tree) -> tuple[Tree, ...]:
@@ -130,8 +121,6 @@ def children(tree: Tree) -> tuple[Tree, ...]:
     match tree:
         case Number() | Name() | Truth():
             return ()
-        case Not():
-            return (tree.operand,)
         case Sum():
             return tuple(term for _, term in tree.terms)
         case Product():
@@ -158,8 +147,6 @@ def mapped(tree: Tree, change: Callable[[Tree], Tree]) -> Tree:
     match tree:
         case Number() | Name() | Truth():
             return tree
-        case Not():
-            return replace(tree, operand=change(tree.operand))
         case Sum():
             return replace(tree, terms=tuple((minus, change(term)) for minus, term in tree.terms))
         case Product():
@@ -340,8 +327,8 @@ class _Parser:
         if first.text == "not":
             denied = len(self.skipped(("not",))) % 2 == 1
             operand = self.expression(_COMPARE)
-            inner = Not(operand, first.start, self.tokens[self.at - 1].end)
-            return inner if denied else Not(inner, inner.start, inner.end)
+            inner = Logic("not", (operand,), first.start, self.tokens[self.at - 1].end)
+            return inner if denied else Logic("not", (inner,), inner.start, inner.end)
         return self.operand()
 
     def skipped(self, texts: tuple[str, ...]) -> list[str]:

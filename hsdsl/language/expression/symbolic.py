@@ -18,7 +18,6 @@ from hsdsl.language.expression.parse import (
     ExpressionError,
     Logic,
     Name,
-    Not,
     Number,
     Power,
     Product,
@@ -141,11 +140,9 @@ class _Builder:
         match tree:
             case Truth():
                 return sp.true if tree.value else sp.false
-            case Not():
-                return sp.Not(self.condition(tree.operand))
             case Logic():
-                parts = [self.condition(operand) for operand in tree.operands]
-                return sp.And(*parts) if tree.operator == "and" else sp.Or(*parts)
+                joined = {"and": sp.And, "or": sp.Or, "not": sp.Not}[tree.operator]
+                return joined(*(self.condition(operand) for operand in tree.operands))
             case Comparison():
                 values = [self.number(operand).expr for operand in tree.operands]
                 pairs = zip(tree.operators, values, values[1:], strict=False)

@@ -7,7 +7,6 @@ from hsdsl.language.expression.parse import (
     Comparison,
     ExpressionError,
     Logic,
-    Not,
     Number,
     Power,
     Product,
@@ -50,11 +49,11 @@ class _Printer:
                 first, *others = (self.within(part, _ADD) for part in tree.operands)
                 pairs = zip(tree.operators, others, strict=True)
                 return first + "".join(f" {sign} {other}" for sign, other in pairs), _COMPARE
+            case Logic("not", (operand,)):
+                return f"not {self.within(operand, _COMPARE)}", _NOT
             case Logic():
                 binding = _OR if tree.operator == "or" else _AND
                 return f" {tree.operator} ".join(self.within(part, binding) for part in tree.operands), binding
-            case Not():
-                return f"not {self.within(tree.operand, _COMPARE)}", _NOT
             case _:
                 return self.text[tree.start : tree.end], _ATOM
 
