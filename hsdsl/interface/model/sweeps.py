@@ -197,7 +197,7 @@ def _begun(
 
 
 PROBES, BYTES, MOST_ROWS = 16, 64e6, 100_000
-SECONDS, LEAST_SECONDS = 2.0, 0.1  # of a chunk
+SECONDS, LEAST_SECONDS = 2.0, 0.25  # of a chunk, which takes 0.01 s besides its rows
 PROBED, GROWTH = 0.004, 8  # seconds that tell how long a row takes, and by how much more rows are tried for them
 CHUNKS_A_CORE = 16  # so that no core waits long for the last chunk
 
@@ -240,7 +240,7 @@ class ChunkWork:
             groups["initial" if name.startswith(INITIAL) else "parameters"][name.removeprefix(INITIAL)] = values
         kept = self.manifest.recording
         found = run_ensemble(self.model, call | groups, kept.samples, 0, self.threads, None, kept.transitions)
-        if "interrupted" in found.reasons:
+        if (found.stop == "interrupted").any():
             raise KeyboardInterrupt
         return found
 
