@@ -46,17 +46,12 @@ def cycle(following: Mapping[T, Iterable[T]]) -> list[T] | None:
 class Elimination:
     """Entries of the factors, row by row, rows and columns numbered in the order of elimination."""
 
+    size: int  # how many entries there are
     order: list[int]  # the unknown of each row
     start: list[int]  # row i has the entries from start[i] to start[i + 1],
     column: list[int]  # in these columns, which go up;
     diagonal: list[int]  # diagonal[i] is the one of its own
     place: list[int]  # for each entry of J the entry of the factors where it goes
-    own: list[int]  # for each unknown which entry of J is the derivative of its flow by itself, -1 for none
-
-    @property
-    def size(self) -> int:
-        """How many entries the factors have."""
-        return len(self.column)
 
 
 @lru_cache(maxsize=64)
@@ -74,17 +69,13 @@ def elimination(places: tuple[int, ...], order: tuple[int, ...]) -> Elimination:
     rows = [[*below[i], i, *sorted(above[i])] for i in range(n)]
     start = [0, *accumulate(map(len, rows))]
     where = [{column: start[i] + at for at, column in enumerate(row)} for i, row in enumerate(rows)]
-    own = [-1] * n
-    for index, k in enumerate(places):
-        if k // n == k % n:
-            own[k // n] = index
     return Elimination(
+        size=sum(map(len, rows)),
         order=list(order),
         start=start,
         column=[column for row in rows for column in row],
         diagonal=[where[i][i] for i in range(n)],
         place=[where[position[k // n]][position[k % n]] for k in places],
-        own=own,
     )
 
 
@@ -100,13 +91,14 @@ class Variation:
     """
 
     own: int  # how many states x has; they are the first ones
+    count: int  # of columns
     columns: list[int]  # where each column begins, and where the last one ends: behind it states do not flow
     rows: list[int]  # for each state of a column, from columns[0] on, which state of x it is the derivative of
     entries: int  # how many entries of J are those of f_x for x; they are the first ones
-    links: list[int]  # the entries of J that are derivatives of a column by x;
+    links: int  # how many derivatives of columns by x there are,
+    link: list[int]  # which entries of J they are;
     linked: list[int]  # for each of them which state it is the derivative of,
     linking: list[int]  # and by which
-    itself: list[int]  # for each state which entry of J is the derivative of its flow by itself, -1 for none
     groups: list[int]
     elimination: Elimination | None  # the pattern for f_x, where it is sparse
 
@@ -121,16 +113,16 @@ def variation(
     """
     inside = [k for k in places if k // n < own]
     links = [index for index, k in enumerate(places) if k // n >= own > k % n]
-    itself = {k // n: index for index, k in enumerate(places) if k // n == k % n}
     return Variation(
         own=own,
+        count=len(varied),
         columns=list(accumulate(map(len, varied), initial=own)),
         rows=[row for column in varied for row in column],
         entries=len(inside),
-        links=links,
+        links=len(links),
+        link=links,
         linked=[places[index] // n for index in links],
         linking=[places[index] % n for index in links],
-        itself=[itself.get(i, -1) for i in range(n)],
         groups=[] if order else _groups([(k // n, k % n) for k in inside], own),
         elimination=elimination(tuple(k // n * own + k % n for k in inside), order) if order else None,
     )

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from itertools import combinations
+from types import SimpleNamespace
 
 import pytest
 
 import hsdsl
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.engine.integrators.stepper import flow_terms
+from hsdsl.engine.integrators.stepper import make_resolved
+from hsdsl.engine.scheme.scales import flow_terms
 
 
 @pytest.mark.parametrize("n", [3, 7, 20])
@@ -20,7 +22,10 @@ def test_the_terms_of_any_difference(n):
         def flow(t, *x, i=i, j=j):
             return (700 * ((*x, t)[i] - (*x, t)[j]), *(0.0 for _ in range(n - 1)))
 
-        found = flow_terms(flow, 1.0, ones, flow(1.0, *ones), ones, FLOAT64)
+        by = make_resolved(n, 0.0, FLOAT64)
+        by.found[:], by.slope[:] = ones, flow(1.0, *ones)
+        flow_terms(SimpleNamespace(flow=flow), by, n, 1.0, ones)
+        found = by.least
         assert 700 / 4 <= found[0] <= 16 * 700
         assert not any(found[1:])
 

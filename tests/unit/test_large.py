@@ -17,8 +17,8 @@ import hsdsl
 from hsdsl.base.graphs import elimination
 from hsdsl.engine.backends.c.routine import LONGEST
 from hsdsl.engine.backends.c.source import model_parts, model_source
-from hsdsl.engine.integrators.linear import sparse_factored, sparse_factored_complex
 from hsdsl.engine.runtime.kernel import SYMBOL
+from hsdsl.engine.scheme.linear import sparse_factored, sparse_factored_complex, sparse_solve, sparse_solve_complex
 from hsdsl.mathematics.lower.mode import ordering
 from hsdsl.mathematics.program_cache import _rows
 
@@ -122,12 +122,16 @@ def test_sparse_factors_solve_what_dense_ones_do(seed):
         return values
 
     right, other = draw.normal(size=(2, n))
-    found = sparse_factored(of, entries(4.0))(right.tolist())
+    factors, row, column, found = entries(4.0), [0.0] * n, [0.0] * n, [0.0] * n
+    assert sparse_factored(n, of, factors, row)
+    sparse_solve(n, of, factors, right.tolist(), row, found)
     assert np.allclose((matrix + 4 * np.eye(n)) @ found, right)
     turned = [0.0] * of.size
     for at in of.diagonal:
         turned[at] = -3.0
-    a, b = sparse_factored_complex(of, entries(2.0), turned)(right.tolist(), other.tolist())
+    factors, a, b = entries(2.0), [0.0] * n, [0.0] * n
+    assert sparse_factored_complex(n, of, factors, turned, row, column)
+    sparse_solve_complex(n, of, factors, turned, right.tolist(), other.tolist(), row, column, a, b)
     assert np.allclose((matrix + (2 - 3j) * np.eye(n)) @ (np.array(a) + 1j * np.array(b)), right + 1j * other)
 
 

@@ -133,24 +133,7 @@ def _collocation() -> Any:
     from hsdsl.engine.integrators.radau import coefficients  # most runs need none
 
     known = coefficients(FLOAT64)
-
-    def square(rows: Sequence[Sequence[float]]) -> Any:
-        return (c_double * 3 * 3)(*((c_double * 3)(*row) for row in rows))
-
-    return Collocation(
-        (c_double * 3)(*known.nodes),
-        square(known.powers),
-        known.gamma,
-        known.alpha,
-        known.beta,
-        square(known.mix),
-        square(known.unmix),
-        (c_double * 3)(*known.estimate),
-        known.share,
-        (c_double * 3)(*known.values),
-        (c_double * 3)(*known.slope),
-        (c_double * 3)(*known.end_slope),
-    )
+    return Collocation(*(getattr(known, name) for name, _ in Collocation._fields_))
 
 
 def _butcher_table(table: integrators.ButcherTableau) -> Any:

@@ -1,9 +1,56 @@
-"""What is written twice: inner loops that in C are tuned by hand (``primitives.h``), each with the same bits."""
+"""What is written twice: inner loops that in C are tuned by hand (``primitives.h``), each with the same bits.
+
+And what is of a model: its routines, and records that C has in its headers.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from operator import add
+
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.scheme.words import Here, Room, Time, Vector, may_fail
+from hsdsl.engine.scheme.words import Here, Room, Time, Vector, inline, may_fail
+
+
+@dataclass(frozen=True)
+class Collocation:
+    """Coefficients of Radau IIA.
+
+    Attributes
+    ----------
+    node : Vector
+        The three c_i.
+    power : sequence of Vector
+        Row m has the weights of the three increments in the polynomial's coefficient of s**(m + 1), s the share of
+        the step.
+    gamma, alpha, beta : Number
+        The eigenvalues of the inverse of A: gamma and alpha +- i beta.
+    mix, unmix : sequence of Vector
+        T, whose columns are an eigenvector to gamma and the parts of one to alpha + i beta, and its inverse.
+    estimate : Vector
+        Weights of the increments in the embedded method's defect, added to h times the flow at the step's start.
+    share : Number
+        Where inside a step its polynomial is held against the flow: (6 - sqrt 6)/10.
+    value, slope : Vector
+        Weights of the increments in the polynomial and in its derivative by s there.
+    end_slope : Vector
+        Weights of the increments in the derivative by s at the step's end.
+    """
+
+    node: Vector
+    power: Sequence[Vector]
+    gamma: Number
+    alpha: Number
+    beta: Number
+    mix: Sequence[Vector]
+    unmix: Sequence[Vector]
+    estimate: Vector
+    share: Number
+    value: Vector
+    slope: Vector
+    end_slope: Vector
 
 
 def fill_bernstein(binomials: Vector, c: Vector, n: int, b: Room) -> None:
@@ -32,3 +79,35 @@ def least_of(b: Vector, n: int) -> Number:
 def flow_between(here: Here, k: int, t: Time, x: Vector, t1: Time, z: Vector, s: Number) -> Number:
     """Component k of the flow at the share s of the way from (t, x) to (t1, z)."""
     return here.flow(t + s * (t1 - t), *(a + s * (b - a) for a, b in zip(x, z, strict=True)))[k]
+
+
+@may_fail
+def flow_at(here: Here, t: Time, x: Vector, out: Room) -> None:
+    """The flow."""
+    out[:] = here.flow(t, *x)
+
+
+def has_terms(here: Here) -> bool:
+    """Whether a routine bounds the terms of the flow."""
+    return here.terms is not None
+
+
+@may_fail
+def terms_at(here: Here, t: Time, x: Vector, sizes: Vector, out: Room) -> None:
+    """The sizes of the terms of the flow, at states of these sizes."""
+    out[:] = here.terms(t, *x, *sizes)
+
+
+@may_fail
+def derivatives_at(here: Here, t: Time, x: Vector, out: Room) -> None:
+    """The derivatives of the flow by the states, those that are not zero everywhere."""
+    derivatives = here.jacobian(t, *x)
+    out[:] = derivatives if here.places is None else [derivatives[place] for place in here.places]
+
+
+@inline
+def sum_of(v: Vector, n: int) -> Number:
+    """A sum, made of four so that none must wait for another."""
+    whole = n - n % 4
+    a, b, c, d = (reduce(add, v[i:whole:4], 0) for i in range(4))
+    return (reduce(add, v[whole:n], a) + b) + (c + d)

@@ -21,15 +21,24 @@ from textwrap import fill, indent
 from hsdsl.engine.backends.printer import C_OPERATORS
 
 FOLDER = Path(__file__).parent
+ROOT = FOLDER.parents[2]
 BY_HAND = "primitives"  # the text whose C is `primitives.h`
-TEXTS = ("control", "pace", "cascade", "roots")  # in the order in which they build on each other
+# in the order in which they build on each other
+TEXTS = ("control", "pace", "cascade", "roots", "linear", "scales", "newton", "radau")
 PLAIN = {"Number": "hs_real", "Time": "hs_time", "int": "int", "bool": "int", "Count": "int64_t"}
-VECTORS = {"Room": "hs_real *", "Vector": "const hs_real *", "Here": "hs_run *"}
-ELEMENTS = {"Room": "Number", "Vector": "Number"}
+VECTORS = {
+    "Here": "hs_run *", "Room": "hs_real *", "Vector": "const hs_real *", "list[Room]": "hs_real **",
+    "IndexRoom": "int *", "Indices": "const int *", "list[int]": "const int *", "Sequence[Vector]": "",
+}  # fmt: skip
+ELEMENTS = {
+    "Room": "Number", "Vector": "Number", "list[Room]": "Room", "Sequence[Vector]": "Vector",
+    "IndexRoom": "int", "Indices": "int", "list[int]": "int",
+}  # fmt: skip
 GIVEN = {"TIE": "HS_TIE", "NOTHING": "HS_NOTHING"}  # constants that differ by the type of numbers
 CALLS = {"abs": "fabs", "sqrt": "sqrt"}
 FOLDED = {"min": "hs_min", "max": "hs_max"}
 SIGNS: Mapping[type[ast.AST], str] = {**C_OPERATORS, ast.Div: "/", ast.Is: "==", ast.IsNot: "!=", ast.BitOr: "|"}
+WHOLE: Mapping[type[ast.AST], str] = {ast.FloorDiv: "/", ast.Mod: "%"}  # of what is not negative
 MAY_BE_NONE = " | None"
 
 
@@ -83,24 +92,43 @@ class Scheme:
     def __init__(self, texts: Sequence[Text]) -> None:
         self.texts = texts
         self.records: dict[str, dict[str, str]] = {}
+        self.values = set[str]()  # records that are passed by value: nothing changes them
+        self.given = set[str]()  # records that C has in its headers
         self.functions: dict[str, Signature] = {}
         self.constants: dict[str, str] = {}
         for text in texts:
             for part in text.tree.body:
+                if isinstance(part, ast.ImportFrom) and part.module not in (None, "dataclasses"):
+                    self._import(part)
                 self._declare(text, part)
+
+    def _import(self, part: ast.ImportFrom) -> None:
+        """Declare the records of another module, which C has in its headers."""
+        source = ROOT.joinpath(*(part.module or "").split(".")).with_suffix(".py")
+        if ROOT / "hsdsl" / "base" not in source.parents:
+            return
+        wanted = {each.name for each in part.names}
+        for each in ast.parse(source.read_text()).body:
+            if isinstance(each, ast.ClassDef) and each.name in wanted and each.decorator_list:
+                self.given.add(each.name)
+                self._declare(Text(source.stem, ast.Module([], []), {}), each)
 
     def _declare(self, text: Text, part: ast.stmt) -> None:
         match part:
             case ast.ClassDef(name=name, body=body):
                 fields = [each for each in body if isinstance(each, ast.AnnAssign)]
-                kinds = {ast.unparse(each.target): ast.unparse(each.annotation) for each in fields}
+                kinds = {ast.unparse(each.target): _kind(each.annotation) for each in fields}
                 for each, kind in zip(fields, kinds.values(), strict=True):
                     if kind not in PLAIN and kind not in VECTORS and _of_list(kind) not in self.records:
                         raise text.refused(each, "a field")
                 self.records[name] = kinds
+                if text.name == BY_HAND:
+                    self.given.add(name)
+                elif name not in self.given and "frozen=True" in ast.unparse(part.decorator_list[0]):
+                    self.values.add(name)
             case ast.FunctionDef(name=name, args=arguments, returns=returns):
                 result = "None" if returns is None else ast.unparse(returns)
-                given = {one.arg: ast.unparse(one.annotation) for one in arguments.args if one.annotation is not None}
+                given = {one.arg: _kind(one.annotation) for one in arguments.args if one.annotation is not None}
                 optional, result = result.endswith(MAY_BE_NONE), result.removesuffix(MAY_BE_NONE)
                 results = result.removeprefix("tuple[").removesuffix("]").split(", ") if result != "None" else []
                 self.functions[name] = Signature(given, results, optional, "may_fail" in _decorators(part))
@@ -119,7 +147,16 @@ class Scheme:
             return f"{PLAIN[kind]} "
         if kind in VECTORS:
             return VECTORS[kind]
-        return f"hs_{_of_list(kind).lower()} *"
+        name = f"hs_{_of_list(kind).lower()} "
+        return name if kind in self.values else f"const {name}*" if kind in self.given else f"{name}*"
+
+    def field_type(self, kind: str) -> str:
+        """The same as a field: a record is part of the one that has it."""
+        return f"hs_{kind.lower()} " if self.is_part(kind) else self.c_type(kind)
+
+    def is_part(self, kind: str) -> bool:
+        """Whether a field is a record of its own, not an address."""
+        return kind in self.records and kind not in self.given
 
     def header(self) -> str:
         """The records of all texts as C."""
@@ -127,7 +164,9 @@ class Scheme:
         for text in self.texts:
             for part in text.of_kind(ast.ClassDef):
                 assert isinstance(part, ast.ClassDef)
-                fields = (f"  {self.c_type(kind)}{name};\n" for name, kind in self.records[part.name].items())
+                if part.name in self.given:
+                    continue
+                fields = (f"  {self.field_type(kind)}{name};\n" for name, kind in self.records[part.name].items())
                 about = _comment(ast.get_docstring(part) or "", f"{text.name}.py:{part.lineno}")
                 parts.append(f"{about}typedef struct {{\n{''.join(fields)}}} hs_{part.name.lower()};\n")
         return "\n".join(parts)
@@ -231,6 +270,8 @@ class _Function:
                 return [f"while ({self.truth(test)}) {{", *self.inner(body, path), "}"]
             case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=bounds), body=body):
                 return [self.loop(part, name, bounds, body), *self.inner(body, path), "}"]
+            case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="each"), args=bounds), body=body):
+                return ["HS_SIMD", self.loop(part, name, bounds, body), *self.inner(body, path), "}"]
             case ast.Return(value=value):
                 return self.returned(part, value)
             case ast.Break() | ast.Continue():
@@ -402,7 +443,10 @@ class _Function:
                 text, kind = self.value(value)
                 if field not in self.scheme.records.get(kind, {}):
                     raise self.text.refused(node, f"a field of {kind}")
-                return f"{text[1:]}.{field}" if text[0] == "&" else f"{text}->{field}", self.scheme.records[kind][field]
+                found = self.scheme.records[kind][field]
+                address = "&" if self.scheme.is_part(found) and found not in self.scheme.values else ""
+                dot = "." if text[0] == "&" or kind in self.scheme.values else "->"
+                return f"{address}{text.lstrip('&')}{dot}{field}", found
             case ast.Subscript(value=value, slice=ast.Slice(lower=ast.expr() as first, upper=None, step=None)):
                 return f"{self.value(value)[0]} + {self.value(first)[0]}", "Vector"
             case ast.Subscript(value=value, slice=index):
@@ -450,6 +494,8 @@ class _Function:
         wider = _wider(kind, another)
         if isinstance(operator, ast.Pow):
             return f"pow({one}, {two})", wider
+        if type(operator) in WHOLE and wider in ("int", "Count"):
+            return f"{one} {WHOLE[type(operator)]} {two}", wider
         if (
             type(operator) not in SIGNS
             or wider not in PLAIN
@@ -465,10 +511,12 @@ class _Function:
         match left, operators, others:
             case _, [ast.In()], [ast.Tuple(elts=several)]:
                 return " || ".join(f"({self.value(left)[0]} == {self.value(one)[0]})" for one in several)
-            case ast.Name(id=name), [ast.Is() | ast.IsNot() as operator], [ast.Constant(value=None)]:
-                if name not in self.optional:
-                    raise self.text.refused(node, "a name that is never None")
-                return f"{'!' if isinstance(operator, ast.Is) else ''}has_{name}"
+            case ast.Name() | ast.Attribute(), [ast.Is() | ast.IsNot() as operator], [ast.Constant(value=None)]:
+                text, kind = self.value(left)
+                if text not in self.optional and kind not in self.scheme.given:
+                    raise self.text.refused(node, "what is never None")
+                has = "" if kind in self.scheme.given else "has_"
+                return f"{'!' if isinstance(operator, ast.Is) else ''}{has}{text}"
             case _:
                 pass
         if len(others) > 1 and not all(isinstance(one, (ast.Name, ast.Constant, ast.Attribute)) for one in others[:-1]):
@@ -494,6 +542,10 @@ def _wider(kind: str, another: str) -> str:
         if one in (kind, another):
             return one
     return "int" if {kind, another} == {"bool"} else kind if another in ("int", "bool") else another
+
+
+def _kind(annotation: ast.expr) -> str:
+    return ast.unparse(annotation).removesuffix(MAY_BE_NONE)
 
 
 def _of_list(kind: str) -> str:

@@ -10,6 +10,9 @@ from hsdsl.base.numbers.arithmetic import Number
 Time = Number  # an instant: of 64 bits also where numbers have 32
 Vector = Sequence[Number]  # that is only read
 Room = list[Number]  # that is written
+Indices = Sequence[int]  # that are only read
+IndexRoom = list[int]  # that are written
+each = range  # for passes of which none depends on another: C may make several at once
 Count = int  # of 64 bits
 Here = Any  # in C the run; in Python what primitives need of the mode that it is in
 Function = TypeVar("Function", bound=Callable[..., Any])

@@ -25,7 +25,6 @@ from itertools import pairwise
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Number
 from hsdsl.engine.execution import Stop, Transition
-from hsdsl.engine.integrators.linear import Vector
 from hsdsl.engine.integrators.stepper import State, rows_of
 from hsdsl.engine.simulate.run import ModeState, Run
 from hsdsl.engine.simulate.stops import FREE
@@ -48,10 +47,10 @@ def contact_at(run: Run, here: ModeState) -> ModeState | Stop:
     return in_contact(run, here, holding) if holding else here
 
 
-def flow_sizes(run: Run, here: ModeState, slope: State) -> Vector:
+def flow_sizes(run: Run, here: ModeState, slope: State) -> list[Number]:
     """For each state the size that its flow has had, |f| + sum |df/dx_j| s_j: below round-off of it, it is at rest."""
     mode, scales = here.flow, here.sizes
-    found: Vector = []
+    found: list[Number] = []
     rows = rows_of(run.kernel.jacobian(mode, here.segment.data)(here.t, *here.x), len(here.x))
     for f, row in zip(slope, rows, strict=True):
         total = abs(f)
@@ -95,7 +94,7 @@ def flows(here: ModeState, held: ModeState) -> bool:
 
 def keeping(run: Run, here: ModeState, surfaces: Iterable[int]) -> list[int]:
     """The edges of some surfaces whose guards hold the state where the flow presses on them: resets keep it there."""
-    edges, sizes, found = here.mode.edges, Vector(), list[int]()
+    edges, sizes, found = here.mode.edges, list[Number](), list[int]()
     for k in surfaces if run.settings.completion != "none" else ():
         if not k < len(edges) or edges[k].contact is None:
             continue

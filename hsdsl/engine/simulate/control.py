@@ -27,12 +27,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import nan
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
-from hsdsl.engine.integrators.stepper import State, Stepper, resolved
+from hsdsl.engine.integrators.stepper import State, Stepper, make_resolved
 from hsdsl.engine.scheme import control as text
 from hsdsl.engine.scheme.control import ratio_to
+from hsdsl.engine.scheme.scales import resolve
 from hsdsl.engine.simulate.settings import Settings
 
 if TYPE_CHECKING:
@@ -107,7 +109,9 @@ def error_ratio(
             scales = method.scales(True)
         else:
             terms = run.kernel.terms(here.flow, here.segment.data)
-            scales = resolved(here.kernel.flow, t, h, x, scales, None, run.arithmetic, control.tolerance, terms)
+            by = make_resolved(len(x), control.tolerance, run.arithmetic)
+            resolve(SimpleNamespace(flow=here.kernel.flow, terms=terms), by, len(x), t, h, x, scales, False)
+            scales = by.found
     except DOMAIN_ERRORS:
         return ratio
     ratio = ratio_to(control, h, error, z, scales, had, len(z))

@@ -92,7 +92,7 @@ class Run(Problem):
             return taylor_stepper(method, series, self.arithmetic)
         known, data = here.mode.jacobian, here.segment.data
         derivatives = Derivatives(
-            self.kernel.jacobian(mode, data), here.arc.scales, self.kernel.terms(mode, data),
+            self.kernel.jacobian(mode, data), here.arc.scales, self.kernel.terms(mode, data), known.places,
             known.elimination, here.mode.measured, known.variation, self.control.first,
         )  # fmt: skip
         return method.stepper(derivatives, self.settings.tolerance, self.arithmetic)

@@ -9,8 +9,10 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from dataclasses import fields
 from itertools import count
 from textwrap import dedent
+from typing import cast
 
 from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.engine.backends.c.routine import (
@@ -218,14 +220,14 @@ class _Writer:
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states), mode.derived > 0) if mode.tape else ("0", "0", "0")),
             self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),
-            self.elimination(mode.jacobian.elimination),
+            self.pattern(mode.jacobian.elimination),
             str(int(mode.affine)),
             self.routines(mode.terms)["terms"] if mode.terms else "0",
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
             str(-1 if mode.held is None else mode.held),
             str(len(mode.measured)),
             self.table("int", "measured", list(map(str, mode.measured))),
-            self.variation(mode.jacobian.variation),
+            self.pattern(mode.jacobian.variation),
             str(len(mode.states) - mode.derived),
             str(len(mode.queues)),
             self.table("hs_queue", "queues", list(map(self.queue, mode.queues))),
@@ -243,23 +245,16 @@ class _Writer:
         """Write a routine with the places of its values."""
         return f"{{{routine}, {len(places)}, {self.table('int', 'places', list(map(str, places)))}}}"
 
-    def elimination(self, of: Elimination | None) -> str:
-        """Write the pattern of a sparse elimination."""
+    def pattern(self, of: Elimination | Variation | None) -> str:
+        """Write the pattern of a sparse elimination, or which states are derivatives of others."""
         if of is None:
             return "0"
-        lists = (of.order, of.start, of.column, of.diagonal, of.place, of.own)
-        tables = ", ".join(self.table("int", "elimination", list(map(str, each))) for each in lists)
-        return self.table("hs_elimination", "pattern", [f"{{{of.size}, {tables}}}"])
-
-    def variation(self, of: Variation | None) -> str:
-        """Write which states are derivatives of others."""
-        if of is None:
-            return "0"
-        lists = (of.columns, of.rows, of.links, of.linked, of.linking, of.itself, of.groups)
-        columns, rows, *others = (self.table("int", "variation", list(map(str, each))) for each in lists)
-        sizes = f"{of.own}, {len(of.columns) - 1}, {columns}, {rows}, {of.entries}, {len(of.links)}"
-        numbers = ", ".join((sizes, *others))
-        return self.table("hs_variation", "varied", [f"{{{numbers}, {self.elimination(of.elimination)}}}"])
+        name, written = type(of).__name__.lower(), list[str]()
+        for value in (getattr(of, field.name) for field in fields(of)):
+            if isinstance(value, list):
+                value = self.table("int", name, list(map(str, cast("list[int]", value))))
+            written.append(str(value) if isinstance(value, (int, str)) else self.pattern(value))
+        return self.table(f"hs_{name}", f"{name}_pattern", [f"{{{', '.join(written)}}}"])
 
     def series(self, tape: Tape, dimension: int, has_derivatives: bool) -> tuple[str, str, str]:
         """Write the functions of a tape: those of the lines, which many modes share, and those that give constants.

@@ -27,8 +27,6 @@ static const hs_found CLEAR = {HS_CLEAR, -1, 0}, NOT_FINITE = {HS_NOT_FINITE, -1
 static const hs_found TOO_WRONG = {HS_ERROR, -1, 0}, UNSOLVED = {HS_UNSOLVED, -1, 0};
 
 /* What is used before it is defined; the order of files in hs.c is that in which they build on each other. */
-static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const hs_real *rows);
-HS_INLINE int iterate(hs_run *run, hs_blocks of, hs_time t, hs_real h);
 static void *take(hs_store *store, int64_t count, size_t size);
 static hs_real *numbers(hs_store *store, int64_t count);
 HS_INLINE void append(hs_run *run, hs_time t, const hs_real *x, const hs_polynomial *piece);

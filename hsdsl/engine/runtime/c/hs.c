@@ -19,7 +19,10 @@
 #pragma GCC optimize("O2")
 #endif
 #include "linear.c"
+#include "scales.c"
+#include "newton.c"
 #include "radau.c"
+#include "implicit.c"
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options
 #endif
@@ -76,13 +79,15 @@ static hs_real **take_stages(hs_store *store, const hs_run *run) {
 /* Give every array of a run its place. */
 static void lay_out(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces, e = run->model->edges;
+  hs_resolved *const by = &run->radau.resolved;
   hs_real **const states[] = {
       &run->x,      &run->slope, &run->z,      &run->end,      &run->at,         &run->scale,     &run->entered,
-      &run->after,  &run->landed, &run->error, &run->scales,   &run->resolved,   &run->least,     &run->unmoved,
+      &run->after,  &run->landed, &run->error, &run->scales,   &by->found,   &by->least,     &by->slope,
       &run->near,   &run->nearby, &run->flow_sizes, &run->cascade.x, &run->source, 0};
   take_each(store, w, states);
   run->known = numbers(store, run->model->states);
-  run->lifted = take(store, w, sizeof(int));
+  by->near = run->near, by->other = run->nearby, run->radau.at = run->at;
+  by->lifted = take(store, w, sizeof(int));
   run->k = take_stages(store, run);
   if (store->numbers) run->k[0] = run->slope, run->k[run->method->stages] = run->end;
   lay_out_method(run, store);
@@ -200,6 +205,7 @@ static hs_run open_run(hs_task *task) {
   run.control.order = task->method->order;
   run.control.failed_at = NAN;
   run.control.implicit = is_implicit(task->method);
+  begin_implicit(&run);
   run.steps_to_poll = run.poll_steps = 32;
   run.full_queue = -1;
   copy(run.x, task->x, task->dimension);

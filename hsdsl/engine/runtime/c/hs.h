@@ -54,7 +54,6 @@ typedef struct {
   const int *column;
   const int *diagonal;
   const int *place;
-  const int *own;
 } hs_elimination;
 
 /* States that are derivatives of others: see Variation in hsdsl/base/graphs.py. */
@@ -68,7 +67,6 @@ typedef struct {
   const int *link;
   const int *linked;
   const int *linking;
-  const int *itself;
   const int *groups;
   const hs_elimination *elimination; /* 0 where the matrix of the own states is dense */
 } hs_variation;

@@ -99,7 +99,7 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time
   const int status = step(run, n, span->t, h);
   if (status == NO_CONVERGENCE) return HS_UNSOLVED;
   if (status || mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
-  if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
+  if (!hs_finite(sum_of(run->z, n) + sum_of(run->end, n))) return HS_NOT_FINITE;
   if (run->control.tolerance > 0) {
     local_error(run, h);
     run->ratio = error_ratio(run, h);
@@ -260,7 +260,7 @@ HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_tim
   begin_span(run, h, t1);
   taylor_span(run, n, h, &run->span.piece);
   if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
-  if (!hs_finite(sum(run->z, n) + sum(run->end, n))) return HS_NOT_FINITE;
+  if (!hs_finite(sum_of(run->z, n) + sum_of(run->end, n))) return HS_NOT_FINITE;
   if (tolerance > 0) {
     left_of(run, n, h);
     if (error_ratio(run, h) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
@@ -307,7 +307,7 @@ static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
   if (surface(run, k, time, q, &r)) return RAISED;
   if (r < -off) return 0;
   for (int i = 0; i < n; i++) run->at[i] = q[i] + 2 * off / norm * g[i];
-  return here->table->flow(here->p, time, run->at, run->source) || !hs_finite(sum(run->source, n));
+  return here->table->flow(here->p, time, run->at, run->source) || !hs_finite(sum_of(run->source, n));
 }
 
 /* Whether surface k rises from the start of the step, and is followed by one polynomial. */

@@ -39,6 +39,33 @@ HS_INLINE hs_real least_of(const hs_real *b, int n) {
   return least;
 }
 
+/* Four sums at a time need not wait for each other. */
+HS_INLINE hs_real sum_of(const hs_real *v, int n) {
+  hs_real a = 0.0, b = 0.0, c = 0.0, d = 0.0;
+  int i = 0;
+  for (; i + 3 < n; i += 4) a += v[i], b += v[i + 1], c += v[i + 2], d += v[i + 3];
+  for (; i < n; i++) a += v[i];
+  return (a + b) + (c + d);
+}
+
+HS_INLINE int flow_at(hs_run *run, hs_time t, const hs_real *x, hs_real *f) {
+  return run->here.table->flow(run->here.p, t, x, f) ? RAISED : 0;
+}
+
+HS_INLINE int has_terms(const hs_run *run) { return run->here.table->terms != 0; }
+
+/* The routine wants states and sizes as one vector. */
+static int terms_at(hs_run *run, hs_time t, const hs_real *x, const hs_real *sizes, hs_real *terms) {
+  const int n = run->here.dimension;
+  copy(run->both, x, n);
+  copy(run->both + n, sizes, n);
+  return run->here.table->terms(run->here.p, t, run->both, terms) ? RAISED : 0;
+}
+
+static int derivatives_at(hs_run *run, hs_time t, const hs_real *x, hs_real *rows) {
+  return run->here.table->jacobian.values(run->here.p, t, x, rows) ? RAISED : 0;
+}
+
 static int flow_between(hs_run *run, int k, hs_time t, const hs_real *x, hs_time t1, const hs_real *z, hs_real s,
                         hs_real *f) {
   const hs_mode_state *here = &run->here;

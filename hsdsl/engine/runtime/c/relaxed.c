@@ -29,7 +29,7 @@ static int ends(hs_run *run, hs_trial *trial) {
     trial->looked = 1;
     trial->ends = 0;
     if (!run->here.table->flow(run->here.p, trial->t1, run->z, run->end)) {
-      const hs_real total = sum(run->end, run->here.dimension);
+      const hs_real total = sum_of(run->end, run->here.dimension);
       trial->ends = total - total == 0;
     }
   }
@@ -263,9 +263,9 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, hs_real h, hs_time t1) {
   if (largest <= 0) {
     if (mode->flow(here->p, t1, run->z, run->end)) return NOT_FINITE;
     trial->looked = trial->ends = 1;
-    return hs_finite(sum(run->z, n) + sum(run->ahead, m) + sum(run->end, n)) ? CLEAR : NOT_FINITE;
+    return hs_finite(sum_of(run->z, n) + sum_of(run->ahead, m) + sum_of(run->end, n)) ? CLEAR : NOT_FINITE;
   }
-  if (!hs_finite(sum(run->z, n) + sum(run->ahead, m))) return NOT_FINITE;
+  if (!hs_finite(sum_of(run->z, n) + sum_of(run->ahead, m))) return NOT_FINITE;
   if (judge(run, run->ahead, &found)) return trial->ends = 0, NOT_FINITE;
   if (found.failure != HS_CLEAR || found.crossings || ends(run, trial)) {
     ends(run, trial);

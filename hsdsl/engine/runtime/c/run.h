@@ -89,55 +89,10 @@ typedef struct {
   int crossings;
 } hs_found;
 
-/* How iterations converge: what the last one left of the one before, what all that follow would have added, and whether
-   the derivatives should be renewed for the next step. */
-typedef struct {
-  hs_real rate, left;
-  int aged;
-} hs_convergence;
-
-/* What Radau IIA knows from one step to the next, and its scratch: vectors of `width`, matrices of `factors`. */
-typedef struct {
-  int derived, factored, stepped; /* whether there are derivatives, factors of their matrices, and a last step */
-  hs_time derived_at, start;
-  hs_real factored_for, length;
-  hs_convergence convergence;
-  hs_real *rows, *fresh;            /* the flow's derivatives; of a sparse system those that are not zero */
-  hs_real *real, *re, *im;          /* factors of the real matrix and of the complex one */
-  int *order, *turned;             /* the order of their rows */
-  hs_real *scratch[2];             /* of sparse systems */
-  hs_real *linked, *spread[4];     /* of variations: see linear.c */
-  hs_real *lasting;                /* of variations: which share of an error of a derivative lasts */
-  hs_real *z[3], *last[3];          /* increments: as they are now, and of the last step */
-  hs_real *apart[3], *change[3];    /* in the coordinates that the systems are solved in */
-  hs_real *slopes[3], *right[3];
-  hs_real *largest, *error;
-  const hs_real *scales; /* of the states, as the last step was solved with them */
-  hs_real *least;        /* below which they are not, where round-off of the flow makes some of them larger: `lifted` */
-  int lifted;
-} hs_radau;
-
-/* A mode's columns of derivatives; exported C has none. */
-static inline const hs_variation *columns_of(const hs_mode *mode) {
-#if defined(HS_COLUMNS)
-  return mode->variation;
-#else
-  return (void)mode, (const hs_variation *)0;
-#endif
-}
-
-/* What a step solves for: n states that flow, the `own` ones of which have a matrix, and columns of derivatives of them
-   where they have a variation; 0 for none. `of` is the pattern of the matrix where it is sparse, else 0. `whole` says
-   that every column has derivatives of all own states: then n is (1 + columns) own. */
-typedef struct {
-  int n, own;
-  const hs_variation *v;
-  const hs_elimination *of;
-  int whole;
-} hs_blocks;
-
-/* Numbers that lay_out_method() takes of it, as a constant: see workspace.h. */
-#define HS_RADAU_SPACE(w, factors) (5 * HS_NUMBERS(factors) + 23 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int))
+/* Numbers that lay_out_method() takes of Radau IIA, as a constant: see workspace.h. */
+#define HS_RADAU_SPACE(w, factors)                                                                                \
+  (5 * HS_NUMBERS(factors) + 24 * HS_NUMBERS(w) + 2 * HS_TAKEN(w, int) + 6 * HS_TAKEN(3, hs_real *) +             \
+   HS_TAKEN(2, hs_real *) + HS_TAKEN(4, hs_real *))
 #define HS_IMPLICIT_SPACE(kind, w, factors) ((kind) == HS_RADAU ? HS_RADAU_SPACE(w, factors) : 0)
 
 /* What is remembered of a transition. */
@@ -198,8 +153,7 @@ typedef struct {
   /* scale: the sizes of the numbers that the state was computed from on entry, negative where the terms of a reset gave
      them: the next reset reads no more than the value of such a state, and no size multiplies */
   hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
-  hs_real *resolved, *least, *unmoved, *near, *nearby; /* see stepper.c */
-  int *lifted;
+  hs_real *near, *nearby;
   hs_real *flow_sizes, *jacobian; /* see contact.c; jacobian: model->derivatives */
   hs_real *held_p; /* in contact: what routines are bound to, model->data and then model->contacts numbers */
   const hs_real *own_p; /* what they are bound to else */
@@ -283,15 +237,6 @@ static inline int all_finite(const hs_real *v, int n) {
   for (int i = 0; i < n; i++)
     if (!hs_finite(v[i])) return 0;
   return 1;
-}
-
-/* Four sums at a time need not wait for each other; it tells whether all are finite. */
-static inline hs_real sum(const hs_real *v, int n) {
-  hs_real a = 0.0, b = 0.0, c = 0.0, d = 0.0;
-  int i = 0;
-  for (; i + 3 < n; i += 4) a += v[i], b += v[i + 1], c += v[i + 2], d += v[i + 3];
-  for (; i < n; i++) a += v[i];
-  return (a + b) + (c + d);
 }
 
 static inline void swap(hs_real **a, hs_real **b) {

@@ -209,9 +209,9 @@ HS_INLINE int factor_correction(hs_view *v, const hs_shadow *c, int n) {
   for (int i = 0; i < size; i++) a[i] = 0.0;
   for (int i = 0; i < rows->count; i++) a[of ? of->place[i] : rows->place[i]] = away * v->derivatives[i];
   for (int i = 0; i < n; i++) a[of ? of->diagonal[i] : i * n + i] += 1.0;
-  if (of) return sparse_factored(n, of, a, v->z);
+  if (of) return !sparse_factored(n, of, a, v->z);
   for (int i = 0; i < n; i++) sizes[i] = fabs(x[i]), unit[i] = 0.0;
-  if (factored(n, a, v->exchanged, sizes, 0)) return 1;
+  if (!factored(n, a, v->exchanged, sizes, 0)) return 1;
   for (int i = 0; i < n; i++) {
     unit[i] = 1.0;
     solve(n, a, v->exchanged, unit, v->inverse + i * n);

@@ -1,11 +1,6 @@
-/* One step by whichever method the run has, a table, Taylor series or Radau IIA, and the scales of states. Other files
+/* One step by whichever method the run has: a table, Taylor series or Radau IIA. Other files
    tell tables and series apart, at most. Sums of a Butcher tableau go left to right, as in the functions that
    hsdsl/engine/integrators/stepper.py writes out. */
-
-#define SHARE 32
-#define NOISE_UNITS 64
-#define ITERATED 1024
-#define BLUR_UNITS 4 /* BLUR there */
 
 #if !defined(HS_FLOAT32)
 /* 2**k, where that is a normal number. */
@@ -39,69 +34,7 @@ static hs_real root(hs_real x, int m) {
   return ldexp(pow(ldexp(fraction, exponent - shift * m), (hs_real)-1 / m), -shift);
 }
 
-/* The sizes of the terms of a flow, by what the last digits of the states `moved` change in it, to `found`;
-   its value is `slope`. Not 0 where it has none nearby. */
-static int flow_terms(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope, const hs_real *moved,
-                      hs_real *found) {
-  static const hs_real moves[4] = {2, -2, 6, -6};
-  const int n = run->here.dimension;
-  hs_real *const near = run->near, *const other = run->nearby;
-  for (int s = 0; s < n; s++) found[s] = 0.0;
-  for (int probe = 0, every = 1; probe < 4; probe++, every *= 4) {
-    for (int s = 0; s < n; s++) near[s] = x[s] + moves[(s / every + probe) % 4] * HS_UNIT * moved[s];
-    const hs_time later = t + moves[(n / every + probe) % 4] * HS_UNIT * t;
-    if (run->here.table->flow(run->here.p, later, near, other)) return 1;
-    for (int s = 0; s < n; s++) found[s] = hs_max(found[s], fabs(other[s] - slope[s]));
-  }
-  for (int s = 0; s < n; s++) found[s] = found[s] / (BLUR_UNITS * HS_UNIT);
-  return 0;
-}
-
-/* The same by a bound on them, of a flow whose terms jump or may hide. */
-static int bounded_terms(const hs_run *run, hs_time t, const hs_real *x, const hs_real *moved, hs_real *found) {
-  const int n = run->here.dimension;
-  copy(run->both, x, n);
-  copy(run->both + n, moved, n);
-  return run->here.table->terms(run->here.p, t, run->both, found);
-}
-
-/* The derivative of a state's flow by itself. */
-static hs_real own_derivative(const hs_run *run, const hs_real *rows, int s) {
-  const hs_elimination *of = run->here.table->elimination;
-  const hs_variation *v = columns_of(run->here.table);
-  if (!of && !v) return rows[s * run->here.dimension + s];
-  const int entry = v ? v->itself[s] : of->own[s];
-  return entry < 0 ? (hs_real)0.0 : rows[entry];
-}
-
-/* The scales over a step of length h from (t, x), none below a share of what the terms of its flow could move the state
-   by, to run->resolved. `rows` are the derivatives of the flow, or 0. Not 0 where the flow has no value nearby. */
-static int resolved(hs_run *run, hs_time t, hs_real h, const hs_real *x, const hs_real *rows) {
-  const int n = run->here.dimension;
-  const hs_real share = hs_max(SHARE, hs_max(run->control.tolerance, 0) / ((rows ? ITERATED : NOISE_UNITS) * HS_UNIT));
-  hs_real *const moved = run->resolved, *const least = run->least;
-  if (run->here.table->flow(run->here.p, t, x, run->unmoved)) return 1;
-  for (int s = 0; s < n; s++) moved[s] = run->scales[s], run->lifted[s] = 0;
-  for (int round = 0; round < n; round++) {
-    int further = 0;
-    if (run->here.table->terms ? bounded_terms(run, t, x, moved, least)
-                               : flow_terms(run, t, x, run->unmoved, moved, least))
-      return 1;
-    for (int s = 0; s < n; s++) {
-      hs_real size = h * least[s];
-      if (rows) size = size / (1 + h * fabs(own_derivative(run, rows, s)));
-      if (!(hs_finite(size) && size > share * run->scales[s])) continue;
-      moved[s] = hs_max(moved[s], size);
-      further |= !run->lifted[s];
-      run->lifted[s] = 1;
-    }
-    if (!further) break;
-  }
-  for (int s = 0; s < n; s++) moved[s] = hs_max(run->scales[s], moved[s] / share);
-  return 0;
-}
-
-HS_INLINE hs_real weighted(const hs_row *row, hs_real *const *k, int state) {
+HS_INLINE hs_real weighted_row(const hs_row *row, hs_real *const *k, int state) {
   if (!row->terms) return 0.0;
   hs_real total = row->weight[0] * k[row->stage[0]][state];
   for (int i = 1; i < row->terms; i++) total += row->weight[i] * k[row->stage[i]][state];
@@ -111,7 +44,7 @@ HS_INLINE hs_real weighted(const hs_row *row, hs_real *const *k, int state) {
 /* Evaluate stage i of a step from (t, run->x); not 0 where the flow has no value. */
 HS_INLINE int evaluate(hs_run *run, int n, int i, hs_time t, hs_real h) {
   const hs_method *method = run->method;
-  for (int s = 0; s < n; s++) run->at[s] = run->x[s] + h * weighted(&method->a[i], run->k, s);
+  for (int s = 0; s < n; s++) run->at[s] = run->x[s] + h * weighted_row(&method->a[i], run->k, s);
   return run->here.table->flow(run->here.p, t + method->c[i] * h, run->at, run->k[i]);
 }
 
@@ -119,7 +52,7 @@ HS_INLINE int evaluate(hs_run *run, int n, int i, hs_time t, hs_real h) {
 HS_INLINE int table_step(hs_run *run, int n, hs_time t, hs_real h) {
   for (int i = 1; i < run->method->stages; i++)
     if (evaluate(run, n, i, t, h)) return 1;
-  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + h * weighted(&run->method->b, run->k, s);
+  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + h * weighted_row(&run->method->b, run->k, s);
   return 0;
 }
 
@@ -150,7 +83,7 @@ static int table_piece(hs_run *run, hs_time t, hs_real h, hs_polynomial *piece) 
   piece->degree = method->degree;
   for (int m = 0; m < method->degree; m++)
     for (int s = 0; s < run->here.dimension; s++)
-      piece->c[m * run->width + s] = h * weighted(&method->dense[m], run->k, s);
+      piece->c[m * run->width + s] = h * weighted_row(&method->dense[m], run->k, s);
   return 0;
 }
 
@@ -163,8 +96,8 @@ static hs_real sharpened(hs_real fine, hs_real coarse) {
 static void table_error(hs_run *run, hs_real h) {
   const hs_method *method = run->method;
   for (int s = 0; s < run->here.dimension; s++) {
-    run->error[s] = h * weighted(&method->error, run->k, s);
-    if (method->coarse.terms) run->error[s] = sharpened(run->error[s], h * weighted(&method->coarse, run->k, s));
+    run->error[s] = h * weighted_row(&method->error, run->k, s);
+    if (method->coarse.terms) run->error[s] = sharpened(run->error[s], h * weighted_row(&method->coarse, run->k, s));
   }
 }
 
@@ -172,21 +105,21 @@ static void table_error(hs_run *run, hs_real h) {
 HS_INLINE int step(hs_run *run, int n, hs_time t, hs_real h) {
   switch (run->method->kind) {
     case HS_TAYLOR: return taylor_step(run, t, h);
-    case HS_RADAU: return radau_step(run, t, h);
+    case HS_RADAU: return implicit_step(run, t, h);
     default: return table_step(run, n, t, h);
   }
 }
 
 /* A part of the step just made, from (t, run->x) to run->z: by Radau IIA it is solved to round-off. */
 HS_INLINE int part_of_step(hs_run *run, int n, hs_time t, hs_real h) {
-  return run->method->kind == HS_RADAU ? radau_landing(run, t, h) : step(run, n, t, h);
+  return run->method->kind == HS_RADAU ? implicit_landing(run, t, h) : step(run, n, t, h);
 }
 
 /* The method's own interpolant of the step from (t, run->x) to run->z; not 0 where the flow has no value. */
 static int method_piece(hs_run *run, hs_time t, hs_real h, hs_polynomial *piece) {
   switch (run->method->kind) {
     case HS_TAYLOR: return taylor_piece(run, run->here.dimension, h, piece), 0;
-    case HS_RADAU: return radau_piece(run, piece), 0;
+    case HS_RADAU: return implicit_piece(run, piece), 0;
     default: return table_piece(run, t, h, piece);
   }
 }
@@ -207,28 +140,16 @@ static const hs_real *error_scales(const hs_run *run) {
 
 /* The same with a look at what the flow is computed from; 0 where it has no value. See hsdsl/engine/simulate/control.py. */
 static const hs_real *closer_scales(hs_run *run, hs_real h) {
-  if (run->method->kind == HS_RADAU) return radau_scales(run, run->here.t, h, 1), run->radau.scales;
-  return resolved(run, run->here.t, h, run->x, 0) ? 0 : run->resolved;
+  hs_resolved *const by = &run->radau.resolved;
+  const hs_mode_state *const here = &run->here;
+  if (run->method->kind == HS_RADAU) {
+    look_closer(run, blocks_of(here->table), &run->radau, here->t, h, run->x, run->scales);
+    return run->radau.scales;
+  }
+  return resolve(run, by, here->dimension, here->t, h, run->x, run->scales, 0) ? 0 : by->found;
 }
 
 static int is_implicit(const hs_method *method) { return method->kind == HS_RADAU; }
-
-static void lay_out_radau(hs_radau *radau, int w, int factors, int varied, hs_store *store) {
-  hs_real **matrices[] = {&radau->rows, &radau->fresh, &radau->real, &radau->re, &radau->im};
-  hs_real **threes[] = {radau->z, radau->last, radau->apart, radau->change, radau->slopes, radau->right};
-  for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, factors);
-  for (int i = 0; i < 18; i++) threes[i / 3][i % 3] = numbers(store, w);
-  radau->largest = numbers(store, w);
-  radau->error = numbers(store, w);
-  radau->least = numbers(store, w);
-  radau->scratch[0] = numbers(store, w);
-  radau->scratch[1] = numbers(store, w);
-  radau->linked = numbers(store, varied);
-  for (int i = 0; i < 4; i++) radau->spread[i] = numbers(store, varied ? w : 0);
-  radau->lasting = numbers(store, varied ? w : 0);
-  radau->order = take(store, w, sizeof(int));
-  radau->turned = take(store, w, sizeof(int));
-}
 
 /* Give the arrays of the method their places. */
 static void lay_out_method(hs_run *run, hs_store *store) {
@@ -240,7 +161,7 @@ static void lay_out_method(hs_run *run, hs_store *store) {
 /* Forget what a method knows of the place it was at: the mode or the segment of the inputs is another one. */
 static void forget_steps(hs_run *run) {
   run->expanded = 0;
-  if (run->method->kind == HS_RADAU) radau_forget(run);
+  if (run->method->kind == HS_RADAU) begin_stretch(&run->radau, blocks_of(run->here.table));
 }
 
 /* Error ratio of a step of length h to run->z, errors held against these scales. */

@@ -62,7 +62,7 @@ static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time
   hs_real total = magnitudes[k];
   const hs_sparse *const row = &here->table->gradients[k];
   hs_real *const g = run->gradient;
-  if (!row->values(here->p, t, x, g) && hs_finite(sum(g, row->count))) {
+  if (!row->values(here->p, t, x, g) && hs_finite(sum_of(g, row->count))) {
     const int push = is_push(run, k), scaled = entry || run->active_surfaces[k];
     for (int i = 0; i < row->count; i++) {
       const int s = row->place[i] - 1;

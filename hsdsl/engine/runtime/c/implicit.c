@@ -1,0 +1,101 @@
+/* Implicit steps of a run: where the text of Radau IIA (hsdsl/engine/scheme/radau.py) meets modes and the workspace. */
+
+/* A mode's columns of derivatives; exported C has none. */
+static inline const hs_variation *columns_of(const hs_mode *mode) {
+#if defined(HS_COLUMNS)
+  return mode->variation;
+#else
+  return (void)mode, (const hs_variation *)0;
+#endif
+}
+
+HS_INLINE hs_blocks blocks_of(const hs_mode *mode) {
+  const hs_variation *const v = columns_of(mode);
+  const int n = mode->dimension, entries = mode->jacobian.count;
+  hs_blocks of = {n, n, n, entries, entries, mode->jacobian.place, v, n > 3 ? mode->elimination : 0, 0};
+  if (!v) return of;
+  of.n = v->columns[v->count], of.own = v->own, of.inside = v->entries, of.pattern = v->elimination;
+  of.whole = of.n == of.own * (1 + v->count);
+  return of;
+}
+
+/* The same where so many states have a matrix, dense, and all columns of derivatives of them: numbers that a compiler
+   knows. */
+HS_INLINE hs_blocks of_size(hs_blocks of, int own, int columns) {
+  of.own = own, of.n = own * (1 + columns), of.pattern = 0, of.whole = 1;
+  if (!columns) of.width = own, of.varied = 0;
+  return of;
+}
+
+HS_INLINE int implicit_step_in(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
+  int solved = 0;
+  if (radau_step(run, of, run->method->collocation, &run->radau, t, h, run->x, run->slope, run->scales, run->z, &solved))
+    return NO_VALUE;
+  return solved ? 0 : NO_CONVERGENCE;
+}
+
+/* Try a step; compiled for two and three states apart, a tenth faster, and a third where these have columns. */
+static int implicit_step(hs_run *run, hs_time t, hs_real h) {
+  const hs_mode *const mode = run->here.table;
+  const hs_blocks of = blocks_of(mode);
+  if (!columns_of(mode) && of.n == 2) return implicit_step_in(run, of_size(of, 2, 0), t, h);
+  if (!columns_of(mode) && of.n == 3) return implicit_step_in(run, of_size(of, 3, 0), t, h);
+  if (columns_of(mode) && of.whole && !of.pattern) {
+    if (of.n == 4 && of.own == 2) return implicit_step_in(run, of_size(of, 2, 1), t, h);
+    if (of.own == 2) return implicit_step_in(run, of_size(of, 2, of.varied->count), t, h);
+    if (of.own == 3) return implicit_step_in(run, of_size(of, 3, of.varied->count), t, h);
+  }
+  return implicit_step_in(run, of, t, h);
+}
+
+/* Make a part of the last step. */
+static int implicit_landing(hs_run *run, hs_time t, hs_real h) {
+  const hs_mode *const mode = run->here.table;
+  int solved = 0;
+  if (radau_landing(run, blocks_of(mode), run->method->collocation, &run->radau, t, h, run->x, run->scales,
+                    mode->measures, mode->measured, run->z, &solved))
+    return NO_VALUE;
+  return solved ? 0 : NO_CONVERGENCE;
+}
+
+static void implicit_piece(hs_run *run, hs_polynomial *piece) {
+  piece->degree = 3;
+  fill_piece(blocks_of(run->here.table), run->method->collocation, &run->radau, run->width, piece->c);
+}
+
+/* What stays for a whole run. */
+static void begin_implicit(hs_run *run) {
+  hs_radau *const radau = &run->radau;
+  const hs_real tolerance = hs_max(run->control.tolerance, 0);
+  radau->unit = radau->resolved.unit = HS_UNIT;
+  radau->tolerance = radau->resolved.tolerance = tolerance;
+  radau->enough = tolerance > 0 ? enough_of(HS_UNIT, tolerance, sqrt(tolerance)) : 0;
+  radau->soon = run->task->settings.step;
+  radau->most = MOST_HALVINGS;
+}
+
+/* Room for so many vectors. */
+static hs_real **vectors(hs_store *store, int count, int64_t length) {
+  hs_real **const found = take(store, count, sizeof(hs_real *));
+  for (int i = 0; i < count; i++) {
+    hs_real *const one = numbers(store, length);
+    if (store->numbers) found[i] = one;
+  }
+  return found;
+}
+
+static void lay_out_radau(hs_radau *radau, int w, int factors, int varied, hs_store *store) {
+  hs_factors *const by = &radau->factors;
+  hs_real **const matrices[] = {&radau->rows, &radau->fresh, &by->real, &by->re, &by->im};
+  hs_real ***const threes[] = {&radau->z, &radau->last, &radau->apart, &radau->change, &radau->slopes, &radau->right};
+  hs_real **const states[] = {&radau->largest, &radau->error, &radau->least, &radau->resolved.diagonal};
+  for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, factors);
+  for (int i = 0; i < 6; i++) *threes[i] = vectors(store, 3, w);
+  for (int i = 0; i < 4; i++) *states[i] = numbers(store, w);
+  by->scratch = vectors(store, 2, w);
+  by->links = numbers(store, varied);
+  by->spread = vectors(store, 4, varied ? w : 0);
+  radau->lasting = numbers(store, varied ? w : 0);
+  by->order = take(store, w, sizeof(int));
+  by->turned = take(store, w, sizeof(int));
+}
