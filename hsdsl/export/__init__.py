@@ -41,6 +41,7 @@ ABOUT = {
     "latex": "the model as mathematics, a LaTeX document",
     "matlab": "functions for MATLAB and GNU Octave, and runs in C",
     "mermaid": "the mode graph as a Mermaid diagram",
+    "sbml": "a model in SBML, Level 3, with events",
     "rust": "a crate for Rust without its standard library",
     "web": "one HTML page that runs the model in a browser",
 }
@@ -50,7 +51,7 @@ TARGETS = Table[Files](
 )
 
 Modes = Literal["local", "output", "none"]  # what the number of the mode is in a functional mock-up unit
-DOCUMENTS = ("latex", "mermaid")  # targets that do not run
+DOCUMENTS = ("latex", "mermaid", "sbml")  # targets that do not run
 OF_PARTS = ("c", "fmi2", "fmi3", "latex", "matlab", "mermaid", "rust", "web")  # targets that keep systems of parts
 
 

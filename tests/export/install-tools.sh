@@ -35,4 +35,8 @@ for package in libcosimpy==0.0.6 ecospy==0.7.2 cofmupy==1.0.0 pathsim-fmi==0.1.1
   "$environment/bin/pip" install --quiet "$package"
 done
 "$importers/ecospy/bin/pip" install --quiet tbb
+
+# What runs --to sbml: test_sbml_export.py.
+[ -d "$importers/libroadrunner" ] || python3 -m venv "$importers/libroadrunner"
+"$importers/libroadrunner/bin/pip" install --quiet libroadrunner==2.10.0 python-libsbml==5.21.2
 "$importers/pathsim-fmi/bin/pip" install --quiet pathsim==0.27.1

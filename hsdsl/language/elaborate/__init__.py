@@ -58,7 +58,8 @@ class Elaboration(NamedTuple):
 
     The parts correspond by their order: ``system.modes[i].edges[k]`` is the k-th of the transitions of the i-th of
     ``document.modes``, and likewise for walls, flows and outputs. ``root`` has the nodes of the file ``text``. A scope
-    has the meaning of names: ``scopes`` that of each mode, ``top`` that outside the modes.
+    has the meaning of names: ``scopes`` that of each mode, ``top`` that outside the modes. ``before_events`` is the
+    system whose events are conditions still, not edges with a memory.
     """
 
     system: HybridSystem
@@ -67,6 +68,7 @@ class Elaboration(NamedTuple):
     text: Text
     scopes: dict[str, Scope]
     top: Scope
+    before_events: HybridSystem
 
 
 def elaborate(path: str | os.PathLike[str], *, text: bytes | None = None) -> HybridSystem:
@@ -119,7 +121,8 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
 def _elaborated(symbols: SymbolTable, root: Node, text: Text) -> Elaboration:
     try:
         with deep_stack(), timebox(limits.current().seconds, PARTS) as symbols.box:
-            system = with_events(_system(symbols))
+            conditions = _system(symbols)
+            system = with_events(conditions)
             system = with_timers(system) if symbols.timed and not system.parts else system
     except OutOfTime:
         message = "working this expression out takes too long"
@@ -131,7 +134,7 @@ def _elaborated(symbols: SymbolTable, root: Node, text: Text) -> Elaboration:
     except ValueError as error:  # a check at birth that no diagnostic foresaw
         raise ModelError([text.diagnostic("HS204", str(error), text.span(1, 1))]) from error
     top = symbols.scope(("time", "parameters", "inputs", "states", "let", "unknowns"), "")
-    return Elaboration(system, symbols.document, root, text, symbols.scopes, top)
+    return Elaboration(system, symbols.document, root, text, symbols.scopes, top, conditions)
 
 
 def _system(symbols: SymbolTable) -> HybridSystem:

@@ -1,0 +1,181 @@
+# pyright: basic
+"""A model as SBML, Level 3 Version 2: flows as rate rules, transitions as events, several modes as a parameter.
+
+A guard becomes an event whose trigger holds where the state is on it or beyond and the flow points out. Its `if`
+decides what the event assigns, so that a surface that is passed while it is false stays passed. Events lose the race
+of an instant as transitions do: one goes at a time, by priority and then by their order in the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import sympy as sp
+
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import visible
+from hsdsl.export.sbml.mathml import MathML, condition
+from hsdsl.export.source import Source, identifiers
+from hsdsl.language.elaborate import elaborate_files
+from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, symbol
+
+SPACE = "http://www.sbml.org/sbml/level3/version2/core"
+
+
+def files(source: Source) -> dict[str, bytes]:
+    """One file of SBML.
+
+    Raises UsageError: what SBML does not have.
+    """
+    return {f"{source.name}.xml": document(source).encode()}
+
+
+def document(source: Source) -> str:
+    """The text of the file."""
+    system = _system(source)
+    root = Element("sbml", xmlns=SPACE, level="3", version="2")
+    root.append(_Writer(source, system).model())
+    indent(root)
+    heading = "".join(f"<!-- {line.replace('--', '- -')} -->\n" for line in source.heading)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{heading}{tostring(root, encoding="unicode")}\n'
+
+
+def _system(source: Source) -> HybridSystem:
+    """The system, with events as conditions; refused where SBML cannot keep it."""
+    system = source.system
+    if system.inputs:
+        hint = "write it as an expression of time"
+        raise UsageError(f"SBML has no sampled inputs, and `{system.inputs[0].name}` is one", hint)
+    if not any(edge.of_event for edge in system.edges):
+        return system
+    if len(system.modes) > 1:
+        hint = "write one mode, or guards (`when`)"
+        raise UsageError("SBML has no events of a mode, and this model has several modes and an `event`", hint)
+    source_files = source.model.pipeline.files
+    assert source_files is not None
+    return elaborate_files(source_files).before_events
+
+
+class _Writer:
+    """The parts of a model in SBML."""
+
+    def __init__(self, source: Source, system: HybridSystem) -> None:
+        self.source, self.system = source, system
+        self.ids = identifiers([*system.states, *(p.name for p in system.parameters), *system.outputs])
+        self.mode = next(iter(identifiers(["mode"], self.ids.values()).values()))
+        self.numbers = {mode.name: sp.Integer(i) for i, mode in enumerate(system.modes)}
+        self.mathml = MathML({**self.ids, self.mode: self.mode})
+
+    def model(self) -> Element:
+        """The element of the model, with what it has of each kind in SBML's order."""
+        whole = Element("model", id=self.source.name, name=visible(self.system.title or self.source.name))
+        kinds = {"Parameters": self.parameters, "Rules": self.rules}
+        kinds |= {"Constraints": self.constraints, "Events": self.events}
+        for kind, make in kinds.items():
+            if parts := list(make()):
+                SubElement(whole, f"listOf{kind}").extend(parts)
+        return whole
+
+    def parameters(self) -> Iterator[Element]:
+        """Parameters, states with their initial values, outputs, and the number of the mode."""
+        problem = self.source.problem
+        for given, value in zip(self.system.parameters, problem.timeline.segments[0].data, strict=False):
+            yield self._parameter(given.name, float(value), given.about)
+        starts = dict(zip(problem.states, map(float, problem.x), strict=True))
+        for name in self.system.states:
+            yield self._parameter(name, starts.get(name, 0.0), constant=False)
+        for name in self.system.outputs:
+            yield self._parameter(name, None, constant=False)
+        if len(self.numbers) > 1:
+            listed = ", ".join(f"{number} is {name}" for name, number in self.numbers.items())
+            start = problem.program.modes[problem.mode].name
+            yield self._parameter(self.mode, float(self.numbers[start]), f"the mode: {listed}", constant=False)
+
+    def _parameter(self, name: str, value: float | None, about: str | None = None, constant: bool = True) -> Element:
+        identifier = self.ids.get(name, name)
+        given = {"id": identifier} | ({"name": visible(about or name)} if about or name != identifier else {})
+        given |= {} if value is None else {"value": repr(value)}
+        return Element("parameter", given | {"constant": str(constant).lower()})
+
+    def rules(self) -> Iterator[Element]:
+        """The flow of each state, and the outputs."""
+        for name in self.system.states:
+            flows = [mode.vector_field.get(symbol(name), sp.S.Zero) for mode in self.system.modes]
+            yield self._rule("rateRule", name, self.by_mode(flows))
+        for i, name in enumerate(self.system.outputs):
+            if lacking := [mode.name for mode in self.system.modes if mode.outputs[i] is None]:
+                raise UsageError(f"SBML needs output `{name}` in every mode, and {lacking[0]} has none")
+            yield self._rule("assignmentRule", name, self.by_mode([mode.outputs[i] for mode in self.system.modes]))
+
+    def _rule(self, tag: str, name: str, value: Any) -> Element:
+        rule = Element(tag, variable=self.ids[name])
+        rule.append(self.mathml.math(value))
+        return rule
+
+    def by_mode(self, given: list[Any]) -> Any:
+        """The expression that is given for the mode that is on."""
+        values: dict[Any, list[Any]] = {}
+        for mode, value in zip(self.system.modes, given, strict=True):
+            values.setdefault(value, []).append(self.inside(mode))
+        *others, last = values
+        pieces = [(value, sp.Or(*values[value])) for value in others]
+        return sp.Piecewise(*pieces, (last, True), evaluate=False) if pieces else last
+
+    def inside(self, mode: Mode) -> Any:
+        """The condition that a mode is on."""
+        return sp.true if len(self.numbers) == 1 else sp.Eq(symbol(self.mode), self.numbers[mode.name])
+
+    def constraints(self) -> Iterator[Element]:
+        """The walls of each mode."""
+        for mode in self.system.modes:
+            for wall in mode.walls:
+                constraint = Element("constraint")
+                constraint.append(self.mathml.math(sp.Or(sp.Not(self.inside(mode)), sp.Le(wall.residual, 0))))
+                yield constraint
+
+    def events(self) -> Iterator[Element]:
+        """The transitions, each as an event."""
+        edges = [(mode, edge) for mode in self.system.modes for edge in mode.edges]
+        names = identifiers([f"{mode.name} {edge.name} {k}" for k, (mode, edge) in enumerate(edges)], self.ids.values())
+        for k, ((mode, edge), name) in enumerate(zip(edges, names.values(), strict=True)):
+            yield self._event(mode, edge, name, len(edges) - k)
+
+    def _event(self, mode: Mode, edge: Edge, identifier: str, rank: int) -> Element:
+        event = edge.event
+        delay = event.delay if event else None
+        at_trigger = event is not None and delay is not None and not event.at_execution
+        given = {"id": identifier, "name": visible(edge.name), "useValuesFromTriggerTime": str(at_trigger).lower()}
+        whole = Element("event", given)
+        initially, persistent = (event.initially, event.persistent) if event else (False, False)
+        attributes = {"initialValue": str(initially).lower(), "persistent": str(persistent).lower()}
+        trigger = self.guard(mode, edge) if event is None else condition(event.trigger)
+        SubElement(whole, "trigger", attributes).append(self.mathml.math(trigger))
+        SubElement(whole, "priority").append(self.mathml.math(self.priority(edge, rank)))
+        if delay is not None and delay != 0:
+            SubElement(whole, "delay").append(self.mathml.math(delay))
+        assigned = {str(name): value for name, value in edge.changes.items()}
+        if edge.target != mode.name:
+            assigned[self.mode] = self.numbers[edge.target]
+        makes = SubElement(whole, "listOfEventAssignments") if assigned else whole
+        for name, value in assigned.items():
+            if edge.condition is not None:
+                value = sp.Piecewise((value, edge.condition), (symbol(name), True), evaluate=False)
+            one = SubElement(makes, "eventAssignment", variable=self.ids.get(name, self.mode))
+            one.append(self.mathml.math(value))
+        return whole
+
+    def priority(self, edge: Edge, rank: int) -> Any:
+        """What decides between events of one instant: the priority, and of whole ones then the order in the file."""
+        given = [each.event.priority for each in self.system.edges if each.event and each.event.priority is not None]
+        if not given:
+            return sp.Integer(edge.priority * (len(self.system.edges) + 1) + rank)
+        return edge.event.priority if edge.event and edge.event.priority is not None else sp.Integer(edge.priority)
+
+    def guard(self, mode: Mode, edge: Edge) -> Any:
+        """The condition that a state is on a guard or beyond it, and that the flow points out."""
+        residual = edge.surface.residual
+        slopes = [residual.diff(name) * flow for name, flow in mode.vector_field.items()]
+        rate = sum(slopes, residual.diff(TIME))
+        return sp.And(self.inside(mode), sp.Ge(residual, 0), sp.Gt(rate, 0))
