@@ -30,11 +30,10 @@ def test_every_rule_is_decided_for_every_model_of_the_tests_and_places_are_in_th
             assert finding.text == line
 
 
-@pytest.mark.parametrize("part", range(2))
-def test_random_documents(part, tmp_path):
+def test_random_documents(tmp_path):
     """`--fix` leaves a model without anything to fix, keeps its comments, and has nothing to do the second time."""
     path, sound, fixed = tmp_path / "model.yaml", 0, 0
-    for seed in range(part * RANDOM, (part + 1) * RANDOM):
+    for seed in range(RANDOM):
         path.write_bytes(generators.document(Random(seed)))
         before = path.read_bytes()
         try:
@@ -67,7 +66,7 @@ def test_a_misspelt_cell_is_found_in_a_large_grid():
         ("# hsdsl: ignore[HS401] once more\n" * 25_000 + "parameters: {a: 1}\n", 0),
         ("reference:\n" + "- {source: '# hsdsl: ignore'}  # hsdsl: ignore[HS401]\n" * 12_000, 12_000),
         ("# hsdsl: ignore[" + ",".join(f"HT{n:05}" for n in range(100_000)) + "]\n", 100_000),
-        ("# hsdsl: ignore " * 60_000 + "\n", 60_000),
+        ("# hsdsl: ignore " * 20_000 + "\n", 20_000),
     ],
     ids=["stacked", "beside texts", "long", "in one line"],
 )
