@@ -59,7 +59,7 @@ def _check_order(one: Solved, other: Solved) -> None:
 def verdict(solved: Solved) -> Verdict:
     """Finitely many transitions, how transversal they are, and how near the others came."""
     reasons = [
-        f"{len(solved.rates)} transitions, the surfaces rising at a rate of at least {float(min(solved.rates)):.4g}"
+        f"{len(solved.rates)} transitions cross their surfaces at a rate of at least {float(min(solved.rates)):.4g}"
     ]
     if solved.misses:
         reasons.append(f"elsewhere no surface is missed by less than {float(min(solved.misses)):.3g}")

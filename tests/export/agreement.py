@@ -1,4 +1,4 @@
-"""Modules for JAX, run, and held against runs of the engine."""
+"""Modules for JAX, run, and compared with runs of the engine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exported modules for JAX, imported, and held against runs."""
+"""Exported modules for JAX, imported, and compared with runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exports for MATLAB, run by GNU Octave, and held against runs."""
+"""Exports for MATLAB, run by GNU Octave, and compared with runs."""
 
 from __future__ import annotations
 

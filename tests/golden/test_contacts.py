@@ -90,7 +90,7 @@ experiment: {until: 1}
 """
     run = hsdsl.loads(text).simulate(engine=engine)
     assert run.stop.reason == "zeno"
-    assert "that of one among them, and no one motion along them is known" in run.stop.message
+    assert "among them that of one, and no single motion along them is known" in run.stop.message
 
 
 def many(n: int, springs: str = "") -> str:

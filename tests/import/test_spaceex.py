@@ -1,4 +1,4 @@
-"""Models of SpaceEx, written by hand from published equations: imported, run, and held against exact switch times."""
+"""Models of SpaceEx, written by hand from published equations: imported, run, and compared with exact switch times."""
 
 from __future__ import annotations
 

@@ -291,7 +291,7 @@ REFUSED = {
         "outputs: {total: sum(p.x), how_many: count(a.m)}"
     ),
     "HS111 no automaton or instance 'b'": CLOCK + ONE + "outputs: {total: sum(b.x**2)}",
-    "HS111 no instance is of": (
+    "HS111 no instance uses": (
         "automata: {a: {modes: {m: {flow: {x: 1}}}}, b: {modes: {m: {flow: {x: 1}}}}}\n"
         + ONE
         + "outputs: {total: sum(b.x)}"

@@ -142,7 +142,7 @@ def test_van_der_pol() -> None:
     made = model('{x: v, v: "((1 - x**2)*v - x)/1e-6"}', "x: 2, v: 0", 2)
     run = made.simulate(tolerance=1e-8)
     assert abs(run.final.state["x"] - 1.706167732170483) <= 1e-8
-    peak = np.max(np.abs(run.values[:, 1]))  # v's scale, 1.3e3: its errors are held against that
+    peak = np.max(np.abs(run.values[:, 1]))  # v's scale, 1.3e3: its errors are compared with that
     assert abs(run.final.state["v"] + 0.8928097010247975) <= 1e-8 * peak
     assert len(run.times) <= 5000
 

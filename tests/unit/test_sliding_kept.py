@@ -51,7 +51,7 @@ experiment: {until: 3}
 
 @pytest.mark.parametrize("scheme", ["located", "relaxed"])
 def test_switches_slide_stop_or_chatter(scheme):
-    """Without completion two modes that press on one surface end a run; with a distance they stay near the sliding."""
+    """Without completion a run ends where two flows point towards one surface; with a distance it stays near."""
     model, given = hsdsl.loads(SWITCHED), {"engine": "python", "scheme": scheme, "relaxation": 1e-4}
     assert model.simulate(**given).stop.reason == "zeno"
     slides = model.simulate(completion="auto", **given)

@@ -63,8 +63,8 @@ EARLY, LATE = "1 - sqrt(0.5) - 1e-9", "1 - sqrt(0.5) + 1e-10"  # before and afte
 EASY = {"height": "0.25", "until": "2", "size": "tolerance: 1e-9", "condition": ""}
 COMMUTING = {"shift": "z + 1", "double": "z + 2", "start": "0"}
 CASES = [
-    ("transversal", THROW, EASY, "holds", "1 transition, the surfaces rising at a rate of at least 0.7071"),
-    ("missed by far", THROW, EASY | {"height": "0.6"}, "holds", "the nearest miss is of touch at t = 1, by"),
+    ("transversal", THROW, EASY, "holds", "1 transition crosses its surface at a rate of at least 0.7071"),
+    ("missed by far", THROW, EASY | {"height": "0.6"}, "holds", "the nearest miss is that of touch at t = 1, at"),
     ("missed by less than the error", THROW, EASY | {"height": "0.5 + 1e-12"}, "unknown", "turns back close to"),
     ("touched at the top", THROW, EASY | {"height": "0.5"}, ("unknown", "left"), "touch"),
     ("nearly tangential", THROW, EASY | {"height": "0.5 - 1e-10"}, "unknown", "touch"),
@@ -74,7 +74,7 @@ CASES = [
     ("condition clear and false", THROW, EASY | {"condition": "if: s <= 0.1, "}, "holds", "no transition"),
     ("condition near", THROW, EASY | {"condition": f"if: s <= {LATE}, "}, "unknown", "whether the condition"),
     ("condition near, false", THROW, EASY | {"condition": f"if: s <= {EARLY}, "}, "unknown", "whether the condition"),
-    ("a fixed step", THROW, EASY | {"size": "step: 1e-2"}, "unknown", "a fixed step does not say"),
+    ("a fixed step", THROW, EASY | {"size": "step: 1e-2"}, "unknown", "a fixed step gives no estimate"),
     ("together, commuting", PAIR, COMMUTING, "holds", "every order leads to the same point"),
     ("together, not commuting", PAIR, COMMUTING | {"double": "2*z"}, "left", "matters"),
     ("nearly together", PAIR, COMMUTING | {"double": "2*z", "start": "1e-11"}, "unknown", "and it matters"),

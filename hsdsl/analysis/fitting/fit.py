@@ -101,8 +101,8 @@ class Fit:
             known = f"+- {number(deviation, 3)}" if determined else "not determined by the measurements"
             bound = ", at its bound" if name in self.at_bound else ""
             yield f"  {name:{width}}  {number(value, 12 if determined else 3)} {known}{bound}"
-        yield f"left over: {number(self.deviation, 4)} (weighted root mean square)"
-        yield f"{'ended' if self.success else 'did not end'} well: {self.message}"
+        yield f"residual: {number(self.deviation, 4)} (weighted root mean square)"
+        yield f"{'converged' if self.success else 'did not converge'}: {self.message}"
         yield from (f"not smooth: {reason}" for reason in condensed(self.nonsmooth))
 
     def plot(self, path: str | os.PathLike[str]) -> None:
@@ -111,7 +111,7 @@ class Fit:
 
         values = ", ".join(f"{name} = {number(value, 6)}" for name, value in self.values.items())
         heading = (
-            f"fit to {counted(self.measured.count, 'measurement')}: {values}; left over {number(self.deviation, 4)}"
+            f"fit to {counted(self.measured.count, 'measurement')}: {values}; residual {number(self.deviation, 4)}"
         )
         plot_measured(path, self.execution, self.measured.times, self.measured.columns, self.units, heading)
 

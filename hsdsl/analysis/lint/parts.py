@@ -35,7 +35,7 @@ from hsdsl.mathematics.decisions.search import SearchRange
 CODES = ("HS401", "HS402", "HS403", "HS406")
 _WORD = re.compile(r"[^\W\d]\w*")
 _UNUSED = "remove it, or use it"
-_UNKNOWN = "some rules do not look at systems of parts, and some only at automata that use nothing of others"
+_UNKNOWN = "some rules do not check systems of parts, and some check only automata that use nothing of other parts"
 
 
 def findings_of_parts(subject: Subject, codes: abc.Sequence[str]) -> Iterator[tuple[str, Finding]]:
@@ -87,7 +87,7 @@ def _unreachable(document: SystemDocument, name: Key, kind: AutomatonDocument) -
     """Modes that no instance starts in and no transition leads to."""
     instances = [one for one in document.system.values() if one.automaton.value == name]
     if not instances:
-        yield "HS406", Finding(name.place.span, f"no instance is of the automaton '{name}'", _UNUSED)
+        yield "HS406", Finding(name.place.span, f"no instance uses the automaton '{name}'", _UNUSED)
         return
     starts = {one.initial.mode.value for one in instances if one.initial and one.initial.mode}
     first = {str(mode) for mode in kind.modes if str(mode) in starts or len(kind.modes) == 1}

@@ -121,7 +121,7 @@ def proposed_step(stages: Stages, scales: Sequence[Number], tolerance: Number, a
 
     Both the last term of the polynomial and the one after it count, so that an even or odd solution is no trap. With l
     the largest coefficient of order m relative to the tolerance, h = l**(-1/m); one more of order m + 1 asks for less
-    only where it exceeds l/h. A state that has been zero so far, or too small for digits, is held against the first of
+    only where it exceeds l/h. A state that has been zero so far, or too small for digits, is compared with the first of
     its own terms.
     """
     least, before = None, arithmetic.zero

@@ -32,7 +32,7 @@ class Collocation:
     estimate : Vector
         Weights of the increments in the embedded method's defect, added to h times the flow at the step's start.
     share : Number
-        Where inside a step its polynomial is held against the flow: (6 - sqrt 6)/10.
+        Where inside a step its polynomial is compared with the flow: (6 - sqrt 6)/10.
     value, slope : Vector
         Weights of the increments in the polynomial and in its derivative by s there.
     end_slope : Vector

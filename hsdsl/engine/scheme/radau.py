@@ -228,7 +228,7 @@ def estimate(
 
     Both are (gamma - h J)^-1 times a defect. That of Hairer and Wanner (IV.8.19), from the flow at the start, is the
     embedded method's; over a decay that the step is too long to show it stays as large as what decays. For stiff states
-    that follow a slow motion it is far too small for the curve, so the flow is held against the polynomial at one more
+    that follow a slow motion it is far too small for the curve, so the flow is compared with the polynomial at one more
     point, where the polynomial's slope is farthest off.
 
     Where steps show a decay the first is 2.7 times the second, and that 1.5 times the largest error of the curve. The

@@ -1,6 +1,6 @@
-"""The scales of states that errors are held against: see hsdsl/engine/integrators/stepper.py.
+"""The scales of states that errors are compared with: see hsdsl/engine/integrators/stepper.py.
 
-The *scale* of a state is the largest size it has had in a run. No error of a state is held against 1: a state may be a
+The *scale* of a state is the largest size it has had in a run. No error of a state is compared with 1: a state may be a
 current of 1e-12 or a pressure of 1e5. A state whose flow is a small difference of large terms, as the speed of a mass
 at rest on a spring, may be no more than their round-off. So where a step cannot be accepted, the scale of a state is
 not below a share of what these terms could move it by (`resolved`): that share whose tolerance is so many units of

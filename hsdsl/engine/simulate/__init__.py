@@ -9,7 +9,7 @@
 `surfaces`              a mode's surfaces at a point, as polynomials along a step, and where these rise through zero
 `transitions`           which crossing goes, its reset, the mode entered, cascades, executions that wait
 `contact`               guards that hold the state, motion along them, and Zeno tails that end in it (M11)
-`control`               the step size, and what errors are held against
+`control`               the step size, and what errors are compared with
 `stalls`                when no shorter step helps, and why a run cannot go on, also the compiled one
 `stops`                 how runs end and what they remark, in sentences
 `input_segments`        inputs as segments that no step crosses

@@ -62,7 +62,7 @@ class CompiledPlan:
         self._mode, self._x = problem.mode, np.array(problem.x, np.float64)
         self._start = len(problem.x), self._x.ctypes.data
         self.until, self.memory, self.queued = settings.until, settings.memory, bool(program.queues)
-        self.of_screens: dict[bool, Any] = {}  # those of its runs, by whether they are held against shadow runs
+        self.of_screens: dict[bool, Any] = {}  # those of its runs, by whether they are compared with shadow runs
         self._formulas = compiled.shared("formulas", partial(_tables, program)) if settings.moves else None
         self._rows = 1.01 * settings.until / settings.step + 64 if settings.step else 0
 

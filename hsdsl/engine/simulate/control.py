@@ -14,7 +14,7 @@ the step before (Gustafsson's predictive control; Hairer and Wanner 1996, IV.8),
 stretch of flow begins with a step in which no state moves by more than tolerance**(1/4) of its scale, but no shorter
 than the least step: the largest one times the tolerance, or times 1e-8 (half the digits of a number) if that is more.
 
-A state that has been zero so far has no scale. It is held against its own value at the step's end. Where it begins as
+A state that has been zero so far has no scale. It is compared with its own value at the step's end. Where it begins as
 a power of time that is above the method's order, no step is short enough for that: over the least step a state that has
 been no more than the tolerance times what it is then does not count.
 

@@ -1,4 +1,4 @@
-"""The finer run that another one is held against: its settings, and how its round-off moves it.
+"""The finer run that another one is compared with: its settings, and how its round-off moves it.
 
 The difference of the two runs estimates the error of the first. The tolerance falls to a tenth, so the finer run is
 wrong by about a tenth of what the run is. Steps that the tolerance does not bound become shorter in the same way: the

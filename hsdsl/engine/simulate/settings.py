@@ -42,7 +42,7 @@ class Settings:
     ``completion`` is `none` where no state moves along a guard that holds it.
     ``longest_step`` bounds the steps of an adaptive method further, ``first_steps`` the first ones of each arc of flow,
     0 where it does not: by this number, then twice, then four times as much.
-    ``moves`` is whether round-off moves the run, as one that another is held against (`hsdsl.engine.simulate.moving`).
+    ``moves`` is whether round-off moves the run, as one that another is compared with (`hsdsl.engine.simulate.moving`).
     ``method`` is None and ``one_stop`` is given for the scheme that has its own formula, `paoli_schatzman`.
     """
 

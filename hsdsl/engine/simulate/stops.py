@@ -235,7 +235,7 @@ class Diagnostics:
             self._noted.add("crowded")
             self.remarks[len(self.departures)] = Remark("crowded", "", t)
             self.departures.append(
-                f"more than {FREE} transitions within the relaxation, from t = {show(t)} on in strips"
+                f"more than {FREE} transitions fall within the relaxation: from t = {show(t)} on each waits in a strip"
             )
 
     def in_contact(self, edge: str, start: Number, end: Number, still: bool) -> None:
@@ -262,15 +262,15 @@ class Diagnostics:
         counts = ", ".join(without_memory(edge.target_states[i] for i in edge.counts))
         self.remarks[len(self.departures)] = of_edge("replaced", edge.name, end)
         self.departures.append(
-            f"Zeno at t = {show(end)}: the transitions of {edge.name} after number {number}, all within {show(left)} "
-            f"of each other, are replaced by their limit{f'; {counts} has none and keeps its value' * bool(counts)}"
+            f"Zeno at t = {show(end)}: the transitions of {edge.name} after number {number} lie within {show(left)} of "
+            f"each other, and their limit replaces them{f'; {counts} has no limit, and keeps its value' * bool(counts)}"
         )
 
     def accumulates(self, edge: str, end: Number, t: Number) -> Stop:
         """Transitions accumulate at ``end``, and no motion along the guard goes on there: the run stops at t."""
         sentence = (
             f"the transitions of {edge} accumulate at t = {show(end)}, and no motion along its guard is known there: "
-            "one that goes on along it needs a mode of its own"
+            "give the motion that follows a mode of its own"
         )
         self.departures.append(f"Zeno at t = {show(end)}: {sentence}")
         return Stop("zeno", t, sentence)
@@ -280,7 +280,7 @@ class Diagnostics:
         where = ", ".join(f"{name} = {show(a)}" for name, a in zip(without_memory(states), x, strict=False))
         sentence = (
             f"the transitions of {', '.join(dict.fromkeys(self.turns))} take turns and accumulate at t = {show(t)}, "
-            f"where {where}: no motion is known at this limit, and one that goes on needs a mode of its own"
+            f"where {where}: no motion is known at this limit: give the motion that follows a mode of its own"
         )
         self.departures.append(f"Zeno at t = {show(t)}: {sentence}")
         return Stop("zeno", t, sentence)
@@ -288,8 +288,8 @@ class Diagnostics:
     def coupled(self, edge: str, t: Number) -> Stop:
         """Guards hold the state together, and the forces that do so are not one choice: the run stops at t."""
         sentence = (
-            f"several guards hold the state at t = {show(t)}, that of {edge} among them, and no one motion along them "
-            "is known: their forces are not one choice, or they are too many"
+            f"several guards hold the state at t = {show(t)}, among them that of {edge}, and no single motion along "
+            "them is known: their forces are not unique, or there are too many guards"
         )
         self.departures.append(sentence)
         return Stop("zeno", t, sentence)
@@ -298,14 +298,14 @@ class Diagnostics:
         """A crossing was found on a piece of a surface that is no polynomial."""
         if (mode, k) not in self.rough:
             self.rough[mode, k] = t
-            self.undecided.append(f"surface {k} of mode {mode} would not settle on a polynomial at t = {show(t)}")
+            self.undecided.append(f"no polynomial fits surface {k} of mode {mode} to round-off at t = {show(t)}")
 
 
 def slides(edge: str, source: ModeProgram, target: ModeProgram, t: Number) -> Stop:
     """Transitions without flow between them return to the same state: the run stops at t."""
     if source.name == target.name:
         back = f"{edge} leads back to the same state of mode {source.name}"
-        how = f"{back} without end, since the flow presses on its guard"
+        how = f"{back} without end, since the flow points beyond its guard"
     else:
         how = (
             f"transitions lead from mode {source.name} to mode {target.name} and back to the same state without end, "
@@ -315,7 +315,7 @@ def slides(edge: str, source: ModeProgram, target: ModeProgram, t: Number) -> St
             how += "on an intersection of surfaces no rule gives one flow"
         else:
             how += (
-                "completion: auto follows the motion where both modes press on one surface, written alike "
-                "up to a factor, and neither has events"
+                "completion: auto follows the motion if both flows point towards one surface, which both modes write "
+                "alike up to a factor, and neither mode has events"
             )
     return Stop("zeno", t, f"sliding at t = {show(t)}: {how}")

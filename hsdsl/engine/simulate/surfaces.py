@@ -5,7 +5,7 @@ entered the mode so; it *stands* on a guard (`Surfaces.standing`) where that is 
 A surface is *emerging* where it moved past the state while that waited in a strip, and the flow leads back through it.
 
 With a Taylor method the polynomial is the surface's own series, if it is smooth. Otherwise the surface is interpolated
-on the step's dense output, at equidistant nodes, and held against itself between them: where that residual is too
+on the step's dense output, at equidistant nodes, and compared with itself between them: where that residual is too
 large the piece is halved. Roots are isolated in the Bernstein form: its coefficients on an interval enclose the values
 there, and a polynomial has at most as many roots inside as they have changes of sign, and as many up to an even number
 (Descartes' rule). An interval is cut until these decide; no root between two samples can be missed. See R. T. Farouki,
@@ -323,7 +323,7 @@ def along_steps(settings: Settings) -> tuple[int, Number]:
 class Interpolation:
     """How a function is interpolated on [0, 1].
 
-    Its values at ``nodes``, equidistant, times ``matrix`` are coefficients of powers; they are held against it at
+    Its values at ``nodes``, equidistant, times ``matrix`` are coefficients of powers; they are compared with it at
     ``tests``. ``rounding`` is what round-off in them can amount to, relative to its largest value.
     """
 

@@ -195,7 +195,7 @@ def _two_colons(content: str, column: int) -> str:
 def _indentation(text: Text, line: int, column: int) -> Diagnostic:
     dash = _DASH.fullmatch(text.lines[line - 2]) if 2 <= line <= len(text.lines) else None
     if dash:
-        message, hint = "after the dash of a list item a space is missing", f"write - {shown(dash.group(2))}"
+        message, hint = "a space is missing after the dash of a list item", f"write - {shown(dash.group(2))}"
         return text.fault("HS004", message, line - 1, len(dash.group(1)) + 1, hint, _WHOLE_LINE)
     item = _line(text, line).lstrip().startswith("- ")
     message = "a list item is not possible here" if item else "the indentation of this line fits no line above it"
@@ -207,7 +207,7 @@ def _misread(text: Text, line: int, column: int) -> Diagnostic:
     content = _line(text, line)
     remark = _COMMENT.match(content, column - 1) or _COMMENT.match(content, _indent(content))
     if remark and content[: remark.start()].rstrip()[-1:] in ("", "}", "]"):
-        message, length = f"`{remark.group()}` begins no comment", len(remark.group())
+        message, length = f"`{remark.group()}` does not begin a comment", len(remark.group())
         return text.fault("HS004", message, line, remark.start() + 1, "write `#` before it", length)
     match = _VALUE.match(content)
     start = match.start("value") if match else column - 1
@@ -326,7 +326,7 @@ def _one(run: list[Scalar] | list[Node], findings: Findings) -> Node:
     whole = _joined(run)
     if whole is run[0] or not isinstance(whole, Scalar):
         return run[0]
-    message = "inside braces or brackets YAML ends a value at its comma"
+    message = "YAML ends a value at a comma inside braces or brackets"
     hint = f'quote this expression: "{whole.value}"'
     if _decimal(list(run)):
         whole = Scalar(whole.value.replace(",", "."), True, whole.place)

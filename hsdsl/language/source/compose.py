@@ -173,7 +173,7 @@ class _Composer:
             key = Key.at(normalised(node.value), node.place)
             if key in unique:
                 line = unique[key][0].place.span.line
-                message = f"the key '{shown(key)}' is here a second time; the first is on line {line}"
+                message = f"the key '{shown(key)}' is repeated; line {line} has the first one"
                 self.findings.add(node.place.diagnostic("HS008", message, "keep one of them"))
                 continue
             unique[str(key)] = (key, value)
@@ -183,7 +183,7 @@ class _Composer:
         name = event.anchor
         place = self._place(event)
         if name not in self.anchors:
-            message = f"`*{name}` is an alias in YAML, and no anchor `&{name}` is before it"
+            message = f"`*{name}` is an alias in YAML, and there is no anchor `&{name}` before it"
             from hsdsl.language.diagnosis.yaml_text import quote
 
             _, line, column = place.start

@@ -22,7 +22,7 @@ _TIE_OF_WRITTEN_TIMES = 1e-9
 def starts_outside(subject: Subject) -> Iterator[Finding]:
     """Find initial states beyond a guard or a wall."""
     part = subject.mode(subject.system.initial.mode)
-    place, hint = subject.document.initial.mode.place, "start inside, or turn the inequality round"
+    place, hint = subject.document.initial.mode.place, "start inside, or reverse the inequality"
     if part.mode.final:
         return
     edges = [edge for edge in part.mode.edges if edge.condition is None and side(edge.surface, subject.start) == BEYOND]
@@ -71,7 +71,7 @@ def ends_on_event(subject: Subject) -> Iterator[Finding]:
     until = subject.setting("until")
     names = (*_guards_of_time(subject, until), *_reached_by_constant_flow(subject, until), *_recorded(subject, until))
     for name in dict.fromkeys(names):
-        message = f"the run ends at the very moment of '{name}'"
+        message = f"the run ends at the instant of '{name}'"
         yield Finding(subject.document.experiment.until.place.span, message, "end a little earlier or later")
 
 

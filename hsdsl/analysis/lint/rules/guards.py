@@ -42,7 +42,7 @@ def guard_never_crossed(subject: Subject) -> Iterator[Finding]:
         if found is None or entered_beyond(subject.dynamics, edge.edge):
             continue
         why, proof = found
-        where, hint, severity = within(proof.searched), "turn the inequality round or correct its level", None
+        where, hint, severity = within(proof.searched), "reverse the inequality or correct its level", None
         if any(s is not TIME for s, _, _ in proof.searched):  # a run may go beyond
             hint = f"a run that leaves these bounds may cross it; where none does, {hint}"
             severity = "note"
@@ -322,7 +322,7 @@ def sliding(subject: Subject) -> Iterator[Finding]:
             reported.add(pair)
             where = at(dynamics, part.mode, answer, [residual, rate, landing.rate])
             names = f"'{edge.edge.name}' and '{back.name}'"
-            message = f"{names} push against one surface from both sides (sliding): {where}"
+            message = f"{names} point towards one surface from both sides (sliding): {where}"
             hint = "give the two surfaces a distance; where sliding is meant, experiment: {completion: auto} follows it"
             decided = "sampled" if answer.decided == "sampled" else "symbolic"
             alike.add((rate, landing.rate), Finding(edge.document.when.place.span, message, hint, decided))

@@ -198,7 +198,7 @@ def misnamed_output(subject: Subject) -> Iterator[Finding]:
     for mode, name, taken in _outputs(subject):
         tree = trees[mode, name]
         if name in taken and not (isinstance(tree, Name) and tree.name == name):
-            message = f"the output '{name}' is something else than '{name}' in the expressions of this file"
+            message = f"the output '{name}' differs from '{name}' in the expressions of this file"
             yield Finding(name.place.span, message, _SEPARATE)
 
 

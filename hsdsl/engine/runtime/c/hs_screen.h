@@ -124,7 +124,7 @@ typedef struct {
   int32_t missed_mode, missed_surface;
 } hs_screen;
 
-/* Screen a run, held against a finer one if there is one: 0 where there is surely nothing to find, -1 where there may
+/* Screen a run, compared with a finer one if there is one: 0 where there is surely nothing to find, -1 where there may
    be. Where that takes more room than there is, nothing was done, and it is so many numbers. */
 HS_EXPORT int64_t hs_screen_run(hs_screen *screen, const hs_record *run, const hs_record *finer);
 

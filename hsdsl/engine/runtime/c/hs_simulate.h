@@ -59,7 +59,7 @@ typedef struct {
 
 enum { HS_TESTS = 3 };
 
-/* How functions are interpolated: values at the nodes times the matrix are coefficients of powers, held against the
+/* How functions are interpolated: values at the nodes times the matrix are coefficients of powers, compared with the
    functions at the tests. */
 typedef struct {
   int degree;

@@ -164,7 +164,7 @@ static void forget_steps(hs_run *run) {
   if (run->method->kind == HS_RADAU) begin_stretch(&run->radau, blocks_of(run->here.table));
 }
 
-/* Error ratio of a step of length h to run->z, errors held against these scales. */
+/* Error ratio of a step of length h to run->z, errors compared with these scales. */
 HS_INLINE hs_real ratio_with(hs_run *run, hs_real h, const hs_real *scales) {
   return ratio_to(&run->control, h, run->error, run->z, scales, run->scales, run->here.dimension);
 }

@@ -2,7 +2,7 @@
 
 The convergence theorem (Burden et al. 2013, Thm 26, Cor. 28) is about executions that cross finitely many guards, each
 transversally. No other surface is so near that an error could change the sequence, and simultaneous choices lead to the
-same point. A run shows its own neighbourhood of the execution, so every margin is held against the error that the run
+same point. A run shows its own neighbourhood of the execution, so every margin is compared with the error that the run
 allows itself: that of a shadow run, and where that does not show that the theorem holds, that of a finer run.
 
 The hypotheses are checked in this order. Where the compiled `screen` leaves none undecided, that is all.
@@ -185,12 +185,12 @@ def _named(found: Sequence[Finding], theorem: str) -> Iterator[str]:
 def _unchecked(run: RunView) -> list[str]:
     """Why hypotheses could not be checked for all of a run."""
     if run.stop.reason in INCOMPLETE:
-        return [f"the run did not get to its end: {run.stop.message}"]
+        return [f"the run did not reach its end: {run.stop.message}"]
     if run.errors is not None:
         return []
     if run.problem.settings.tolerance is not None:
-        return ["the finer run was interrupted, so no margin can be held against the error"]
-    return ["a fixed step does not say how wrong it is, so no margin can be held against the error (a tolerance does)"]
+        return ["the finer run was interrupted, so no margin can be compared with the error"]
+    return ["a fixed step gives no estimate of its error, so no margin can be compared with it (a tolerance does)"]
 
 
 def _crowded_steps(problem: Problem, execution: Execution) -> list[str]:

@@ -55,7 +55,8 @@ def summary(made: int, count: int, slowest: Number | None, least: Number | None)
     """Say how many of the transitions that were made the flow made, at which rates, and by which margin."""
     if not count or slowest is None:
         return ["no transition"] if not made else []
-    each = f"{count} transition{'s' * (count > 1)}, the surfaces rising at a rate of at least {float(slowest):.4g}"
+    cross = f"{count} transitions cross their surfaces" if count > 1 else "1 transition crosses its surface"
+    each = f"{cross} at a rate of at least {float(slowest):.4g}"
     return [each + (f", {times(least)} what the error could undo" if least is not None else "")]
 
 
@@ -156,7 +157,7 @@ def accumulations(run: RunView) -> Iterator[str]:
         first = made[crowded[0] - FREE]
         yield (
             f"more than {FREE} transitions within the relaxation of flow from t = {show(first.time)} on "
-            f"({first.edge}): a Zeno point, rest or sliding, which the theorem is not about"
+            f"({first.edge}): a Zeno point, rest or sliding, which the theorem does not cover"
         )
 
 

@@ -1,8 +1,8 @@
 """The flow along steps: does it vary where no step evaluated it, jump, or have no bound on its slope?
 
 A step's polynomial knows the flow at a few points. Operations of the flow that are not as smooth as half a step is long
-may be pulses that it did not see. What they may add is held against the error, on parts of the step that are halved;
-there the flow is held against the polynomial's own derivative, too.
+may be pulses that it did not see. What they may add is compared with the error, on parts of the step that are halved;
+there the flow is compared with the polynomial's own derivative, too.
 
 For that, routines are expanded along parts of steps, many at once: what a formula is there up to third order. An
 expansion is a function of u from -1 to 1, no further than its remainder from a polynomial. An operation is *resolved*
@@ -47,7 +47,7 @@ def flows(run: RunView) -> tuple[list[Finding], list[str]]:
         visited = {arc.mode for arc in run.flows}
         if jumping := [mode.name for mode in run.problem.program.modes if mode.jumps and mode.name in visited]:
             where = f"the flow of mode {', '.join(jumping)} jumps where sign, floor or select does, or atan2 on its cut"
-            found.append(Finding("jump", "unknown", f"{where}, and the theorem is about continuous ones"))
+            found.append(Finding("jump", "unknown", f"{where}; the theorem assumes continuous flows"))
     if run.errors is None:
         return found, []
     for steps in steps_of(run, marked="changing"):

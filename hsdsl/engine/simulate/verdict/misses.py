@@ -55,7 +55,7 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
         turning = _turning(run, steps)
         found += filter(None, (_turned(run, each, passed) for each in turning[:MOST_TURNING_POINTS]))
         if len(turning) > MOST_TURNING_POINTS:
-            more = f"{len(turning) - MOST_TURNING_POINTS} more turning points close to surfaces were not looked at"
+            more = f"{len(turning) - MOST_TURNING_POINTS} more turning points close to surfaces were not checked"
             found.append(Finding("misses", "unknown", more))
     passing, near = run.undecided("transparent"), run.undecided("nearest")
     for steps in steps_of(run) if passing or near else ():
@@ -74,7 +74,7 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
         margins = run.screen.margins.nearest_miss(run.problem.program.modes)
     elif not found and nearest is not None:
         margin, name, time = nearest
-        margins = [f"the nearest miss is of {name} at t = {show(time)}, by {times(margin)} the error"]
+        margins = [f"the nearest miss is that of {name} at t = {show(time)}, at {times(margin)} the error"]
     ended = _at_the_end(run) if run.undecided("ending") else ()
     run.remarks = [of_edge("passed", name, time) for name, at in passed.items() for time in at]
     run.remarks += [Remark("beyond", *each.wall) for each in found if each.wall is not None]

@@ -64,7 +64,7 @@ class Margins(NamedTuple):
         mode, k = modes[self.mode], self.surface
         edges = mode.edges
         name = edges[k].name if k < len(edges) else f"the wall {wall_of(mode, k)}"
-        return [f"the nearest miss is of {name} at t = {show(self.missed)}, by {times(self.margin)} the error"]
+        return [f"the nearest miss is that of {name} at t = {show(self.missed)}, at {times(self.margin)} the error"]
 
 
 class Screen:
@@ -78,7 +78,7 @@ class Screen:
     def decide(self, columns: Columns, finer: int | None = None) -> bool:
         """Screen a run, and say whether there is surely nothing to find; ``finer`` is the record of a finer one.
 
-        Without that, the run is held against its shadow run.
+        Without that, the run is compared with its shadow run.
         """
         self.columns = columns
         while (left := self._decide(self._where, columns.record, finer)) > 0:
@@ -88,7 +88,7 @@ class Screen:
 
     @property
     def shadow_errors(self) -> ShadowErrors:
-        """How far the run is from its shadow run; only of a run that is held against one."""
+        """How far the run is from its shadow run; only of a run that is compared with one."""
         run = self.table.run
         apart = self._found("shadow_errors", run.rows * run.width, np.float64)
         return ShadowErrors(apart.reshape(run.rows, run.width), self._found("time_errors", run.transitions, np.float64))
@@ -133,7 +133,7 @@ class Screen:
 
 
 class Screens:
-    """Screens of the runs by a plan, held against shadow runs or finer runs.
+    """Screens of the runs by a plan, compared with shadow runs or finer runs.
 
     What one leaves can be used by the next.
     """

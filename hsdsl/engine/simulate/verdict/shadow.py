@@ -65,7 +65,7 @@ ROUNDED = 2.0**-52  # of a state that moves, in each step
 FEWEST, MORE_TERMS = 3, 2  # the order of the first series, and by how much it grows where that is not enough
 NODES, POWERS = 4, 6
 POLE = 1 / 5
-INSIDE = (6 - sqrt(6)) / 10  # where a polynomial by Radau IIA is held against the flow: `collocation`
+INSIDE = (6 - sqrt(6)) / 10  # where a polynomial by Radau IIA is compared with the flow: `collocation`
 
 
 @dataclass(frozen=True)
@@ -332,7 +332,7 @@ def correction() -> tuple[Array, Array, Array, Array]:
     weights : array, shape (6, 4)
         d(1) is the sum of W**(m + 1) times the sum of ``weights[m, i]`` g at node i, W the inverse of 1 - h J/5.
     bulge, slope : array, shape (4,)
-        m and M at the nodes, for M = 1 where the polynomial is held against the flow.
+        m and M at the nodes, for M = 1 where the polynomial is compared with the flow.
     """
     from numpy.polynomial import Legendre, Polynomial  # few runs need them
 

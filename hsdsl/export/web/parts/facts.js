@@ -48,13 +48,13 @@ function stopped(run) {
 function noted({kind, mode, surface, number, time: t, other}) {
   const edge = edgeOf(mode, surface);
   return {
-    "crowded": `more than 16 transitions within the relaxation, from ${time(t)} on in strips`,
+    "crowded": `more than 16 transitions fall within the relaxation: from ${time(t)} on each waits in a strip`,
     "in contact": `${number ? "at rest on" : "motion along"} the guard of ${edge} from ${time(t)} to ${time(other)}`,
-    "replaced": `Zeno at ${time(t)}: the transitions of ${edge} after number ${number} are replaced by their limit`,
+    "replaced": `Zeno at ${time(t)}: the limit of the transitions of ${edge} after number ${number} replaces them`,
     "accumulates": `the transitions of ${edge} accumulate at ${time(t)}, and no motion along its guard is known there`,
     "takes turn": `transitions, ${edge} the last of them, take turns and accumulate at ${time(t)}: no motion is known there`,
-    "coupled": `several guards hold the state at ${time(t)}, that of ${edge} among them, and no one motion along them is known`,
-    "unsettled": `surface ${surface} of mode ${modeOf(mode)} would not settle on a polynomial at ${time(t)}`,
+    "coupled": `several guards hold the state at ${time(t)}, among them that of ${edge}, and no single motion along them is known`,
+    "unsettled": `no polynomial fits surface ${surface} of mode ${modeOf(mode)} to round-off at ${time(t)}`,
     "slides": `sliding at ${time(t)}: the flows of ${modeOf(mode)} and ${modeOf(number)} lead into each other`,
   }[model.notices[kind]];
 }

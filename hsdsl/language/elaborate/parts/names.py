@@ -431,7 +431,7 @@ class Names(Mapping[str, Meaning]):
             if roster.is_broken(base):
                 return Name(f"{base}.{IN_MODE}", node.start, node.end)
             if base in roster.automata and not roster.group(base):
-                message = f"no instance is of the automaton '{base}'"
+                message = f"no instance uses the automaton '{base}'"
                 raise ExpressionError("HS111", message, node.start, node.end, "give one under `system`")
             if "." in node.name and not roster.group(base):
                 message = f"there is no automaton or instance '{base}'"
