@@ -12,10 +12,9 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Generic, NamedTuple, NoReturn, TypeVar
+from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from hsdsl.base import interrupts
 from hsdsl.base.errors import ModelError, UsageError
@@ -41,42 +40,36 @@ Answer = Lowered | ModelError | None
 LARGE = 0.03  # seconds to elaborate a model, from which on a copy takes less time than half of the lowering
 
 
-@dataclass(frozen=True)
-class _Copy(Generic[Result]):
-    """A copy of this process that does some work, and where its answer is read."""
-
-    process: int
-    answer: int
-
-    def wait(self) -> Result | None:
-        """Its answer; None where it ends without one."""
-        import pickle  # what was compiled before needs none
-
-        with open(self.answer, "rb", closefd=False) as stream:
-            written = stream.read()
-        with suppress(EOFError, pickle.UnpicklingError):
-            return pickle.loads(written)
-        return None
-
-    def end(self) -> None:
-        """End the process, if it has not ended; until it is waited for, its number is no other's."""
-        from signal import SIGKILL
-
-        os.close(self.answer)
-        with suppress(ProcessLookupError):
-            os.kill(self.process, SIGKILL)
-        with suppress(ChildProcessError):
-            os.waitpid(self.process, 0)
+_begun: list[tuple[ModelFiles, int, int]] = []  # files, the process that lowers them, and where its answer is read
 
 
-_begun: list[tuple[ModelFiles, _Copy[Answer]]] = []
+def _answer_of(answer: int) -> Any:
+    """The answer of another process; None where it ends without one."""
+    import pickle  # what was compiled before needs none
+
+    with open(answer, "rb", closefd=False) as stream:
+        written = stream.read()
+    with suppress(EOFError, pickle.UnpicklingError):
+        return pickle.loads(written)
+    return None
+
+
+def _end(process: int, answer: int) -> None:
+    """End a process, if it has not ended; until it is waited for, its number is no other's."""
+    from signal import SIGKILL
+
+    os.close(answer)
+    with suppress(ProcessLookupError):
+        os.kill(process, SIGKILL)
+    with suppress(ChildProcessError):
+        os.waitpid(process, 0)
 
 
 def begin(files: ModelFiles) -> None:
     """Begin to lower a model in another process, where that saves time: see :func:`taken`."""
     if _saves_time() and not program_cache.is_kept(files):
         with suppress(OSError):  # there may be no more processes
-            _begun.append((files, _copy(lambda: _lowered(files))))
+            _begun.append((files, *_copy(lambda: _lowered(files))))
 
 
 def begin_run(words: list[str]) -> None:
@@ -109,17 +102,17 @@ def taken(files: ModelFiles, needed: Sequence[str] = ()) -> Lowered | None:
     for one in [each for each in _begun if each[0] == files]:
         for name in needed:
             import_module(name)
-        answer = one[1].wait()
+        answer: Answer = _answer_of(one[2])
         _begun.remove(one)
-        one[1].end()
+        _end(*one[1:])
         if isinstance(answer, ModelError):
             raise answer
         return answer
     return None
 
 
-def _copy(work: Callable[[], Result]) -> _Copy[Result]:
-    """Begin some work in a copy of this process, which may go on by itself when it has answered.
+def _copy(work: Callable[[], object]) -> tuple[int, int]:
+    """Begin some work in a copy of this process: its number, and where its answer is read.
 
     Raises OSError: there may be no more processes.
     """
@@ -133,7 +126,7 @@ def _copy(work: Callable[[], Result]) -> _Copy[Result]:
         if process == 0:
             os.close(answer)  # else a large answer is waited with for ever where the reader has ended
             _work(work, to_answer)
-        return _Copy(process, answer)
+        return process, answer
     finally:
         os.close(to_answer)
 
@@ -161,9 +154,9 @@ def _both(first: Callable[[], First], second: Callable[[], Second]) -> tuple[Fir
     except OSError:  # there may be no more processes
         return first(), second()
     try:
-        done, answer = first(), other.wait()
+        done, answer = first(), _answer_of(other[1])
     finally:
-        other.end()
+        _end(*other)
     return done, second() if answer is None else answer
 
 
@@ -204,7 +197,7 @@ def _lowered(files: ModelFiles) -> Answer:
 @atexit.register
 def _end_all() -> None:
     while _begun:
-        _begun.pop()[1].end()
+        _end(*_begun.pop()[1:])
 
 
 interrupts.before_leaving.append(_end_all)

@@ -76,28 +76,28 @@ def test_a_method_that_does_not_exist_is_refused_with_its_place():
 def test_without_an_answer_there_is_none():
     files = ModelFiles.read(MODELS / "thermostat.yaml")
     ahead.begin(files)
-    ((_, other),) = ahead._begun
-    os.kill(other.process, signal.SIGKILL)
+    ((_, other, _),) = ahead._begun
+    os.kill(other, signal.SIGKILL)
     assert ahead.taken(files) is None
 
 
 def test_a_large_answer_that_nobody_reads_keeps_no_process(monkeypatch):
     monkeypatch.setattr(ahead, "_lowered", lambda files: bytes(1 << 22))  # more than any pipe holds
     ahead.begin(ModelFiles.read(MODELS / "thermostat.yaml"))
-    _, other = ahead._begun.pop()
-    os.close(other.answer)
-    assert ends(other.process)
+    _, other, answer = ahead._begun.pop()
+    os.close(answer)
+    assert ends(other)
 
 
 def test_another_model_is_not_taken_for_it_and_nothing_is_left():
     files = ModelFiles.read(MODELS / "thermostat.yaml")
     ahead.begin(files)
-    ((_, other),) = ahead._begun
+    ((_, other, _),) = ahead._begun
     assert ahead.taken(ModelFiles.read(MODELS / "bouncing-ball.yaml")) is None
     ahead._end_all()
     assert not ahead._begun
     with pytest.raises(ProcessLookupError):
-        os.kill(other.process, 0)
+        os.kill(other, 0)
 
 
 @pytest.mark.parametrize("options", [[], ["--json"], ["-q", "--json"]])

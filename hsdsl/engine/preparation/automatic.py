@@ -30,7 +30,7 @@ A run with a precision is not examined, and counts as not stiff.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from math import inf, isfinite
@@ -58,21 +58,6 @@ LAST = 16  # of these, at which a mode must be stiff
 MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longer to examine than to run
 
 
-@dataclass(frozen=True)
-class Stiffness:
-    """A decay that is fast in comparison: its time, and for how long the curve is straight to a hundredth."""
-
-    mode: str
-    time: float
-    decay: float
-    straight: float
-
-    def __str__(self) -> str:
-        near = f"at t = {self.time:.3g}" if self.time else "near the start"
-        fast = f"{self.mode} is stiff {near}: something decays within {self.decay:.2g}"
-        return fast + (f", the curve is straight for {self.straight:.2g}" if isfinite(self.straight) else ", to rest")
-
-
 def chosen(
     settings: Settings, program: Program, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]
 ) -> Settings:
@@ -91,7 +76,7 @@ def _adaptive(
     for k, values in near.items():
         stiff = stiffness(kernel, timeline, program.modes[k].name, k, values, until)
         if stiff is not None:
-            return METHODS["radau"], str(stiff)
+            return METHODS["radau"], stiff
     if mode in near and not _has_derivatives(kernel, timeline, mode, x):
         without = f"the flow of {program.modes[mode].name} has no derivatives at the start"
         if _begins(METHODS[AUTO], kernel, timeline, mode, x, until):
@@ -130,10 +115,8 @@ def judge_of(prepared: Prepared, plain: Prepared | None = None) -> Judge | None:
     return None
 
 
-def _judge(
-    plain: Prepared, program: Program, mode: int, t: Number, x: Sequence[Number], step: Number
-) -> Stiffness | None:
-    """The stiffness of a mode of a program at a state of a run whose steps were so long on average."""
+def _judge(plain: Prepared, program: Program, mode: int, t: Number, x: Sequence[Number], step: Number) -> str | None:
+    """Why a mode of a program is stiff at a state of a run with such steps on average; None where it is not."""
     name, values = program.modes[mode].name, dict(zip(program.modes[mode].states, x, strict=False))
     if name not in plain.program.mode_names:
         return None
@@ -160,7 +143,7 @@ def settled(prepared: Prepared) -> Prepared:
     return prepared if stiff is None else instead(prepared, stiff)
 
 
-def instead(prepared: Prepared, stiff: Stiffness) -> Prepared:
+def instead(prepared: Prepared, stiff: str) -> Prepared:
     """The same run by the method for stiff modes."""
     settings = prepared.settings
     method = METHODS["radau"].for_tolerance(settings.tolerance, prepared.arithmetic)
@@ -205,11 +188,14 @@ def _in_mode(program: Program, mode: int, values: Mapping[str, Number]) -> list[
 
 def stiffness(
     kernel: Kernel, timeline: Timeline, name: str, mode: int, x: Sequence[Number], until: float, t: float = 0.0
-) -> Stiffness | None:
-    """The stiffness of a mode near x at a time, None where it is not stiff."""
+) -> str | None:
+    """Why a mode is stiff near x at a time; None where it is not.
+
+    Something decays fast in comparison with the time for which the curve is straight to a hundredth.
+    """
     try:
         flight = _Flight(kernel, timeline, mode, t, np.array(x, float))
-        stiff = None
+        decay = straight = inf
         for count in range(STEPS):
             decay = flight.decay()
             if decay * (until - t) < LEAST_STEPS * REACH:
@@ -217,13 +203,14 @@ def stiffness(
             straight = flight.straight(decay)
             if count >= STEPS - LAST and straight * decay < APART:
                 return None
-            stiff = Stiffness(name, t, 1 / decay, straight)
             flight.step(min(LENGTH / decay, straight))
             if flight.has_ended():
                 return None
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
         return None  # unknown
-    return stiff
+    near = f"at t = {t:.3g}" if t else "near the start"
+    rests = f"the curve is straight for {straight:.2g}" if isfinite(straight) else "to rest"
+    return f"{name} is stiff {near}: something decays within {1 / decay:.2g}, {rests}"
 
 
 class _Flight:
