@@ -10,6 +10,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import chi2, linregress
+from scipy.stats import t as student
 
 import hsdsl
 from hsdsl import UsageError
@@ -133,6 +136,55 @@ experiment: {{until: 4*u}}
     data = {"t": times, "x": unit * (0.8 + (0.3 - 0.8) * np.exp(-times / (0.8 * unit)))}
     found = hsdsl.loads(text).fit(data, "k,initial.x")
     assert found.values == pytest.approx({"k": 1.25 / unit, "initial.x": 0.3 * unit}, rel=1e-9)
+
+
+LINE = "hsdsl: 1\nparameters: {a: {value: 1, max: 3}}\nmodes: {m: {flow: {x: a}}}\ninitial: {mode: m, x: 0}\n"
+DECAY = "hsdsl: 1\nparameters: {k: {value: 1, min: 0}}\nmodes: {m: {flow: {x: -k*x}}}\ninitial: {mode: m, x: 1}\n"
+
+
+def test_intervals_of_a_line_are_those_of_student() -> None:
+    """Here the sum of squares is a parabola, and the profile gives the intervals of linear regression."""
+    t = np.linspace(0.5, 4, 8)
+    x = 2 * t + 1 + 0.1 * np.array([1, -1, 2, 0, -2, 1, 0.5, -1.5])
+    model = hsdsl.loads(LINE + "experiment: {until: 4}\n")
+    found = model.fit({"t": t, "x": x}, "a,initial.x", intervals=0.9)
+    by = linregress(t, x)
+    chance = student.ppf(0.95, len(t) - 2)
+    for name, value, deviation in (("a", by.slope, by.stderr), ("initial.x", by.intercept, by.intercept_stderr)):
+        ends = value - chance * deviation, value + chance * deviation
+        assert found.intervals[name] == pytest.approx(ends, rel=1e-4)
+    assert "; 90 %: " in found.summary and found.as_json()["intervals"]["a"] == [*found.intervals["a"]]
+    narrow = hsdsl.loads(LINE.replace("max: 3", f"max: {by.slope + by.stderr / 2}") + "experiment: {until: 4}\n")
+    low, high = narrow.fit({"t": t, "x": x}, "a,initial.x", intervals=0.9).intervals["a"]
+    assert high == by.slope + by.stderr / 2 and low == pytest.approx(by.slope - chance * by.stderr, rel=1e-4)
+
+
+def test_intervals_follow_the_sum_of_squares() -> None:
+    """Of a decay measured late the sum ends below: any faster decay leaves nothing either."""
+    t, sigma = np.array([3.0, 4.0, 5.0]), 0.02
+    x = np.array([0.03, 0.01, 0.02])
+
+    def total(k: float) -> float:
+        return float(np.sum((np.exp(-k * t) - x) ** 2)) / sigma**2
+
+    model = hsdsl.loads(DECAY + "experiment: {until: 5}\n")
+    found = model.fit({"t": t, "x": x}, "k", sigma=sigma, intervals=0.95)
+    best = found.values["k"]
+    rise = total(best) + chi2.ppf(0.95, 1)
+    low, high = found.intervals["k"]
+    assert low == pytest.approx(brentq(lambda k: total(k) - rise, 0.1, best), rel=1e-3)
+    assert high == np.inf and total(1e3) < rise and "to unbounded" in found.summary
+    assert best - low < 0.9 * 1.96 * found.deviations["k"]
+
+
+def test_intervals_that_cannot_be_are_refused() -> None:
+    model, data = hsdsl.loads(DECAY + "experiment: {until: 5}\n"), {"t": [1.0], "x": [0.4]}
+    for level, sentence in ((1.0, "a level between 0 and 1, got 1"), (0.9, "leave nothing over to judge by")):
+        with pytest.raises(UsageError, match=sentence):
+            model.fit(data, "k", intervals=level)
+    assert model.fit(data, "k", intervals=0.9, sigma=0.1).intervals["k"][0] == pytest.approx(
+        -np.log(0.4 + 0.1 * chi2.ppf(0.9, 1) ** 0.5), rel=1e-3
+    )
 
 
 def test_what_measurements_do_not_determine() -> None:

@@ -45,6 +45,11 @@ class Fit:
         The run with these values.
     units : mapping
         The units that the model gives.
+    level, intervals : float or None, dict of (float, float)
+        Intervals of this level by profile likelihood, if they were asked for: the values up to which the others can
+        make up for a change. An end is the bound of the file, or infinite, where the measurements do not end it.
+    bounds : mapping
+        The least and the largest value that the file allows.
     """
 
     values: dict[str, float]
@@ -59,6 +64,9 @@ class Fit:
     measured: Measurements = field(repr=False)
     execution: Execution = field(repr=False)
     units: Mapping[str, str] = field(default_factory=dict[str, str], repr=False)
+    level: float | None = None
+    intervals: dict[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]], repr=False)
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} {number(value, 6)}" for name, value in self.values.items())
@@ -84,6 +92,7 @@ class Fit:
         """Return the object of `fit --json`; values that are not determined are null."""
         names = ("values", "deviations", "covariance", "deviation", "success", "message", "evaluations", "at_bound")
         known = {name: getattr(self, name) for name in names}
+        known |= {"intervals": self.intervals, "level": self.level} if self.level else {}
         return plain(known | {"measurements": self.measured.count, "nonsmooth": self.nonsmooth})
 
     @property
@@ -100,14 +109,33 @@ class Fit:
             determined = bool(np.isfinite(deviation))
             known = f"+- {number(deviation, 3)}" if determined else "not determined by the measurements"
             bound = ", at its bound" if name in self.at_bound else ""
-            yield f"  {name:{width}}  {number(value, 12 if determined else 3)} {known}{bound}"
+            yield f"  {name:{width}}  {number(value, 12 if determined else 3)} {known}{self._interval(name)}{bound}"
+        for name in self.at_bound:
+            which = "min" if self.values[name] == self.bounds[name][0] else "max"
+            yield f"{name} is at its {which}: a fit without this bound would be closer to the measurements"
         yield f"residual: {number(self.deviation, 4)} (weighted root mean square)"
         yield f"{'converged' if self.success else 'did not converge'}: {self.message}"
         yield from (f"not smooth: {reason}" for reason in condensed(self.nonsmooth))
 
+    def _interval(self, name: str) -> str:
+        if name not in self.intervals:
+            return ""
+        ends = [
+            "unbounded" if isinf(end) else number(end, 6) + " (its bound)" * (end in self.bounds[name])
+            for end in self.intervals[name]
+        ]
+        return f"; {100 * (self.level or 0):.4g} %: {ends[0]} to {ends[1]}"
+
+    def plot_residuals(self, path: str | os.PathLike[str]) -> None:
+        """Draw the residuals to a .png or .svg file: the run minus the measurements over time, and how often."""
+        from hsdsl.analysis.plot.fits import plot_residuals
+
+        heading = f"the run minus {counted(self.measured.count, 'measurement')}; dotted: transitions"
+        plot_residuals(path, self.execution, self.measured.times, self.residuals, self.units, heading)
+
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the measurements and the run to a .png or .svg file."""
-        from hsdsl.analysis.plot.analyses import plot_measured
+        from hsdsl.analysis.plot.fits import plot_measured
 
         values = ", ".join(f"{name} = {number(value, 6)}" for name, value in self.values.items())
         heading = (

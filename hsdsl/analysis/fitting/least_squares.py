@@ -30,9 +30,13 @@ MOST_CROSSED = 32  # measurements that transitions pass
 
 
 def fitted(
-    objective: Objective, bounds: Mapping[str, tuple[float, float]], sigma: bool, scales: Mapping[str, float]
+    objective: Objective,
+    bounds: Mapping[str, tuple[float, float]],
+    sigma: bool,
+    scales: Mapping[str, float],
+    level: float | None = None,
 ) -> Fit:
-    """Fit; ``sigma`` says that weights are inverse standard deviations.
+    """Fit; ``sigma`` says that weights are inverse standard deviations, ``level`` is that of profile intervals.
 
     A scale of zero is replaced by the size of the state in the first run.
 
@@ -51,7 +55,17 @@ def fitted(
         begun = _beginning(objective, share, begun, bounds, scales)
     if not np.array_equal(begun, first):
         results.append(_solved(objective, begun, bounds, scales))
-    return _fit(objective, min(results, key=lambda result: result.cost), bounds, sigma)
+    best = min(results, key=lambda result: result.cost)
+    found = _fit(objective, best, bounds, sigma)
+    if level is None:
+        return found
+    from hsdsl.analysis.fitting.profile import Profile, rise_of
+
+    sizes = np.array([scales[name] for name in found.values])
+    profile = Profile(objective, _minimum, best.x, np.array([*bounds.values()], float), sizes, 2 * float(best.cost))
+    rise = rise_of(level, found.deviation**2, objective.measured.count - len(sizes), sigma)
+    known = profile.intervals([*found.values], found.covariance, rise)
+    return replace(found, level=level, intervals=known, evaluations=objective.evaluations)
 
 
 def _solved(
@@ -70,7 +84,7 @@ def _solved(
     return best
 
 
-def _minimum(objective: Objective, first: Array, limits: Array, sizes: Array) -> Any:
+def _minimum(objective: Any, first: Array, limits: Array, sizes: Array) -> Any:
     """SciPy's result of a fit to values as shares of their sizes, with the values themselves."""
     lower: Array = limits[:, 0]
     upper: Array = limits[:, 1]
@@ -164,6 +178,7 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
         ),
         objective.measured,
         found.run,
+        bounds=bounds,
     )
 
 

@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Pictures of analyses: distances, shortest paths, fits, runs from nearby, orbits and their branches, sweeps."""
+"""Pictures of analyses: distances, shortest paths, runs from nearby, orbits and their branches, sweeps."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hsdsl.analysis.plot.curves import curves, limits_of, line
 from hsdsl.analysis.plot.style import (
     ALARM,
     FAINT,
@@ -25,7 +24,6 @@ from hsdsl.analysis.plot.style import (
     to_file,
     whole_ticks,
 )
-from hsdsl.analysis.report import words
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Array, Execution
 
@@ -67,29 +65,6 @@ def plot_over_time(times: Array, bounds: dict[str, tuple[Array, Array]], title: 
     axis.set_title(title, loc="left", parse_math=False)
     legend_below(figure, axis.get_legend_handles_labels()[0], 9.0)
     return figure
-
-
-def measured(
-    run: Execution, times: Array, columns: Mapping[str, Array], units: Mapping[str, str], values: str = ""
-) -> Figure:
-    """Draw measurements and the run fitted to them, a panel for each column; ``values`` are what was fitted."""
-    figure = empty(9, 1.3 + 2.4 * len(columns))
-    axes = figure.subplots(len(columns), 1, squeeze=False, sharex=True)[:, 0]
-    drawn = curves(run)
-    for axis, (name, column) in zip(axes, columns.items(), strict=True):
-        low, high = limits_of([drawn], name)
-        along = line(drawn.samples.time, drawn.column(name), drawn.begins, (*drawn.span, low, high))
-        axis.plot(*along, color=PALETTE[0], label="run")
-        axis.plot(times, column, ".", color=PALETTE[1], markersize=max(3.0, 7.0 - len(times) / 50), label="measured")
-        axis.set_ylabel(label(name, units), parse_math=False)
-    axes[-1].set_xlabel(time_label(units), parse_math=False)
-    figure.suptitle(words.heading(run), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
-    axes[0].set_title(fill(values, 110), loc="left", fontsize=8.5, color="#555555", parse_math=False)
-    legend_below(figure, axes[0].get_legend_handles_labels()[0], 9.0)
-    return figure
-
-
-plot_measured = to_file(measured)
 
 
 @to_file

@@ -13,7 +13,7 @@ import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.decimals import number_of
 from hsdsl.base.progress import counted_runs
-from hsdsl.interface.cli.console import draw, progress
+from hsdsl.interface.cli.console import draw, progress, say
 from hsdsl.interface.cli.options import AS_RUN, WRT, Answer, Located, Model, Until, check_target, option, overriding
 
 if TYPE_CHECKING:
@@ -117,6 +117,7 @@ SET_OF_FITS = (
 )
 SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
 WEIGHT = "The weight of a column. Default: one over its largest size. May be repeated."
+INTERVALS = "Find intervals of this level, such as 0.95, by profile likelihood: many further runs."
 Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file with columns t or time, states and outputs.")]
 
 
@@ -129,17 +130,24 @@ def fit(
     weight: Annotated[list[str] | None, option("NAME=W", WEIGHT, "--weight")] = None,
     overrides: Annotated[list[str] | None, overriding(SET_OF_FITS)] = None,
     located: Located,
+    intervals: Annotated[float | None, option("LEVEL", INTERVALS)] = None,
     plot: Annotated[Path | None, option("FILE", "Draw measurements and run: .png or .svg.")] = None,
+    residuals: Annotated[Path | None, option("FILE", "Draw the residuals: .png or .svg.")] = None,
     answer: Answer,
 ) -> None:
     """Fit parameters and initial states to measurements."""
     with answer.reporting():
         check_target(plot, "--plot")
+        check_target(residuals, "--residuals")
         with progress(answer.hidden) as show:
             watch = show and partial(_show_fit, show)
             columns = {"sigma": _by_column("--sigma", sigma), "weights": _by_column("--weight", weight)}
-            found = hsdsl.load(model).fit(data, wrt, progress=watch, **columns, **located.settings(overrides))
+            call = located.settings(overrides, intervals=intervals, **columns)
+            found = hsdsl.load(model).fit(data, wrt, progress=watch, **call)
         draw(found, plot)
+        if residuals is not None:
+            found.plot_residuals(residuals)
+            say(f"wrote {residuals}")
         answer.give(found.as_json, lambda: found.summary)
     if not found.success:
         raise Exit(3)

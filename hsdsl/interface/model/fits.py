@@ -32,11 +32,14 @@ def fit(
     wrt: str | Sequence[str],
     sigma: Mapping[str, float] | float | None,
     weights: Mapping[str, float] | float | None,
+    level: float | None,
     progress: Progress | None,
     arguments: Mapping[str, Any],
 ) -> Fit:
     """Fit a model; see `Model.fit`."""
     check_arguments(arguments, "a fit", REFUSED)
+    if level is not None and not 0 < level < 1:
+        raise UsageError(f"intervals: expected a level between 0 and 1, got {level:g}", "for example 0.95")
     if sigma and weights:
         raise UsageError("expected sigma or weights, got both", "a weight is one over a standard deviation")
     measured = measurements(data, model.columns)
@@ -44,6 +47,9 @@ def fit(
     by, start = start_by(wrt, arguments, values)
     if measured.count < len(by):
         raise UsageError(f"{counted(measured.count, 'measurement')} cannot determine {counted(len(by), 'value')}")
+    if level is not None and not sigma and measured.count == len(by):
+        reason = f"{counted(measured.count, 'measurement')} of {counted(len(by), 'value')} leave nothing over"
+        raise UsageError(f"intervals: {reason} to judge by", "give sigma")
     bounds = {t.label: _bounds(values, t) for t in by}
     objective = Objective(
         _evaluate(model, by, arguments),
@@ -53,7 +59,7 @@ def fit(
         progress,
     )
     scales = {label: abs(value) or _span(bounds[label]) for label, value in start.items()}
-    return replace(fitted(objective, bounds, bool(sigma), scales), units=model.program.units)
+    return replace(fitted(objective, bounds, bool(sigma), scales, level), units=model.program.units)
 
 
 def _evaluate(model: Runs, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:

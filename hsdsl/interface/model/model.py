@@ -198,6 +198,7 @@ class Model(Runs):
         *,
         sigma: Mapping[str, float] | float | None = None,
         weights: Mapping[str, float] | float | None = None,
+        intervals: float | None = None,
         progress: Callable[[int, Mapping[str, float], float], None] | None = None,
         **arguments: Any,
     ) -> Fit:
@@ -214,6 +215,8 @@ class Model(Runs):
             The standard deviation of each column, or of a single column.
         weights : mapping or number, optional
             Weights of columns instead; by default one over the largest size of each.
+        intervals : float, optional
+            The level, such as 0.95, of intervals by profile likelihood: many further runs.
         progress : callable, optional
             Called after every run with the number of runs, the values, and the weighted sum of squares.
         **arguments
@@ -225,7 +228,7 @@ class Model(Runs):
 
         with in_notebook() as show:
             progress = progress or (show and (lambda runs, _, squares: show(lambda: f"{runs} runs, {squares:.6g}")))
-            return fit(self._sliding_for(arguments), data, wrt, sigma, weights, progress, arguments)
+            return fit(self._sliding_for(arguments), data, wrt, sigma, weights, intervals, progress, arguments)
 
     def stream(
         self,

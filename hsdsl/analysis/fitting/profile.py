@@ -1,0 +1,99 @@
+"""Profile likelihood: how far a value can move until the best fit of the others is worse than chance allows.
+
+A covariance takes the sum of squares for a parabola; a profile follows it, and need not be symmetric (Bates and Watts,
+Nonlinear Regression Analysis, 1988, section 6.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+from scipy.special import chdtri, stdtrit  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+
+from hsdsl.engine.execution import Array
+
+Minimum = Callable[[Any, Array, Array, Array], Any]
+PRECISE = 1e-4  # of the distance from the value to an end: how well ends are located
+FURTHEST = 12  # doublings of the first step in which an end is sought
+
+
+@dataclass(frozen=True)
+class Pinned:
+    """An objective with one value held; the functions of the others."""
+
+    objective: Any
+    index: int
+    value: float
+
+    def _whole(self, x: Array) -> Array:
+        return np.insert(x, self.index, self.value)
+
+    def residuals(self, x: Array) -> Array:
+        """The residuals at the other values."""
+        return self.objective.residuals(self._whole(x))
+
+    def slopes(self, x: Array) -> Array:
+        """Their derivatives by the other values."""
+        return np.delete(self.objective.slopes(self._whole(x)), self.index, axis=1)
+
+
+def rise_of(level: float, variance: float, free: int, sigma: bool) -> float:
+    """How much the sum of squares may rise: by chi square where deviations are known, else by the F distribution."""
+    chance: Any = chdtri(1, 1 - level) if sigma else variance * stdtrit(free, (1 + level) / 2) ** 2  # F(1, n) is t^2
+    return float(chance)
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The sum of squares as a function of one value, the others fitted to each of its values.
+
+    ``limits`` (n, 2) and ``sizes`` (n,) are those of all values, ``best`` (n,) the fit, ``total`` its sum of squares.
+    """
+
+    objective: Any
+    minimum: Minimum
+    best: Array
+    limits: Array
+    sizes: Array
+    total: float
+
+    def interval(self, k: int, step: float, rise: float) -> tuple[float, float]:
+        """Where the sum of squares has risen by so much; a bound, or infinite, where it does not rise as far."""
+        return self._end(k, -step, rise), self._end(k, step, rise)
+
+    def _end(self, k: int, step: float, rise: float) -> float:
+        near, others = float(self.best[k]), np.delete(self.best, k)
+        bound = float(self.limits[k, int(step > 0)])
+
+        def excess(value: float) -> float:
+            """Signed roots of the sums are near to a line, where these themselves are near to a parabola."""
+            nonlocal others
+            pinned = Pinned(self.objective, k, value)
+            if len(others):
+                keep = np.delete(np.arange(len(self.best)), k)
+                others = self.minimum(pinned, others, self.limits[keep], self.sizes[keep]).x
+            found = float(np.sum(pinned.residuals(others) ** 2))
+            return max(found - self.total, 0.0) ** 0.5 - rise**0.5
+
+        inside = near
+        for doubled in range(FURTHEST):
+            value = near + step * 2.0**doubled
+            beyond = abs(bound - near) <= abs(value - near)
+            value = bound if beyond else value
+            if value != inside and excess(value) > 0:
+                solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
+                return float(solve(excess, inside, value, xtol=PRECISE * abs(value - near), rtol=1e-12))
+            if beyond:
+                return bound
+            inside = value
+        return float(np.copysign(np.inf, step))
+
+    def intervals(self, names: Sequence[str], covariance: Array, rise: float) -> dict[str, tuple[float, float]]:
+        """The interval of each value; the first step is a standard deviation, or where there is none the size."""
+        deviations = np.sqrt(np.diag(covariance))
+        steps = np.where((deviations > 0) & np.isfinite(deviations), deviations, self.sizes)
+        return {name: self.interval(k, float(steps[k]), rise) for k, name in enumerate(names)}
