@@ -93,8 +93,11 @@ class Scope:
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
         faults: list[ExpressionError] = []
-        passed = 0
+        passed, measured = 0, set[int]()  # where factors behind a number begin: the unit of a quantity stands there
         for node in walk(tree):
+            if isinstance(node, Product):
+                pairs = pairwise(factor for _, factor in node.factors)
+                measured |= {factor.start for before, factor in pairs if isinstance(before, Number)}
             if node.start < passed or not isinstance(node, (Name, Call)):
                 continue
             name = node.name if isinstance(node, Name) else node.function
@@ -103,7 +106,7 @@ class Scope:
                 start += name.index(".")
                 fault, end = _DOTTED, start + 1
             elif isinstance(node, Name):
-                fault = self._name(name, name not in self.values and start in _behind_numbers(tree))
+                fault = self._name(name, start in measured)
             elif fault := self._call(name, node.arguments):
                 from hsdsl.language.diagnosis.expressions import timed
 
@@ -172,14 +175,6 @@ class Scope:
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states
-
-
-def _behind_numbers(tree: Tree) -> Iterator[int]:
-    """Where each factor of a product begins that stands behind a number, as the unit of a quantity does."""
-    for product in walk(tree):
-        if isinstance(product, Product):
-            pairs = pairwise(factor for _, factor in product.factors)
-            yield from (factor.start for before, factor in pairs if isinstance(before, Number))
 
 
 _DOTTED = Refusal("HS109", "names have no dots in an expression", "write the name or the function alone: sin(x)")
