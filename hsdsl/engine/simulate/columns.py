@@ -123,7 +123,7 @@ class Packed:
         With the states of the model's largest mode, of which the run may not have been in one.
     """
 
-    def __init__(self, pack: Callable[[int], None], size: int, shape: Shape) -> None:
+    def __init__(self, pack: Callable[[int], int], size: int, shape: Shape) -> None:
         self._shape, self._memory = shape, np.empty(size)
         self.record = structures.start_of(self._memory)  # where the ``hs_record`` is
         pack(self.record)
@@ -186,18 +186,16 @@ class StateLayouts:
         The first is what runs begin with.
     of_mode : array of int32, shape (modes,)
         The kind of each mode's arcs; -1 for a final mode without a flow, which keeps the states it is entered with.
+    one : bool
+        Whether all arcs are of one kind.
     """
 
     def __init__(self, program: Program, states: tuple[str, ...]) -> None:
         own = [None if mode.final and not mode.states else mode.states for mode in program.modes]
         self.kinds = tuple(dict.fromkeys((states, *(kind for kind in own if kind is not None))))
         self.of_mode = np.array([-1 if kind is None else self.kinds.index(kind) for kind in own], np.int32)
+        self.one = len(self.kinds) == 1
         self._kept: dict[bytes, tuple[Array, tuple[str, ...]]] = {}
-
-    @property
-    def one(self) -> bool:
-        """Whether all arcs are of one kind."""
-        return len(self.kinds) == 1
 
     def of_arcs(self, modes: Array, before: int = 0) -> Array:
         """Give the kind of each arc by its mode, the one before them being of kind ``before``."""

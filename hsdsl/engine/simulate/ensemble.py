@@ -11,6 +11,7 @@ import numpy as np
 
 from hsdsl.engine.execution import REASONS, Array
 from hsdsl.engine.runtime import structures
+from hsdsl.engine.runtime.kernel import runtime
 from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.compiled import MOST_TRANSITIONS, CompiledPlan, task_settings
 from hsdsl.engine.simulate.control import FIRST_PART, LARGEST_SHARE
@@ -121,7 +122,7 @@ class CompiledEnsemble:
         table.stop, table.slides = self._stop.ctypes.data, self._slides.ctypes.data if len(self._slides) else None
         for name in BY_INSTANCE:
             setattr(table, name, _row(getattr(kept, name), first))
-        place.workspace.run_ensemble(table)
+        runtime().hs_run_ensemble(ctypes.addressof(table))  # the interpreter is free meanwhile
         if place.workspace.failed:
             raise place.workspace.failed[0]
         if kept.logs:

@@ -145,7 +145,7 @@ class OutputBuffers:
         used["alternatives"] = self._columns["alternatives"][:alternatives]
         return used
 
-    def whole(self, pack: Callable[[int], None], size: int, layouts: StateLayouts) -> Columns:
+    def whole(self, pack: Callable[[int], int], size: int, layouts: StateLayouts) -> Columns:
         """Take away every column from the start of the run, or copy them where the chunk can be used again.
 
         ``pieces`` become ``coefficients``: while a run is under way a row's piece leads to it, in an execution it

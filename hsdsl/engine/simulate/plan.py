@@ -117,9 +117,18 @@ class Prepared(Problem):
         return {**about(self, "python" if self.plan is None else "c"), "repetition": self.again, **self.links}
 
     def _run(self, review: Review | None, watch: Watch | None, spent: dict[str, float]) -> Execution:
-        if self.plan is not None:
-            return self._by_compiled_loop(self.plan, review, watch, spent)
-        return self._by_python_loop(self._fresh(review), watch, spent)
+        plan = self.plan
+        if plan is None:
+            return self._by_python_loop(self._fresh(review), watch, spent)
+        under_way = CompiledRun(plan, plan.workspaces.take(), review)
+        if watch is not None:
+            watch(under_way)
+        began = time.perf_counter()
+        stop = under_way.follow()
+        spent["simulate"] = time.perf_counter() - began
+        if watch is None:  # else someone may look at the workspace for longer than the run lasts
+            plan.workspaces.leave(under_way.workspace)
+        return written(self._about, under_way, stop, spent)
 
     def _fresh(self, review: Review | None) -> Run:
         """A run that nothing is recorded of yet."""
@@ -155,19 +164,6 @@ class Prepared(Problem):
             stop = memory(self.settings.memory, run.recorder.now)
         spent["simulate"] = time.perf_counter() - began
         return from_recorder(self._about, run, stop, spent)
-
-    def _by_compiled_loop(
-        self, plan: CompiledPlan, review: Review | None, watch: Watch | None, spent: dict[str, float]
-    ) -> Execution:
-        under_way = CompiledRun(plan, plan.workspaces.take(), review)
-        if watch is not None:
-            watch(under_way)
-        began = time.perf_counter()
-        stop = under_way.follow()
-        spent["simulate"] = time.perf_counter() - began
-        if watch is None:  # else someone may look at the workspace for longer than the run lasts
-            plan.workspaces.leave(under_way.workspace)
-        return written(self._about, under_way, stop, spent)
 
 
 def prepare(problem: Problem, code: CompiledModel | None = None) -> Prepared:

@@ -6,7 +6,8 @@ To fetch fresh memory from the system costs more than a short run.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from types import FrameType
 from typing import Any
 from weakref import WeakValueDictionary
@@ -27,7 +28,11 @@ MOST_KEPT = 4  # workspaces of one model and method
 
 
 class Workspace:
-    """One task with its memory. One run works there at a time."""
+    """One task with its memory. One run works there at a time.
+
+    ``simulate()`` runs the task to its end, the interpreter being free meanwhile: how many numbers it has written.
+    ``pack`` copies them to an address.
+    """
 
     def __init__(self, task: Any, compiled: CompiledModel, method: Any, scheme: str, shape: Shape) -> None:
         model = compiled.table
@@ -48,8 +53,10 @@ class Workspace:
         self.task.stop.x, self.task.stop.slope = self._x.ctypes.data, self._slope.ctypes.data
         self.task.stop.scales = self._scales.ctypes.data
         self.task.flush, self.task.poll, self.task.grow, self.task.lengthen = _flush, _poll, _grow, _lengthen
-        self._runtime, self._where = runtime(), ctypes.addressof(self.task)
-        _workspaces[self._where] = self
+        where, library = ctypes.addressof(self.task), runtime()
+        self.simulate: Callable[[], int] = partial(library.hs_run_whole, where)
+        self.pack: Callable[[int], int] = partial(library.hs_pack, where)
+        _workspaces[where] = self
 
     def clear(self, rows: float, memory: int, review: Review | None = None) -> None:
         """Make ready for a run that may write about so many rows, and keep so many bytes of them."""
@@ -70,18 +77,6 @@ class Workspace:
             registers = np.empty((formulas.registers, 3))
             moves = (structures.Moves * 1)((ctypes.addressof(formulas.table), registers.ctypes.data))
             self._moves, self.task.moves = (moves, registers), ctypes.addressof(moves)
-
-    def simulate(self) -> int:
-        """Run the task to its end; the interpreter is free meanwhile. Returns how many numbers :meth:`pack` writes."""
-        return self._runtime.hs_run_whole(self._where)
-
-    def pack(self, to: int) -> None:
-        """Copy what the task has written to an address."""
-        self._runtime.hs_pack(self._where, to)
-
-    def run_ensemble(self, ensemble: Any) -> None:
-        """Run instances to their end, their task being the workspace's; the interpreter is free meanwhile."""
-        self._runtime.hs_run_ensemble(ctypes.addressof(ensemble))
 
     def press(self, number: int, frame: FrameType | None) -> None:
         """Ctrl-C: the run is to stop."""
