@@ -59,11 +59,16 @@ def bernstein_of(roots: Roots, c: Vector, n: int) -> Vector:
 
 
 def stays_below(roots: Roots, c: Vector, n: int, level: Number) -> bool:
-    """Whether bounds prove that the polynomial is nowhere above a level on [0, 1]; if not, that proves nothing."""
+    """Whether bounds prove that the polynomial is nowhere above a level on [0, 1]; if not, that proves nothing.
+
+    Its values are mixtures of the sums of its first coefficients, and so are its Bernstein coefficients.
+    """
+    total = c[0]
     bound = c[0]
     for k in range(1, n + 1):
-        if c[k] > 0:
-            bound = bound + c[k]
+        total = total + c[k]
+        if not total <= bound:
+            bound = total
     return bound <= level or largest_of(bernstein_of(roots, c, n), n) <= level
 
 
