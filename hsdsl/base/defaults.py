@@ -44,7 +44,7 @@ _FOR_ROUNDOFF = 7  # digits: of the 16 of float64 the default tolerance keeps 9
 
 
 def kept_digits(digits: int) -> int:
-    """How many of so many decimal digits the default tolerance of a method of any order keeps."""
+    """How many of ``digits`` decimal digits the default tolerance of a method of any order keeps."""
     return digits - _FOR_ROUNDOFF
 
 

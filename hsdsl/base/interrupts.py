@@ -40,7 +40,7 @@ def expect() -> None:
 
 
 def _ignore() -> None:
-    """Let the process end as it is about to."""
+    """Ignore further interrupts while the process ends."""
     if _getsignal(_SIGINT) is _pressed:
         _signal(_SIGINT, signal.SIG_IGN)
 

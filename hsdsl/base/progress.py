@@ -121,13 +121,13 @@ def bar(share: float) -> str:
 
 
 def running(show: Show | None, run: Any) -> None:
-    """Show how far a run is, from its recorder."""
+    """Show the progress of a run, from its recorder."""
     if show is not None:
         show(lambda: f"{bar(min(1.0, float(run.now / run.until)) if run.until else 1.0)}, {run.made} transitions")
 
 
 def counted(show: Show | None, noun: str) -> Callable[[int, int], None] | None:
-    """A function of how much is done and how much there is."""
+    """A function of the amount done and the total amount."""
     return show and (lambda done, of: show(lambda: f"{bar(done / of if of else 1.0)}, {done:,} of {of:,} {noun}"))
 
 

@@ -73,7 +73,7 @@ def begin(files: ModelFiles) -> None:
 
 
 def begin_run(words: list[str]) -> None:
-    """Begin with the model of a command line that runs it as it is, before what reads command lines is loaded."""
+    """Start a run without options before the modules that parse command lines are loaded."""
     match words:
         case ["run", model, *options] if set(options) <= {"--json", "--quiet", "-q"} and os.path.isfile(model):
             with suppress(UsageError):  # which the command reports

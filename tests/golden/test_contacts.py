@@ -13,8 +13,8 @@ import pytest
 from engines import assert_engines_agree
 
 import hsdsl
+from hsdsl.mathematics.completion.constrained import constrained_mode
 from hsdsl.mathematics.completion.nearby import size
-from hsdsl.mathematics.completion.overlay import overlay
 
 ENGINES = ["python", "c"]
 TOWER = """
@@ -465,7 +465,7 @@ initial: {mode: a, x: 0, y: 0.1, u: 0, w: 0, lost: 0}
 experiment: {until: 1}
 """
     system = hsdsl.loads(text).system
-    both = overlay(system.modes[0])
+    both = constrained_mode(system.modes[0])
     assert both is not None and size(both.mode.flow) < 1000
 
 

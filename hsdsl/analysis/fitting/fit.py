@@ -1,4 +1,4 @@
-"""Measurements over time, and what a fit to them found: values with their covariance, and what is left over."""
+"""Measurements over time, and the result of a fit to them: values with their covariance, and residuals."""
 
 from __future__ import annotations
 

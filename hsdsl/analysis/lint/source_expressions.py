@@ -1,4 +1,4 @@
-"""The expressions of a model as written: what each is for, its tree, its places, and the names it depends on."""
+"""The expressions of a model as written: their roles, trees, places, and the names that they depend on."""
 
 from __future__ import annotations
 

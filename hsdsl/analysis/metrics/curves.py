@@ -161,7 +161,7 @@ class Labelled:
         return np.maximum(0.0, apart - rounding), apart + rounding
 
     def motion(self, side: Side) -> Array:
-        """Bound how far one curve moves in each cell, by the length of the control polygon. Shape (n,)."""
+        """Bound the length of one curve in each cell by that of its control polygon. Shape (n,)."""
         return length(side.powers) + side.stray
 
 
@@ -404,7 +404,7 @@ def _largest(bound: Array, size: int) -> Array:
 
 
 def _ways(cells: Cells, distance: Labelled) -> Array:
-    """Bound how far both curves together move in each cell."""
+    """Bound the sum of the lengths of both curves in each cell."""
     return np.concatenate([distance.motion(a) + distance.motion(b) for a, b in _chunks(cells)])
 
 

@@ -295,7 +295,7 @@ def on_line(shape: ConeShape, offsets: Array, numbers: Array) -> tuple[Array, Ar
 
 
 def _minimised(shape: ConeShape, offsets: Array) -> tuple[Array, Array, Array, Array]:
-    """Lower bounds, values attained (more by round-off), where, and how far from 0 the minimum can be."""
+    """Lower bounds, attained values (up to round-off), their places, and a bound on the distance of minima from 0."""
     low, high = interval_of(shape.normals, shape.levels)
     along = [(offsets[:, part], shape.stacked[part, 0]) for part in shape.parts]
     kinks = [np.clip(-(o @ m) / (m @ m), low, high) for o, m in along if m @ m > 0]

@@ -1,4 +1,4 @@
-"""Distances as intervals, with a status that says how far both ends are proved.
+"""Distances as intervals, with a status that says which ends are proved.
 
 What is open when the time of a `Budget` is spent stays open, and the interval says so.
 """
@@ -21,7 +21,7 @@ def up_to_hops(hops: int) -> str:
 
 
 def weakest(*statuses: str) -> str:
-    """The status of what rests on several; the first of those that promise least."""
+    """The combined status of several distances: the weakest of them."""
     order = {CERTIFIED: 0, SAMPLED: 2, SEARCHED: 3}
     return max(statuses, key=lambda status: order.get(status, 1), default=CERTIFIED)
 

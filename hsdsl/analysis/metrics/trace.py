@@ -74,7 +74,7 @@ class Trace:
         return np.searchsorted(self.start, times, side="right") - 1
 
     def share(self, pieces: Array, times: Array) -> Array:
-        """Return how far through its piece each time is, from 0 to 1."""
+        """Return the position of each time within its piece, from 0 to 1."""
         length = self.end[pieces] - self.start[pieces]
         passed = times - self.start[pieces]
         return np.where(length > 0, passed / np.where(length > 0, length, 1.0), 0.0)
@@ -262,7 +262,7 @@ class Cells:
 
 
 def rounding_of(*curves: Trace) -> float:
-    """Return how far apart two bounds on curves may be for rounding alone."""
+    """Return the largest difference of two bounds on curves that rounding alone explains."""
     largest = max(float(np.max(np.abs(curve.coefficients[:, 0]), initial=0.0)) for curve in curves)
     return ROUNDOFF * largest + 4 * sum(float(np.max(curve.rounding, initial=0.0)) for curve in curves)
 

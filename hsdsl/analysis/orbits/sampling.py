@@ -108,7 +108,7 @@ def sampled(
 
 
 def _exponent(radii: Sequence[float], largest: Sequence[float]) -> float:
-    """The power of the radius between the last two of them: what counts is the limit."""
+    """The power of the radius between the last two radii, since the limit counts."""
     if largest[-1] == 0:
         return float("inf")
     if not np.isfinite(largest[-1]):

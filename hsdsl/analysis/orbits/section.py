@@ -145,7 +145,7 @@ class Symmetry:
         return np.flatnonzero(np.any(self.directions != 0, axis=0)).tolist()
 
     def kept(self, count: int) -> list[int]:
-        """Of so many states, phases and parameters those that are no direction's own."""
+        """The states, phases and parameters that no direction uses alone."""
         return [k for k in range(count) if k not in self.leading]
 
     def without_shifts(self, rows: Array) -> Array:

@@ -126,7 +126,7 @@ def legend_below(figure: FigureBase, handles: Sequence[Any], width: float) -> in
 
 
 def empty(width: float, height: float) -> Figure:
-    """A figure of so many inches."""
+    """A figure of a size in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")

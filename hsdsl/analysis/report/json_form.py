@@ -122,7 +122,7 @@ def dumps(value: Any) -> str:
 
 
 def _multiprecision(value: Any) -> Iterator[Any]:
-    """The numbers of a value that are not floats, and what else is neither plain nor a list or object."""
+    """The numbers of a value, at any depth, that are not floats, and other values without a form in JSON."""
     many: Iterable[Any] = cast("dict[str, Any]", value).values() if isinstance(value, dict) else value
     for item in many if isinstance(value, (dict, list)) else (value,):
         if isinstance(item, (dict, list)):

@@ -155,7 +155,7 @@ def table(execution: Execution, limit: int) -> tuple[list[tuple[str, ...]], int,
 
 
 def times(values: Sequence[Any], digits: int) -> list[str]:
-    """Write times with one number of decimals, about so many significant digits for the largest."""
+    """Write times with equal decimals, and about ``digits`` significant digits for the largest."""
     finite = [float(t) for t in values if decimals.is_finite(t)]
     largest = max((abs(t) for t in finite), default=0.0)
     if largest >= 1e9 or 0.0 < largest < 1e-3:

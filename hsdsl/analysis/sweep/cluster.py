@@ -24,7 +24,7 @@ from hsdsl.analysis.sweep.dataset import TRIES, Run, Work, Write, refuse_deadly
 from hsdsl.base.errors import UsageError
 
 AHEAD = 3  # chunks under way for each thread
-PATIENCE = 10  # seconds for the connection
+CONNECTION_TIMEOUT = 10  # seconds
 PAUSE = 1.0  # seconds until a worker that died may be gone
 
 
@@ -40,7 +40,7 @@ class SweepPlugin(WorkerPlugin):
 
 
 def _answer(name: str, chunk: int) -> bytes:
-    plugins, until = get_worker().plugins, time.monotonic() + PATIENCE
+    plugins, until = get_worker().plugins, time.monotonic() + CONNECTION_TIMEOUT
     while name not in plugins and time.monotonic() < until:
         time.sleep(0.05)  # a worker that was restarted is still compiling
     return plugins[name].work(chunk)
@@ -53,7 +53,7 @@ def connected(address: str) -> Iterator[Run]:
     Raises UsageError: there is no scheduler at this address, it is lost, or chunks end workers.
     """
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=CONNECTION_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         hint = "start one with `dask scheduler`, and workers with `dask worker ADDRESS --nworkers -1`"
         raise UsageError(f"--cluster {address}: no scheduler answers there ({type(error).__name__})", hint) from None

@@ -159,7 +159,7 @@ def _numbers(settings: Any) -> Any:
 
 
 def new(**fields: Any) -> Manifest:
-    """A manifest of what this version of hsdsl writes."""
+    """A manifest in the format that this version of hsdsl writes."""
     untagged = Manifest(**fields, made_with=versions())
     text = json.dumps([untagged.plain()[key] for key in DECIDING], sort_keys=True)
     return replace(untagged, tag=hashlib.sha256(text.encode()).hexdigest())

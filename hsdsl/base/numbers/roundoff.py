@@ -83,11 +83,11 @@ class Roundoff:
         self.lost: Callable[[Number, Number, Number], Number] = _lost if base.digits is None else _lost_of(base)
 
     def exact(self, value: Number) -> Rounded:
-        """A number that is what it is."""
+        """An exact number."""
         return Rounded(self, value, self.base.zero, self.base.zero)
 
     def made(self, value: Number, error: Number, off: Number, lost: Number, units: int = 1) -> Rounded:
-        """The result of an operation, which has ``lost`` so much or, bounded, so many units in the last place."""
+        """The result of an operation, with the error ``lost`` or a bound in units of the last place."""
         if self.traced:
             return Rounded(self, value, error + lost, off)
         return Rounded(self, value, self.base.zero, off + abs(value) * (units * self.ulp))
@@ -285,7 +285,7 @@ def _folded(choose: Callable[[Rounded, Rounded], Rounded], *values: Rounded) -> 
 
 
 def exactly(arithmetic: Arithmetic, values: Iterable[Number]) -> tuple[Rounded, ...]:
-    """Numbers that are what they are, for routines over an arithmetic of `following`."""
+    """Exact numbers, for routines over an arithmetic of `following`."""
     zero = arithmetic.zero
     return tuple(Rounded(zero.of, value, zero.error, zero.off) for value in values)
 

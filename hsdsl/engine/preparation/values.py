@@ -216,7 +216,7 @@ def at(column: Column, instance: int) -> Number:
 
 
 def column_of(column: Column, count: int) -> Array:
-    """A column as an array with a number of each of so many instances."""
+    """A column as an array with one number for each instance."""
     return np.broadcast_to(np.asarray(column, float), count)
 
 
@@ -510,7 +510,7 @@ def check_memory(most: int, count: int, what: str, columns: int) -> None:
 
 
 def arithmetic_of(precision: int | None) -> Arithmetic:
-    """The arithmetic of a run: float64, or mpmath's with so many decimal digits."""
+    """The arithmetic of a run: float64, or mpmath with a number of decimal digits."""
     if precision is None:
         return FLOAT64
     if not LEAST_DIGITS <= precision <= MOST_DIGITS:

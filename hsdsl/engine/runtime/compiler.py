@@ -116,7 +116,7 @@ def _responds(compiler: Compiler) -> bool:
 
 
 def _complaint(done: Done, folder: Path) -> str:
-    """The first line of what a compiler says that names an error."""
+    """The first line of a compiler's output that names an error."""
     lines = [line.strip() for line in done.printed.replace(f"{folder}{os.sep}", "").splitlines() if line.strip()]
     ended = f"exit code {done.code}" if (done.code or 0) >= 0 else f"ended by signal {-(done.code or 0)}"
     return shown(next((line for line in lines if "error" in line), (lines or [ended])[0]), 200)

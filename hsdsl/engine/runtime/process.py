@@ -84,7 +84,7 @@ def _begin(command: Sequence[str], folder: Path) -> tuple[subprocess.Popen[bytes
 
 
 def _wait(process: subprocess.Popen[bytes], listener: Thread, waits: Iterator[float]) -> int | None:
-    """Wait for the end of what a command says, which comes at its own end and needs no looking again and again."""
+    """Wait until the output of a command ends, which needs no polling."""
     for seconds in waits:
         end = monotonic() + seconds
         listener.join(seconds)

@@ -4,8 +4,8 @@ A guard *holds* the state where its own resets keep the state while the flow lea
 the identity, the target is the same mode, and the flow leaves the domain. The guard is then an active constraint, as a
 closed contact in mechanics. The *push* on a guard is how fast the flow that the other constraints leave leads into it
 (of a body on a floor the acceleration by which the floor must hold it, or the velocity): the contact ends where the
-push changes sign. The execution follows the constrained flow (`completion.overlay`, the mode with these routines), at
-rest where that is zero, until then. Other surfaces are crossed as along any flow. A guard that holds the state is
+push changes sign. Until then the execution follows the constrained flow (`completion.constrained`), and is at rest if
+that is zero. Other surfaces are crossed as along any flow. A guard that holds the state is
 *touched* in `Surfaces`; ``held`` is the place of a run in contact, ``here`` the same in the mode itself.
 
 A *tail* is transitions that follow each other ever faster. Flights T_n of one edge that leads back to its own mode

@@ -55,7 +55,7 @@ def unit_of_measure(unit: Unit, variable: Variable) -> str | None:
 
 
 def named(unit: Unit, variable: Variable, reference: int) -> dict[str, Any]:
-    """The attributes of a variable that say what it is called and what it is to the caller."""
+    """The attributes of a variable: its name, and its role for the caller."""
     causality, variability, initial = _KINDS[variable.kind]
     if variable.kind == "mode":
         causality = unit.modes

@@ -42,7 +42,7 @@ class Mathematics:
         return self.names[name]
 
     def symbol(self, name: str) -> str:
-        """A name as it is in an expression, also one of an automaton."""
+        """A name as an expression writes it, also one of an automaton."""
         return self.printer.doprint(symbol(name))
 
     def expression(self, text: str) -> str:

@@ -233,7 +233,7 @@ class Located(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Options of how a command answers, and of what a model file may read and need."""
+    """Options for the output of a command, and for the files and resources that a model may use."""
 
     json: Json = False
     quiet: Quiet = False

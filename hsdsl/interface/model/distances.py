@@ -207,7 +207,7 @@ def distance_of_points(
     budget: Budget,
     plot: str | os.PathLike[str] | None = None,
 ) -> PointDistance:
-    """Return how far apart two points of a model's space are; see `Model.distance`."""
+    """Return the distance between two points of a model's space; see `Model.distance`."""
     if metric not in POINT_METRICS and metric in CURVE_METRICS:
         raise UsageError(
             f"'{metric}' is a distance between runs, not between points",

@@ -416,7 +416,7 @@ def run_compiled(
     threads: int,
     progress: Progress | None,
 ) -> None:
-    """Run all instances on so many threads; at Ctrl-C finished ones are kept."""
+    """Run all instances on ``threads`` threads; Ctrl-C keeps the finished ones."""
     ensemble, count = CompiledEnsemble(plan, instances, kept, names), instances.count
     slices, failed = iter(_slices(count, threads)), list[BaseException]()
 

@@ -270,7 +270,7 @@ def chunk_size(work: ChunkWork, processes: int) -> int:
     first, shared = rows // 2, math.ceil(rows / (CHUNKS_A_CORE * processes))
 
     def timed(count: int) -> tuple[float, float]:
-        """Seconds of the processor for so many rows, and bytes of one."""
+        """Processor seconds for a number of rows, and the bytes of one row."""
         began = time.process_time()
         size = work.rows(first, first + count).nbytes / count
         return time.process_time() - began, size

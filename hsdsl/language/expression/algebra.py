@@ -155,7 +155,7 @@ def is_number(expr: Any, number: int) -> Any:
 
 @lru_cache(maxsize=4096)  # memory of events has many conditions, which only jump
 def moving(expr: sp.Basic) -> frozenset[Any]:
-    """The symbols outside of what only jumps: by the others the derivative is zero."""
+    """The symbols outside piecewise constant functions: derivatives with respect to others are zero."""
     if expr.is_Symbol:
         return frozenset((expr,))
     if isinstance(expr, (sign, floor)):
@@ -209,7 +209,7 @@ class Solved(NamedTuple):
 def linear_solutions(
     sides: Sequence[tuple[Value, Value]], unknowns: Sequence[Any]
 ) -> Solved | tuple[int, str, str | None]:
-    """The solutions of equations left == right; or which equation has a fault, what it is, and a hint."""
+    """The solutions of equations left == right; or the number of a faulty equation, its fault and a hint."""
     rows, constants = [], []
     zero = dict.fromkeys(unknowns, sp.S.Zero)
     for place, (left, right) in enumerate(sides):

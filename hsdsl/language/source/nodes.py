@@ -48,7 +48,7 @@ class Text:
     def fault(
         self, code: str, message: str, line: int, column: int, hint: str | None = None, length: int = 1
     ) -> Diagnostic:
-        """A diagnostic about so many characters at a 1-based line and column."""
+        """A diagnostic about ``length`` characters at a 1-based line and column."""
         return self.diagnostic(code, message, self.span(line, column, length), hint)
 
 
@@ -160,7 +160,7 @@ class SourceRange:
 
 @dataclass(frozen=True, eq=False)
 class Scalar:
-    """A single value, kept as it is written: nothing is ever rounded."""
+    """A single value as written: nothing is ever rounded."""
 
     value: str
     plain: bool

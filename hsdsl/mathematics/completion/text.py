@@ -18,9 +18,9 @@ from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.source import Mapping, Node, Text, child
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
+from hsdsl.mathematics.completion.constrained import MOST_SETS, depends_on, neighbours
 from hsdsl.mathematics.completion.contact import Contact, contact
 from hsdsl.mathematics.completion.nearby import LONG, Slopes, cancelled, slopes_of_inputs
-from hsdsl.mathematics.completion.overlay import MOST_SETS, depends_on, neighbours
 from hsdsl.mathematics.completion.sliding import Sliding, slidings, with_entries
 
 WIDTH, INDENT = 120, 6  # of a line, and of the transitions in a mode that is written

@@ -46,7 +46,7 @@ class ModePoint:
         return 0 if abs(value) <= error else 1 if value > 0 else -1
 
     def _valued(self, expr: Any) -> tuple[float, float]:
-        """A value, and how much of it round-off and the search's own error may be."""
+        """A value, and a bound on its part from round-off and the error of the search."""
         names = sorted(expr.free_symbols, key=str)
         program = self.dynamics.remembered(
             ("terms", expr), lambda: StraightLine([expr, *sp.Add.make_args(expr)], names)

@@ -62,7 +62,7 @@ def positive(expr: Any) -> Constraint:
 
 
 class SearchRange(NamedTuple):
-    """What is known of a name's values: ends that hold for certain (None: without), and how far to look for points."""
+    """Bounds on a name's values that certainly hold (None: no bound), and the range in which points are searched."""
 
     low: Any | None
     high: Any | None

@@ -46,7 +46,7 @@ def parts(expr: Any) -> list[Any]:
 
 
 def jumps(expr: Any) -> Iterator[Part]:
-    """Where a sign, a floor or an angle jumps, unless what it is multiplied with vanishes there."""
+    """Jumps of signs, floors and angles, except where their factor vanishes."""
     for part in parts(expr):
         if isinstance(part, _JUMPING):
             weights = _weights(expr, part)
@@ -106,7 +106,7 @@ def _ends(part: Any) -> tuple[Any, ...]:
 
 
 def kinks(expr: Any) -> Iterator[Part]:
-    """Where abs, min and max have a kink, unless what they are multiplied with vanishes there."""
+    """Kinks of abs, min and max, except where their factor vanishes."""
     for part in parts(expr):
         if isinstance(part, (functions.absolute, functions.minimum, functions.maximum)):
             inside = part.args[0] if len(part.args) == 1 else part.args[0] - part.args[1]
@@ -145,7 +145,7 @@ def without_value(expr: Any) -> Iterator[Part]:
 
 
 def infinite_slopes(expr: Any) -> Iterator[Part]:
-    """Where roots and inverse functions have an infinite slope, unless what they are multiplied with vanishes there."""
+    """Infinite slopes of roots and inverse functions, except where their factor vanishes."""
     for part in parts(expr):
         steep = part.is_Pow and part.exp.is_Rational and 0 < part.exp < 1
         if (steep or isinstance(part, (sp.asin, sp.acos, sp.acosh))) and (ends := _ends(part)):

@@ -21,7 +21,7 @@ from hsdsl.language.expression.scope import slope_symbol
 from hsdsl.language.expression.timebox import OutOfTime, deep_stack, timebox
 from hsdsl.language.system import HybridSystem, SampledInput
 from hsdsl.mathematics import program as lowered
-from hsdsl.mathematics.completion import Overlay, overlays
+from hsdsl.mathematics.completion import ConstrainedMode, constrained_modes
 from hsdsl.mathematics.completion.nearby import slopes_of_inputs
 from hsdsl.mathematics.lower.constants import (
     Names,
@@ -33,7 +33,7 @@ from hsdsl.mathematics.lower.constants import (
     number,
     ranges_of,
 )
-from hsdsl.mathematics.lower.mode import LoweredMode, idle_states, lowered_overlay
+from hsdsl.mathematics.lower.mode import LoweredMode, idle_states, lowered_constrained
 from hsdsl.mathematics.lower.straight import print_routines
 from hsdsl.mathematics.lower.switches import switch_programs, switch_routines, with_switches
 
@@ -66,7 +66,7 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
     names = number(system, switches.symbols)
     experiment = system.experiment
     indices = {mode.name: i for i, mode in enumerate(system.modes)}
-    found = overlays(system)
+    found = constrained_modes(system)
     modes, contacts = _modes(system, found, names, indices, both)
     completed = [mode for mode in system.modes if mode.slides] + [each.mode for each in found if each]
     followed = [e for mode in completed for e in (*mode.flow, *(s.residual for s in mode.surfaces))]
@@ -98,10 +98,12 @@ def _lower(system: HybridSystem, both: Both) -> lowered.Program:
     )
 
 
-def _modes(system: HybridSystem, found: Sequence[Overlay | None], names: Names, indices: dict[str, int], both: Both):
+def _modes(
+    system: HybridSystem, found: Sequence[ConstrainedMode | None], names: Names, indices: dict[str, int], both: Both
+):
     """The modes, and those with motion along their guards."""
     modes = [LoweredMode(mode, names) for mode in system.modes]
-    every = [*modes, *(lowered_overlay(each, names) for each in found if each)]
+    every = [*modes, *(lowered_constrained(each, names) for each in found if each)]
     routines, others = both(lambda: [each.routines() for each in every], lambda: [each.others() for each in every])
     programs = [each.program(indices, *pair) for each, *pair in zip(every, routines, others, strict=True)]
     for i, idle in enumerate(idle_states(system)):

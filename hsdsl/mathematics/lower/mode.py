@@ -23,7 +23,7 @@ from hsdsl.base.graphs import closure, filled
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 from hsdsl.mathematics import program as lowered
-from hsdsl.mathematics.completion import Overlay
+from hsdsl.mathematics.completion import ConstrainedMode
 from hsdsl.mathematics.lower.constants import Names
 from hsdsl.mathematics.lower.straight import Cut, Definition, Gradient, Statement, print_routines, shared
 from hsdsl.mathematics.lower.tape import make_tape
@@ -31,7 +31,7 @@ from hsdsl.mathematics.lower.tape import make_tape
 _NAN = symbol("nan")
 
 
-def lowered_overlay(found: Overlay, names: Names) -> LoweredMode:
+def lowered_constrained(found: ConstrainedMode, names: Names) -> LoweredMode:
     """A mode with motion along its guards over numbered symbols."""
     flags = tuple(symbol(f"d{i}") for i in range(len(found.flags)))
     shared = names.shared | dict(zip(found.flags, flags, strict=True))
@@ -108,7 +108,7 @@ class LoweredMode:
         return replace(program, terms=print_routines((definition,), self.names.data))
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
-        """Whether a surface is affine in time and the states, also where the modes of parts choose what it is."""
+        """Whether a surface is affine in time and the states, in every choice that modes of parts make."""
         if residual.has(below):
             residual = _every_choice(residual)
             slopes = Gradient((residual,), self._places)

@@ -9,9 +9,9 @@ import sympy as sp
 
 from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.system import TIME, HybridSystem
-from hsdsl.mathematics.completion import overlays
+from hsdsl.mathematics.completion import constrained_modes
 from hsdsl.mathematics.lower.constants import number
-from hsdsl.mathematics.lower.mode import LoweredMode, lowered_overlay
+from hsdsl.mathematics.lower.mode import LoweredMode, lowered_constrained
 from hsdsl.mathematics.lower.straight import Definition, Gradient, print_routines
 from hsdsl.mathematics.lower.switches import with_switches
 from hsdsl.mathematics.program import Routines
@@ -35,7 +35,7 @@ def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
     with deep_stack():
         whole, switches = with_switches(system)
         names = number(whole, switches.symbols)
-        held = (lowered_overlay(found, names) for found in overlays(whole) if found)
+        held = (lowered_constrained(found, names) for found in constrained_modes(whole) if found)
         flows = (*(LoweredMode(mode, names) for mode in whole.modes), *held)
         return tuple(map(_slopes, flows))
 

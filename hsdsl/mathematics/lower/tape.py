@@ -218,7 +218,7 @@ class _Writer:
         return self._operation("slope", u)
 
     def ahead(self, lines: int) -> int:
-        """The number of a line that will be written after so many others, slopes being written already."""
+        """The number of the line that follows ``lines`` further lines, after the lines of slopes."""
         return self._first + len(self.operations) + lines
 
     def exp(self, u: int) -> int:

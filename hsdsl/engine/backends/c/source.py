@@ -87,7 +87,7 @@ def model_source(program: Program) -> str:
 
 
 def model_parts(program: Program, most: int) -> list[str]:
-    """Write a program as up to so many files, which can be compiled at the same time and linked to a library."""
+    """Write a program as several files, which can be compiled in parallel and linked to a library."""
     writer, table = _written(program)
     functions = sorted(map(_visible, writer.functions.values()), key=len, reverse=True)
     parts: list[list[str]] = [[] for _ in range(max(1, min(most, sum(map(len, functions)) // PART)))]

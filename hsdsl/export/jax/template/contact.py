@@ -361,7 +361,7 @@ def meets_another(bound, lane, t, x, edges):
 
 
 def nearly_over(model, config, lane):
-    """Whether a tail ends within the relaxation, its edges, and a bound of what is left of it."""
+    """Whether a tail ends within the relaxation, its edges, and a bound on its remaining time."""
     shrinks, flight, ratio = contraction(model, lane)
     k = (model.of(model.edge, lane.mode) == lane.edges[-1]) & model.of(model.is_edge, lane.mode)
     left = flight * ratio / (1 - jnp.where(ratio < 1, ratio, 0.0))

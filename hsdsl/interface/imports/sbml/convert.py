@@ -87,7 +87,7 @@ class Converter(Facts):
         return self.named(name, node)
 
     def _written_first(self, name: str) -> str:
-        """The first value of what a rule assigns, or of a reaction's rate."""
+        """The initial value of a rule's variable, or of a reaction's rate."""
         if name not in self._first:
             self._first[name] = None
             rule = self.model.assigned.get(name)

@@ -20,7 +20,7 @@ Written = tuple[str, int]  # a text, and how strongly its weakest operator binds
 
 
 def readable(text: str) -> str:
-    """A formula as people write it; one that is none, or too long for one, as it is."""
+    """A formula as people write it; a text that is no formula, or too long, is returned unchanged."""
     try:
         return _Printer(text).written(parse(text, "condition"))[0]
     except ExpressionError:

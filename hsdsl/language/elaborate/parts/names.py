@@ -203,7 +203,7 @@ class Board:
                     self.symbols.report(key.place, "HS351", message, hint)
 
     def of(self, one: Instance, attribute: str, lenient: bool = False) -> Meaning:
-        """What a name of an instance is to the others: a choice among what it is in each mode."""
+        """The value of an instance's name for other instances: a choice among its values in each mode."""
         if attribute in one.kind.parameters:
             return self.parameters.get(one.full(attribute))
         if attribute.startswith(IN_MODE):

@@ -29,7 +29,7 @@ from hsdsl.mathematics.program import HELD, LOOKED_AT
 _NAN = symbol("nan")
 
 
-class Overlay(NamedTuple):
+class ConstrainedMode(NamedTuple):
     """A mode's motions along its guards, by the numbers of contacts.
 
     ``mode`` has the states and walls of the mode, its edges, and then ends of `if`. ``flags`` are `HELD` for contacts
@@ -45,13 +45,13 @@ class Overlay(NamedTuple):
     releases: tuple[int | None, ...]
 
 
-def overlays(system: HybridSystem) -> list[Overlay | None]:
+def constrained_modes(system: HybridSystem) -> list[ConstrainedMode | None]:
     """The motions along guards of each mode of a system."""
     numbers, moving = numbered(system.parts), slopes_of_inputs(system)
-    return [overlay(mode, numbers, moving) for mode in system.modes]
+    return [constrained_mode(mode, numbers, moving) for mode in system.modes]
 
 
-def overlay(mode: Mode, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES) -> Overlay | None:
+def constrained_mode(mode: Mode, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES) -> ConstrainedMode | None:
     """The motions along guards of a mode, None without any; for ``numbers`` and ``moving`` see `contact`."""
     contacts = [found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers, moving))]
     if not contacts:
@@ -69,7 +69,7 @@ def overlay(mode: Mode, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES)
         releases += [i] * len(found.further)
     known = dict(zip(flags, chosen, strict=True)) if len(flags) == 1 else {}
     whole = replace(mode, flow=tuple(row.xreplace(known) for row in flow) if known else tuple(flow), edges=tuple(edges))
-    return Overlay(whole, flags, tuple(contacts), tuple(releases))
+    return ConstrainedMode(whole, flags, tuple(contacts), tuple(releases))
 
 
 def _flow_and_pushes(mode: Mode, contacts: Sequence[Contact], flags: Sequence[sp.Symbol]):
