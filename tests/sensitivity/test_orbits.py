@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 import hsdsl
@@ -388,3 +390,80 @@ experiment: {until: 8}
 """)
     with pytest.raises(UsageError, match=r"'d' does not return to its value: it starts at \S+ and comes back at \S+"):
         model.orbit("bounce")
+
+
+RUNNER = """hsdsl: 1
+parameters: {m: 80, k: 20000, L: 1, attack: 68*pi/180, g: 9.81}
+let: {length: sqrt((x - foot)**2 + z**2), pull: k*(L/length - 1)/m}
+modes:
+  flight:
+    flow: {x: vx, z: vz, vx: 0, vz: -g}
+    outputs: {energy: m*(vx**2 + vz**2)/2 + m*g*z}
+    transitions:
+      - {name: touchdown, when: z <= L*sin(attack), if: vz < 0, to: stance, reset: {foot: x + L*cos(attack)}}
+  stance:
+    flow: {x: vx, z: vz, vx: pull*(x - foot), vz: pull*z - g, foot: 0}
+    transitions: [{name: liftoff, when: length >= L, to: flight}]
+initial: {mode: flight, x: 0, z: 1, vx: 5, vz: 0}
+experiment: {until: 4}
+"""
+
+
+def apex_map(height: float, energy: float) -> float:
+    """The next apex of the runner by SciPy: apex height is the one coordinate of a level."""
+    m, k, g, attack = 80, 20000, 9.81, np.radians(68)
+    speed = np.sqrt(2 * energy / m - 2 * g * height)
+    down = -np.sqrt(2 * g * (height - np.sin(attack)))
+
+    def stance(_: float, y: Any) -> list[float]:
+        x, z, vx, vz = y
+        pull = k * (1 / np.hypot(x, z) - 1) / m
+        return [vx, vz, pull * x, pull * z - g]
+
+    def off(_: float, y: Any) -> float:
+        return np.hypot(y[0], y[1]) - 1 + 1e-300 * y[0]
+
+    off.terminal, off.direction = True, 1
+    start = [-np.cos(attack), np.sin(attack), speed, down]
+    end = solve_ivp(stance, (0, 1), start, "DOP853", events=off, rtol=1e-13, atol=1e-13).y[:, -1]
+    return float(end[1] + end[3] ** 2 / (2 * g))
+
+
+def test_stability_within_a_level() -> None:
+    """Against the map from apex to apex at one energy, whose derivative is the multiplier."""
+    model = hsdsl.loads(RUNNER)
+    family = model.orbit("liftoff")
+    assert family.verdict == "undecided" and np.isclose(family.multipliers[0], 1) and family.kept == {}
+    energy = 80 * (25 / 2 + 9.81)
+    for keep in ("energy", "vx**2 + vz**2 + 2*g*z"):
+        orbit = model.orbit("liftoff", keep=keep)
+        assert orbit.verdict == "stable" and len(orbit.multipliers) == 1
+        assert orbit.kept[keep] == pytest.approx(energy if keep == "energy" else energy / 40, rel=1e-14)
+        apex = orbit.state["z"] + orbit.state["vz"] ** 2 / (2 * 9.81)
+        assert apex_map(apex, energy) == pytest.approx(apex, rel=1e-10)
+        slope = (apex_map(apex + 1e-5, energy) - apex_map(apex - 1e-5, energy)) / 2e-5
+        assert orbit.multipliers[0] == pytest.approx(slope, rel=1e-6)
+    assert "within this level" in orbit.summary and orbit.as_json()["kept"] == orbit.kept
+
+
+@pytest.mark.parametrize(
+    ("keep", "sentence"),
+    [
+        ("vx", "'vx' is not kept: a lap changes"),
+        ("z + foot", "expected an expression of states and parameters, got 'foot'"),
+        ("2*(", "is no expression"),
+        ("m*g", "depends on no state of mode flight"),
+    ],
+)
+def test_what_is_no_level_is_refused(keep: str, sentence: str) -> None:
+    with pytest.raises(UsageError, match=rf"--keep: .*{re.escape(sentence)}"):
+        hsdsl.loads(RUNNER).orbit("liftoff", keep=keep)
+
+
+def test_a_refusal_offers_a_start_of_the_run() -> None:
+    """A ball that loses energy has no orbit; its last bounce is offered."""
+    model = hsdsl.load("models/bouncing-ball.yaml")
+    run = model.simulate(until=2)
+    with pytest.raises(UsageError) as refusal:
+        model.orbit(run.transitions[0].edge, until=2)
+    assert f"--set initial.v={run.transitions[-1].after['v']:.10g}" in (refusal.value.hint or "")

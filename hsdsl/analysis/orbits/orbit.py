@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from hsdsl.analysis.orbits.level import within
 from hsdsl.analysis.orbits.section import Closed
 from hsdsl.analysis.report.json_form import plain
 from hsdsl.analysis.report.words import condensed, number, values
@@ -63,6 +64,12 @@ class Orbit:
     closed: Closed = field(repr=False)
 
     @property
+    def kept(self) -> dict[str, float]:
+        """The quantity that the orbit's family keeps, with its value here; stability is that within its level."""
+        level = self.closed.level
+        return {} if level is None else {level.text: level.value}
+
+    @property
     def execution(self) -> Execution:
         """The run over one period, with the derivatives as further states."""
         return self.sensitivity.execution
@@ -72,6 +79,7 @@ class Orbit:
         names = ("section", "laps", "mode", "state", "phase", "period", "drift", "residual", "verdict", "reasons")
         result = {name: getattr(self, name) for name in names}
         result |= {"state": seen(self.state), "multipliers": _pairs(self.multipliers)}
+        result |= {"kept": self.kept} if self.kept else {}
         if self.sides:
             result["sides"] = {edge: _pairs(found) for edge, found in self.sides.items()}
         return plain(result)
@@ -91,7 +99,9 @@ class Orbit:
         yield "state", f"mode {self.mode}, {values(seen(self.state))}"
         if self.drift:
             yield "drift", f"{values(self.drift)} in a period; nothing depends on it"
-        yield "multipliers", shown(self.multipliers)
+        for text, level in self.kept.items():
+            yield "kept", f"{text} = {number(level, 12)}: orbits of other levels are near, and have a multiplier of 1"
+        yield "multipliers", shown(self.multipliers) + (" within this level" if self.kept else "")
         for edge, found in self.sides.items():
             yield "", f"{shown(found)} where {edge} goes first"
         yield "verdict", f"{self.verdict}: {'; '.join(condensed(self.reasons))}"
@@ -119,11 +129,17 @@ class Orbit:
 def multipliers_of(found: Closed, slopes: Array, forced: bool) -> Array:
     """Return the eigenvalues of a return map, the largest first, without the zero along the flow and those of shifts.
 
+    Where a quantity is kept they are those within its level.
     The map does not depend on where along the flow it begins: that direction has the eigenvalue zero.
     """
     matrix, of = return_matrix(slopes, forced), found.symmetry
     count = len(found.point) + forced
-    values = np.linalg.eigvals(of.without_shifts(matrix[:count])[:, of.kept(count)])
+    reduced, kept = of.without_shifts(matrix[:count])[:, of.kept(count)], of.kept(count)
+    if found.level is not None:
+        scale = np.append(found.sizes, found.passage.time)[kept]
+        row = np.append(found.off_level()[0], np.zeros(count - len(found.point)))[kept]
+        reduced = within(row, reduced * scale / scale[:, None], found.level.text)
+    values = np.linalg.eigvals(reduced)
     order = np.argsort(-np.abs(values), kind="stable")
     return values[order][:-1]
 

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hsdsl.analysis.orbits.level import Level
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.analysis.sensitivity.targets import derivative_name, own, shift_name
 from hsdsl.engine.execution import Array, Execution
@@ -231,6 +232,12 @@ class Closed(NamedTuple):
     residual: float
     symmetry: Symmetry
     sizes: Array
+    level: Level | None = None
+
+    def off_level(self) -> tuple[Array, float]:
+        """The slopes of a quantity that is kept, by states, and how far the point is off its level."""
+        assert self.level is not None
+        return self.level.row(self.point, self.sizes)
 
 
 class NotClosed(Exception):
@@ -238,7 +245,13 @@ class NotClosed(Exception):
 
 
 def closed(
-    section: Section, coarse: Section, point: Array, phase: float, horizon: float, multiple: float | None
+    section: Section,
+    coarse: Section,
+    point: Array,
+    phase: float,
+    horizon: float,
+    multiple: float | None,
+    level: Level | None = None,
 ) -> Closed:
     """Solve for a fixed point from a guess.
 
@@ -250,6 +263,8 @@ def closed(
         The end of the first run; it is made longer where that is not enough.
     multiple : float or None
         The time that an orbit of a forced system takes.
+    level : Level, optional
+        A quantity that has its value at the guess in the orbit.
 
     Raises NotClosed: it did not converge.
     """
@@ -258,7 +273,7 @@ def closed(
     except NoReturn as error:
         raise NotClosed(str(error)) from None
     sizes = _sizes(passage, point, other)
-    best = _looked_at(point, phase, passage, sizes, multiple)
+    best = _looked_at(point, phase, passage, sizes, multiple, level)
     here, mark, idle = best, best.residual, 0
     for _ in range(MOST_STEPS):
         if here.residual <= EPSILON:
@@ -280,10 +295,13 @@ def closed(
     raise NotClosed(f"Newton's method stops improving, and {_open(section, best, multiple)}")
 
 
-def _looked_at(point: Array, phase: float, passage: Return, sizes: Array, multiple: float | None) -> Closed:
+def _looked_at(
+    point: Array, phase: float, passage: Return, sizes: Array, multiple: float | None, level: Level | None
+) -> Closed:
     found, scale = symmetry(passage, sizes), np.append(sizes, multiple or 1.0)
     missing = np.abs(found.without_shifts(gap(passage, point, multiple))) / scale[found.kept(len(scale))]
-    return Closed(point, phase, passage, float(np.max(missing)), found, sizes)
+    here = Closed(point, phase, passage, float(np.max(missing)), found, sizes, level)
+    return here if level is None else here._replace(residual=max(here.residual, abs(here.off_level()[1])))
 
 
 def _open(section: Section, here: Closed, multiple: float | None) -> str:
@@ -291,6 +309,8 @@ def _open(section: Section, here: Closed, multiple: float | None) -> str:
     of, scale = here.symmetry, np.append(here.sizes, multiple or 1.0)
     kept = of.kept(len(scale))
     missing = np.abs(of.without_shifts(gap(here.passage, here.point, multiple))) / scale[kept]
+    if here.level is not None and abs(here.off_level()[1]) > np.max(missing):
+        return f"'{here.level.text}' is {here.level.at(here.point)[0]:.10g} instead of {here.level.value:.10g}"
     k = kept[int(np.argmax(missing))]
     if k == len(here.point):
         return f"the orbit takes {here.passage.time:.10g} instead of the period {multiple:.10g} of the forcing"
@@ -329,6 +349,10 @@ def newton_step(here: Closed, multiple: float | None) -> Array:
     scale = np.append(here.sizes, multiple or 1.0)
     scaled = of.without_shifts(matrix[:count])[:, kept] * scale[kept] / scale[kept][:, None]
     missing = of.without_shifts(gap(here.passage, here.point, multiple)[:count]) / scale[kept]
+    if here.level is not None:
+        row, off = here.off_level()
+        scaled = np.vstack([scaled, np.append(row, np.zeros(count - n))[kept]])
+        missing = np.append(missing, off)
     step = np.zeros(n + 1)
     step[kept] = -np.linalg.lstsq(scaled, missing, rcond=SMALLEST)[0] * scale[kept]
     return step
@@ -345,7 +369,7 @@ def _damped(section: Section, here: Closed, step: Array, multiple: float | None)
         except NoReturn as error:
             problem = str(error)
             continue
-        there = _looked_at(point, phase, passage, here.sizes, multiple)
+        there = _looked_at(point, phase, passage, here.sizes, multiple, here.level)
         if there.residual < 2 * here.residual or here.residual < CLOSED:
             return there
     raise NotClosed(f"Newton's method is stuck ({problem}), and {_open(section, here, multiple)}")

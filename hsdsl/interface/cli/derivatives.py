@@ -73,6 +73,7 @@ SECTION = "The name of the transition at which the orbit is cut."
 LAPS = "Number of transitions of the section after which the orbit closes."
 FOLLOW = "Follow the orbit in a parameter from A to B, and mark folds, flips and grazing."
 PERIOD = "The period of the forcing, an expression of parameters. Default: that of the sines and cosines of t."
+KEEP = "A quantity that the motion keeps, an expression of states or an output: find the orbit with the run's value."
 
 
 def orbit(
@@ -81,6 +82,7 @@ def orbit(
     section: Annotated[str, option("EDGE", SECTION)],
     laps: Annotated[int, option("N", LAPS)] = 1,
     period: Annotated[str | None, option("T", PERIOD)] = None,
+    keep: Annotated[str | None, option("ENERGY", KEEP)] = None,
     follow: Annotated[str | None, option("PARAM=A:B", FOLLOW, "--continue")] = None,
     overrides: Annotated[list[str] | None, overriding(AS_RUN)] = None,
     until: Annotated[str | None, option("T", "End of the run that gives the first guess.")] = None,
@@ -91,11 +93,13 @@ def orbit(
     """Find a periodic orbit near the model's run, with its Floquet multipliers."""
     with answer.reporting():
         check_target(plot, "--plot")
+        if keep is not None and follow is not None:
+            raise UsageError("--keep is for one orbit, and --continue follows a branch", "leave one out")
         call = located.settings(overrides, until=until, laps=laps, period=period)
         loaded = hsdsl.load(model)
         with progress(answer.hidden) as show:
             if follow is None:
-                found = loaded.orbit(section, progress=counted_runs(show), **call)
+                found = loaded.orbit(section, keep=keep, progress=counted_runs(show), **call)
             else:
                 name, *ends = _range(follow)
                 found = loaded.continuation(section, name, *ends, progress=counted_runs(show, name), **call)

@@ -92,6 +92,7 @@ class Model(Runs):
         *,
         laps: int = 1,
         period: Any = None,
+        keep: str | None = None,
         progress: Callable[[int, float | None], None] | None = None,
         **arguments: Any,
     ) -> Orbit:
@@ -107,6 +108,9 @@ class Model(Runs):
             Number of transitions of the section after which the orbit closes.
         period : number or str, optional
             The period of the forcing; by default that of the sines and cosines of time in the model.
+        keep : str, optional
+            A quantity that flows and resets keep, such as an energy: an expression of states and parameters, or an
+            output. The orbit has the value of the run, and its stability is that within this level.
         progress : callable, optional
             Called before every run with its number, and the value of the continuation parameter, if any.
         **arguments
@@ -118,7 +122,7 @@ class Model(Runs):
 
         with in_notebook() as show:
             progress = progress or counted_runs(show)
-            return Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments).find()
+            return Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments, keep).find()
 
     def continuation(
         self,

@@ -29,7 +29,7 @@ from hsdsl.analysis.orbits.section import (
 )
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import called, counted, did_you_mean
+from hsdsl.base.names import called, counted, did_you_mean, without_memory
 from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
 from hsdsl.base.parts import meant_alone, numbers_of, written_edges
 from hsdsl.engine.execution import Execution
@@ -40,6 +40,7 @@ from hsdsl.interface.model.differentiate import FINEST, located_arguments, start
 from hsdsl.interface.model.distances import distance_of_runs
 
 if TYPE_CHECKING:
+    from hsdsl.analysis.orbits.level import Level
     from hsdsl.engine.execution import Array
     from hsdsl.interface.model.runs import Runs
 
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 REFUSED = ("step", "scheme", "samples", "precision")
 MOST_GUESSES = 6
 MOST_NAMED = 4  # transitions in a hint
+MOST_OFFERED = 8  # states of a start in a hint
 ENOUGH = 16  # times as many transitions as the guess makes, in a lap that another one is looked for
 SHORTER = "passages become ever shorter, so the execution ends in a point"
 NO_TIME = "Newton's method goes to where a passage takes no time"
@@ -82,7 +84,14 @@ class Orbits:
     """The orbits of a model through one section, with the arguments of its runs."""
 
     def __init__(
-        self, model: Runs, section: str, laps: int, period: Any, progress: Progress | None, arguments: Mapping[str, Any]
+        self,
+        model: Runs,
+        section: str,
+        laps: int,
+        period: Any,
+        progress: Progress | None,
+        arguments: Mapping[str, Any],
+        keep: str | None = None,
     ) -> None:
         from hsdsl.analysis.orbits.forcing import PHASE, forced, shifted
 
@@ -99,6 +108,26 @@ class Orbits:
         self._stiff = False
         self._progress, self._runs, self._followed = progress, 0, ""
         self._guess: Guess | None = None
+        self._keep = keep
+        self._first: Execution | None = None
+
+    def _level(self, guess: Guess, parameters: Mapping[str, Any]) -> Level | None:
+        """The level that an orbit near a guess is to be on."""
+        if self._keep is None:
+            return None
+        from hsdsl.analysis.orbits.level import level_of, quantity
+
+        name, states = guess.entered
+        system = self.model.system
+        mode = next((mode for mode in system.modes if mode.name == name), None)
+        if mode is None:
+            raise UsageError("--keep: it is for models without parts")
+        values = with_parameters(self.model.pipeline.values(FLOAT64), parameters)
+        expr = quantity(system, mode, self._keep)
+        first = self._first
+        begins = first is not None and first.arcs[0].mode == name  # its start has the value of the level
+        start = first.values[0][: len(states)].astype(float) if first and begins else guess.point
+        return level_of(expr, self._keep, states, values.evaluate, start)
 
     def forcing(self, parameters: Mapping[str, Any]) -> float | None:
         """The period of the forcing with these parameters."""
@@ -188,7 +217,7 @@ class Orbits:
         Raises UsageError: the run does not pass the section, or no orbit is found.
         """
         run = self.model.simulate(**located_arguments(self.model.pipeline, self.arguments))
-        self._stiff = run.method == "radau"
+        self._stiff, self._first = run.method == "radau", run
         guesses = self.guesses(run)
         ending = "" if run.stop.complete else f"; the run stops at t = {run.times[-1]:g}: {run.stop.message}"
         if not guesses:
@@ -203,7 +232,24 @@ class Orbits:
                 problem = problem or str(error)
         problem = SHORTER if problem == NO_TIME and self._shortens(run) else problem
         rests = any(mode.held is not None for mode in self.model.program.modes)
-        raise UsageError(f"no periodic orbit was found near the run: {problem}{ending}", COMPLETE if rests else CLOSER)
+        hint = COMPLETE if rests else CLOSER
+        hint += f", or at the run's last passage: {offered}" if (offered := self._start(run)) else ""
+        raise UsageError(f"no periodic orbit was found near the run: {problem}{ending}", hint)
+
+    def _start(self, run: Execution) -> str:
+        """The state after the last passage of the section, as options; nothing where the time counts as well."""
+        passed = [made for made in run.transitions if made.edge == self.edge and made.after is not None]
+        if self.forced or not passed or self.model.program.parts or self.model.program.modes[0].final:
+            return ""
+        mode, states = self._entered()
+        after = passed[-1].after or {}
+        named = [name for name in without_memory(states) if name in after]
+        if len(named) > MOST_OFFERED:
+            return ""
+        sets = ([f"initial.mode={mode}"] if len(self.model.program.modes) > 1 else []) + [
+            f"initial.{name}={float(after[name]):.10g}" for name in named
+        ]
+        return " ".join(f"--set {each}" for each in sets)
 
     def _passes(self, run: Execution) -> tuple[str, str]:
         """What the run makes of the section where that gives no guess, and a hint."""
@@ -236,7 +282,8 @@ class Orbits:
         multiple = None if forcing is None else forcing * max(1, round(guess.time / forcing))
         phase = guess.phase if forcing is None else guess.phase % forcing
         sections = self.section(parameters), self.section(parameters, COARSER)
-        found = closed(*sections, guess.point, phase, 1.5 * guess.time, multiple)
+        level = self._level(guess, parameters)
+        found = closed(*sections, guess.point, phase, 1.5 * guess.time, multiple, level)
         if not found.passage.time > SHRUNK * guess.time:
             raise NotClosed(NO_TIME)
         if self.forced is False and _still(found):

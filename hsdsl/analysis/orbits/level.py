@@ -1,0 +1,89 @@
+# pyright: basic, reportArgumentType=false, reportAttributeAccessIssue=false, reportOptionalMemberAccess=false, reportReturnType=false
+"""A quantity that a family of orbits keeps, such as an energy: its level, and what of the return map is within it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import sympy as sp
+
+from hsdsl.base.errors import UsageError
+from hsdsl.base.names import did_you_mean, shown
+from hsdsl.engine.execution import Array
+from hsdsl.language.expression.parse import ExpressionError
+from hsdsl.language.expression.plain import value
+from hsdsl.language.expression.scope import symbol
+from hsdsl.language.system import HybridSystem, Mode
+
+INVARIANT = 1e-6  # of its slopes: a quantity whose slopes a lap changes by more is not kept
+
+
+class Level(NamedTuple):
+    """A quantity of a section's states, held at its value at a point; ``at`` gives its value and slopes at others."""
+
+    text: str
+    value: float
+    at: Callable[[Array], tuple[float, Array]]
+
+    def row(self, point: Array, scale: Array) -> tuple[Array, float]:
+        """Its slopes by states relative to ``scale``, of length one, and how far a point is off in them."""
+        number, slopes = self.at(point)
+        row = slopes * scale
+        length = float(np.linalg.norm(row)) or 1.0
+        return row / length, (number - self.value) / length
+
+
+def quantity(system: HybridSystem, mode: Mode, text: str) -> sp.Expr:
+    """The expression of a text, or of an output with this name, in a mode.
+
+    Raises UsageError: it is none, or not of the mode's states and of parameters alone.
+    """
+    outputs = dict(zip(system.outputs, mode.outputs, strict=True))
+    if text in outputs and outputs[text] is None:
+        raise UsageError(f"--keep: output '{text}' has no value in mode {mode.name}", "choose another section")
+    try:
+        expr = outputs[text] if text in outputs else value(text)
+    except ExpressionError as error:
+        raise UsageError(f"--keep: '{shown(text)}' is no expression: {error}") from None
+    known = [*mode.states, *(parameter.name for parameter in system.parameters)]
+    expr = expr.xreplace({symbol(name): of for name, of in outputs.items() if of is not None and name not in known})
+    for name in sorted(str(each) for each in expr.free_symbols if str(each) not in known):
+        hint = did_you_mean(name, known)
+        raise UsageError(f"--keep: expected an expression of states and parameters, got '{name}' in it", hint)
+    if not any(str(each) in mode.states for each in expr.free_symbols):
+        raise UsageError(f"--keep: '{shown(text)}' depends on no state of mode {mode.name}")
+    return expr
+
+
+def level_of(
+    expr: sp.Expr, text: str, states: tuple[str, ...], evaluate: Callable[[dict[str, Any]], Any], point: Array
+) -> Level:
+    """The level through a point; ``evaluate`` makes numbers of expressions of parameters."""
+    slopes = [sp.diff(expr, symbol(name)) for name in states]
+
+    def at(point: Array) -> tuple[float, Array]:
+        here = {symbol(name): sp.Rational(x) for name, x in zip(states, point.tolist(), strict=True)}
+        found = evaluate({f"part_{k}": part.xreplace(here) for k, part in enumerate([expr, *slopes])})
+        numbers = np.array([float(number) for number in found.values()])
+        if not np.isfinite(numbers).all():
+            raise UsageError(f"--keep: '{shown(text)}' has no value or no slopes at the section")
+        return float(numbers[0]), numbers[1:]
+
+    return Level(text, at(point)[0], at)
+
+
+def within(row: Array, matrix: Array, text: str) -> Array:
+    """A return map among the directions along which a quantity with these slopes stays, both relative to sizes.
+
+    Raises UsageError: a lap changes the quantity.
+    """
+    off = float(np.max(np.abs(row @ matrix - row)))
+    if off > INVARIANT * float(np.max(np.abs(row))):
+        raise UsageError(
+            f"--keep: '{shown(text)}' is not kept: a lap changes its slopes by {off:.2g} of their size",
+            "leave --keep out, or give a quantity that flows and resets keep",
+        )
+    along = np.linalg.svd(row[None, :])[2][1:]
+    return along @ matrix @ along.T
