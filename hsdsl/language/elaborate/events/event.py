@@ -1,19 +1,22 @@
 # pyright: basic
-"""An event as mathematics: its condition, the states that remember what it did, and the executions that can wait."""
+"""An event as mathematics: its condition, the states that remember what it did, and the executions that can wait.
+
+States have the first that waits; where several can, `hsdsl.engine.simulate.transitions` keeps the others.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from hsdsl.base.functions import below, replaced
+from hsdsl.base.functions import below, maximum, replaced
 from hsdsl.base.names import memory
 from hsdsl.language.expression.algebra import either, is_mode, select, total, whole
 from hsdsl.language.expression.conditions import Reached, comparisons, number, reached
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.system import HALF, ONE, TIME, ZERO, Edge, Mode, Queue, Surface
+from hsdsl.language.system import HALF, ONE, TIME, ZERO, Edge, Mode, Queue, Surface, at_least
 
 Values = dict[str, Any]
 
@@ -197,3 +200,30 @@ def chosen(event: Event, truth: Any, values: Values, others: Values) -> Values:
     if truth == 1:
         return values
     return {name: select(truth, event.guarded(value, truth), others[name]) for name, value in values.items()}
+
+
+def begins_to_wait(event: Event) -> Values:
+    """The values where an event is triggered: those of the execution that begins to wait."""
+    delay = maximum(event.delay, ZERO) if event.delay != 0 else ZERO
+    given, waiting = event.edge.values, event.symbol("waiting")
+    values = {waiting.name: ONE if event.queue is None else waiting + 1, event.at.name: TIME + delay}
+    return values | {name: given[state] for state, name in event.stored.items()}
+
+
+def dropped(event: Event) -> Values:
+    return {} if event.event.persistent or event.delay is None else {event.names["waiting"]: ZERO}
+
+
+def executes(event: Event) -> Edge:
+    """The edge that gives the states, after the delay, the values that were stored."""
+    edge, waiting = replace(event.edge, event=None), event.symbol("waiting")
+    texts = dict(zip(edge.target_states, edge.reset_texts, strict=True))
+    values = edge.values | {state: symbol(name) for state, name in event.stored.items()}
+    if edge.target == event.mode.name:
+        values[waiting.name] = ZERO if event.queue is None else waiting - 1
+    surface = event.surface(TIME, event.at, f"t >= {event.at.name}")
+    states, reset = tuple(values), tuple(values.values())
+    edge = replace(edge, surface=surface, condition=at_least(waiting, HALF), target_states=states, reset=reset)
+    return replace(
+        edge, reset_texts=tuple(texts.get(name, name) for name in states), condition_text=f"{waiting.name} >= 1/2"
+    )

@@ -10,8 +10,7 @@ from math import prod
 from typing import Any
 
 from hsdsl.base.functions import below
-from hsdsl.language.elaborate.events.event import Event, Values
-from hsdsl.language.elaborate.events.waiting import begins_to_wait, dropped, executes
+from hsdsl.language.elaborate.events.event import Event, Values, begins_to_wait, dropped, executes
 from hsdsl.language.expression.conditions import Reached, comparisons, condition
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import HALF, ONE, TIME, TRUTH, ZERO, Edge, all_of, at_least

@@ -10,9 +10,8 @@ from typing import Any
 
 from hsdsl.base.functions import maximum
 from hsdsl.base.names import SINCE
-from hsdsl.language.elaborate.events.event import Event, Values, chosen, number_left
+from hsdsl.language.elaborate.events.event import Event, Values, chosen, dropped, number_left
 from hsdsl.language.elaborate.events.firing import Draft
-from hsdsl.language.elaborate.events.waiting import dropped
 from hsdsl.language.expression.algebra import select
 from hsdsl.language.expression.conditions import Reached
 from hsdsl.language.expression.scope import symbol
