@@ -43,7 +43,7 @@ def test_the_compiler_lays_out_structures_and_numbers_names_as_they_were_read(tm
         lines += [f"HS_{word.upper().replace(' ', '_')}" for word in words]
     source, library = tmp_path / "layout.c", tmp_path / "layout.so"
     numbers = ", ".join(f"(long long)({line})" for line in lines)
-    headers = "".join(f"#include {name}\n" for name in ("<stddef.h>", '"hs_simulate.h"', '"hs_screen.h"'))
+    headers = "".join(f"#include {name}\n" for name in ("<stddef.h>", '"hs_screen.h"', '"hs_lanes.h"'))
     source.write_text(f"{headers}HS_EXPORT long long layout[] = {{{numbers}}};\n")
     find_compiler().build([source], [structures.FOLDER], library, "-O1", FLAGS)
     theirs = (ctypes.c_longlong * len(ours)).in_dll(ctypes.CDLL(str(library)), "layout")
@@ -53,7 +53,7 @@ def test_the_compiler_lays_out_structures_and_numbers_names_as_they_were_read(tm
 
 @needs_compiler
 @pytest.mark.parametrize(
-    "name", ["functions.h", "hs_math.h", "hs_series.h", "hs_screen.h", "workspace.h", "hs.c", "library.c"]
+    "name", ["functions.h", "hs_math.h", "hs_series.h", "hs_screen.h", "workspace.h", "hs.c", "library.c", "lane.h"]
 )
 def test_what_is_compiled_or_included_alone_includes_what_it_uses(name, tmp_path):
     flags = ["-std=c99", "-fsyntax-only", "-Werror=implicit-function-declaration", f"-I{print_scheme(tmp_path)}"]

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hsdsl.engine.scheme.roots import value_of
+from hsdsl.engine.scheme.polynomials import value_of
 from hsdsl.engine.simulate.surfaces import affine_curve, at
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate

@@ -16,7 +16,7 @@ from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.compiler import FLAGS, find_compiler
 from hsdsl.engine.runtime.library import print_scheme
-from hsdsl.engine.scheme import primitives, roots
+from hsdsl.engine.scheme import polynomials, primitives, roots
 from hsdsl.engine.scheme.printer import Refused, Scheme, Text
 from hsdsl.engine.simulate.surfaces import make_roots
 
@@ -24,6 +24,7 @@ DEGREE = 12
 AROUND = """\
 #include "functions.h"
 #include "primitives.h"
+#include "polynomials.c"
 #include "roots.c"
 
 static double left[20], own[20], binomials[200], room[MOST_CUTS][20];
@@ -69,7 +70,7 @@ def walked(c: list[float], level: float, risen: bool) -> list[float]:
     room, n, found = make_roots(DEGREE, FLOAT64), len(c) - 1, list[float]()
     walk = roots.Walk(level, c[0] > level, risen, 0.0)
     while (root := roots.next_root(room, walk, c, n, 0.0, True)) is not None:
-        found += [root, roots.slope_of(c, n, root)]
+        found += [root, polynomials.slope_of(c, n, root)]
     return found
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from hsdsl.engine.execution import Array, Evaluated
 from hsdsl.engine.runtime import structures
-from hsdsl.engine.runtime.library import SYMBOL, compiled, loop
+from hsdsl.engine.runtime.compiler import NoCompiler
+from hsdsl.engine.runtime.library import LANES, SYMBOL, compiled, compiled_lanes, loop
 from hsdsl.mathematics.program import Program
 
 
@@ -29,6 +30,9 @@ def runtime() -> ctypes.CDLL:
     library.hs_sample_record.argtypes, library.hs_sample_record.restype = sampling, ctypes.c_int64
     library.hs_screen_run.argtypes, library.hs_screen_run.restype = (ctypes.c_void_p,) * 3, ctypes.c_int64
     library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
+    library.hs_run_team.argtypes, library.hs_run_team.restype = (ctypes.c_void_p,), None
+    library.hs_lane_memory.argtypes = *(ctypes.c_void_p,) * 2, ctypes.c_int64, ctypes.c_int32
+    library.hs_lane_memory.restype = ctypes.c_int64
     return library
 
 
@@ -39,9 +43,11 @@ class CompiledModel:
     """
 
     def __init__(self, program: Program) -> None:
-        self._library = compiled(program)
+        self._program, self._library = program, compiled(program)
         self.table = structures.Model.in_dll(self._library, SYMBOL)
         self._shared: dict[Hashable, Any] = {}
+        self._lanes: Any = None
+        self._without_lanes = False
 
     def workspace(self, method: Any, scheme: str) -> int:
         """How many numbers a run needs for itself."""
@@ -51,6 +57,20 @@ class CompiledModel:
     def mode(self, number: int) -> Any:
         """The ``hs_mode`` of a mode."""
         return structures.array_at(structures.Mode, self.table.mode, self.table.flows)[number]
+
+    def lanes(self, compiles: bool) -> Any:
+        """Its ``hs_lane_program``: what is kept of it, or what one ``compiles``.
+
+        None where there is none: no mode steps in lanes, or processor or compiler lack them.
+        """
+        if self._lanes is None and not self._without_lanes:
+            try:
+                library = compiled_lanes(self._program, compiles)
+            except NoCompiler:
+                library = None
+            self._without_lanes = compiles and library is None
+            self._lanes = library and structures.LaneProgram.in_dll(library, LANES)
+        return self._lanes
 
     def shared(self, key: Hashable, make: Callable[[], Any]) -> Any:
         """Return what runs of this model share under a key, made on first use."""

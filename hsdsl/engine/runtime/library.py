@@ -97,8 +97,8 @@ def _shipped(content: str) -> Path:
     return SHIPPED / f"{key_of(content, _our_text(), _OPTIONS, _processor())}.so"
 
 
-def load(content: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctypes.CDLL:
-    """Load the library that ``source`` compiles to and that has ``symbol``.
+def load(content: str, symbol: str, source: Callable[[], Sequence[str]], further: tuple[str, ...] = ()) -> ctypes.CDLL:
+    """Load the library that ``source`` compiles to, with ``further`` flags, and that has ``symbol``.
 
     ``content`` is the source's name in the cache; the source, one text or several that are compiled at the same time,
     is written only where it must be compiled.
@@ -110,12 +110,12 @@ def load(content: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctyp
     if loaded is not None:
         return loaded
     compiler = find_compiler()
-    key = _key(content, compiler)
+    key = _key(content, compiler, further)
     loaded = _kept(key)
     if loaded is not None:
         return loaded
     with making(KIND, key):
-        return _kept(key) or _made(compiler, key, symbol, source)
+        return _kept(key) or _made(compiler, key, symbol, source, further)
 
 
 def _kept(key: str) -> ctypes.CDLL | None:
@@ -130,8 +130,8 @@ def _loaded(path: Path) -> ctypes.CDLL | None:
         return None  # made for something else than what runs now: it is made again
 
 
-def _key(content: str, compiler: Compiler) -> str:
-    return key_of(content, _our_text(), compiler.identity, _OPTIONS, _processor())
+def _key(content: str, compiler: Compiler, further: tuple[str, ...] = ()) -> str:
+    return key_of(content, _our_text(), compiler.identity, " ".join((_OPTIONS, *further)), _processor())
 
 
 @cache
@@ -151,7 +151,9 @@ def _processor() -> str:
     return f"{sys.platform} {platform.machine()} {sys.maxsize}"
 
 
-def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], Sequence[str]]) -> ctypes.CDLL:
+def _made(
+    compiler: Compiler, key: str, symbol: str, source: Callable[[], Sequence[str]], further: tuple[str, ...]
+) -> ctypes.CDLL:
     """Compile a library, try it, and keep it where anything can be kept."""
     from hsdsl.engine.runtime.process import workshop
 
@@ -164,7 +166,7 @@ def _made(compiler: Compiler, key: str, symbol: str, source: Callable[[], Sequen
         with workshop() as folder:
             library = folder / "model.so"
             try:
-                _compile(compiler, texts, library, OF_LOOP if is_loop else EFFORT)
+                _compile(compiler, texts, library, EFFORT if symbol == SYMBOL else OF_LOOP, further)
             except TooSlow:
                 if not is_loop:  # which is compiled in seconds, unless much else runs
                     _give_up(key, allowed)
@@ -190,11 +192,13 @@ def _write(path: Path, text: str) -> None:
     path.write_text(text)
 
 
-def _compile(compiler: Compiler, texts: Sequence[str], library: Path, effort: Effort) -> None:
+def _compile(
+    compiler: Compiler, texts: Sequence[str], library: Path, effort: Effort, further: tuple[str, ...] = ()
+) -> None:
     sources = [library.with_name(f"model{number or ''}.c") for number in range(len(texts))]
     for source, text in zip(sources, texts, strict=True):
         source.write_text(text)
-    compiler.build(sources, [RUNTIME, print_scheme(library.parent)], library, effort, FLAGS)
+    compiler.build(sources, [RUNTIME, print_scheme(library.parent)], library, effort, (*FLAGS, *further))
 
 
 def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:
@@ -236,6 +240,40 @@ def compiled(program: Program) -> ctypes.CDLL:
         return load(_content(program), SYMBOL, lambda: _source(program))
     except TooSlow as error:
         raise NoCompiler(f"{error}; {_longest(program)}") from None
+
+
+LANES = "hs_the_lanes"
+VECTORS = {  # flags, by what a processor must have
+    ("avx512f", "avx512dq", "avx512vl"): ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mprefer-vector-width=512"),
+    ("avx2",): ("-mavx2",),
+}
+
+
+def compiled_lanes(program: Program, compiles: bool) -> ctypes.CDLL | None:
+    """The library of a program's lanes, likewise; None where it has none, or is not kept and one does not compile it.
+
+    Raises NoCompiler: there is no compiler, or it lacks vectors.
+    """
+    flags, content = vectors(), f"lanes of {_content(program)}"
+    if flags is None:
+        return None
+    loaded = _kept(_key(content, find_compiler(), flags))
+    if loaded is not None or not compiles:
+        return loaded
+    from hsdsl.engine.backends.c.lanes import lane_source
+
+    text = lane_source(program)
+    return None if text is None else load(content, LANES, lambda: [text], flags)
+
+
+@cache
+def vectors() -> tuple[str, ...] | None:
+    """The flags for the vectors of this processor; None where it has none, or does not say."""
+    try:
+        told = set(Path("/proc/cpuinfo").read_text().split("flags", 1)[-1].split("\n", 1)[0].split())
+    except OSError:
+        return None
+    return next((flags for needed, flags in VECTORS.items() if told.issuperset(needed)), None)
 
 
 def _content(program: Program) -> str:

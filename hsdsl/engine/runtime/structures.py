@@ -23,7 +23,7 @@ from hsdsl.engine import integrators
 from hsdsl.engine.integrators.tableau import Row as Terms
 from hsdsl.engine.integrators.tableau import table_numbers
 
-HEADERS = ("hs.h", "hs_simulate.h", "hs_screen.h")
+HEADERS = ("hs.h", "hs_simulate.h", "hs_lanes.h", "hs_screen.h")
 FOLDER = Path(__file__).parent / "c"
 COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 ENUMERATION = re.compile(r"typedef enum \{([^}=]*)\} (\w+);")  # those that count from 0
@@ -73,6 +73,7 @@ Row, Collocation, Method = (STRUCTURES[name] for name in ("hs_row", "hs_collocat
 Timeline, Interpolation, Settings = (STRUCTURES[name] for name in ("hs_timeline", "hs_interpolation", "hs_settings"))
 Visited, Tail, Task = (STRUCTURES[f"hs_{name}"] for name in ("visited", "tail", "task"))
 Sampling, Ensemble = STRUCTURES["hs_sampling"], STRUCTURES["hs_ensemble"]
+Team, LaneProgram = STRUCTURES["hs_team"], STRUCTURES["hs_lane_program"]
 Operation, Formula, Formulas = (STRUCTURES[name] for name in ("hs_operation", "hs_formula", "hs_formulas"))
 Record, Screen, Correction, Moves = (STRUCTURES[f"hs_{name}"] for name in ("record", "screen", "correction", "moves"))
 ARC, TRANSITION, NOTE = (np.dtype(STRUCTURES[name]) for name in ("hs_arc", "hs_transition", "hs_note"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import Number
+from hsdsl.engine.scheme.polynomials import value_and_slope, value_at_end, value_of
 from hsdsl.engine.scheme.primitives import fill_bernstein, largest_of, least_of
 from hsdsl.engine.scheme.words import Room, Vector, inline
 
@@ -80,43 +81,6 @@ def split(b: Room, n: int, s: Number, left: Room) -> None:
         for i in range(n - j + 1):
             b[i] = rest * b[i] + s * b[i + 1]
         left[j] = b[0]
-
-
-@inline
-def value_of(c: Vector, n: int, s: Number) -> Number:
-    """Evaluate c_0 + c_1 s + ... (Horner)."""
-    total = c[n]
-    for k in range(n - 1, -1, -1):
-        total = c[k] + s * total
-    return total
-
-
-@inline
-def value_at_end(c: Vector, n: int) -> Number:
-    """The same at 1."""
-    total = c[n]
-    for k in range(n - 1, -1, -1):
-        total = c[k] + total
-    return total
-
-
-@inline
-def value_and_slope(c: Vector, n: int, s: Number) -> tuple[Number, Number]:
-    """Evaluate a polynomial and its derivative (Horner)."""
-    total = c[n]
-    slope = total * 0
-    for k in range(n - 1, -1, -1):
-        slope = total + s * slope
-        total = c[k] + s * total
-    return total, slope
-
-
-def slope_of(c: Vector, n: int, s: Number) -> Number:
-    """Evaluate the derivative."""
-    slope = s * 0
-    for k in range(n, 0, -1):
-        slope = k * c[k] + s * slope
-    return slope
 
 
 def changes(b: Vector, n: int) -> int:

@@ -24,6 +24,8 @@ LONGEST = f"U{max(map(len, REASONS))}"
 NOTICED = {"in contact": "held", "replaced": "replaced", "unsettled": "rough", "crowded": "crowded"}
 SLID = 16  # the bit of `HS_SLID`
 KINDS_OF_NOTICES = [(SLID, "sliding"), *((structures.NOTICES.index(word), kind) for word, kind in NOTICED.items())]
+FEWEST_IN_LANES = 64  # instances: fewer leave most lanes empty
+IN_MODES = 3  # runs under way for each lane, where they are in several modes
 LOG_ROOM = 4096  # transitions that a thread keeps before it hands them over
 Logged = tuple[Array, Array, Array]  # transitions as `hs_transition`, and the states before and after each
 
@@ -101,6 +103,7 @@ class CompiledEnsemble:
         modes = plan.problem.program.modes
         self._slides = np.array([bool(mode.slides) for mode in modes] * any(mode.slides for mode in modes), np.int32)
         self._stop = np.zeros(1, np.int32)
+        self._lanes: Any = None
 
     @property
     def stopped(self) -> bool:
@@ -122,16 +125,40 @@ class CompiledEnsemble:
         table.stop, table.slides = self._stop.ctypes.data, self._slides.ctypes.data if len(self._slides) else None
         for name in BY_INSTANCE:
             setattr(table, name, _row(getattr(kept, name), first))
-        runtime().hs_run_ensemble(ctypes.addressof(table))  # the interpreter is free meanwhile
-        if place.workspace.failed:
-            raise place.workspace.failed[0]
+        place.run()
         if kept.logs:
             kept.log[first] = place.logged(int(kept.transitions[first:last].sum()))
 
-    def place(self) -> ThreadWorkspace:
-        """Make a place to work at."""
-        room = LOG_ROOM if self._kept.logs else 0
-        return ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1], room)
+    @property
+    def fewest(self) -> int:
+        """How many instances a thread should take at least: the last of those that step together leave lanes empty."""
+        return 1 if self._lanes is None else 4 * self._together
+
+    def place(self, before: ThreadWorkspace | None = None) -> ThreadWorkspace:
+        """Make a place to work at, and others where runs step in lanes; or take one that is such."""
+        if before is not None and bool(before.others) is bool(self._lanes):
+            return before
+        room, lanes = LOG_ROOM if self._kept.logs else 0, self._lanes
+        places = [
+            ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1], room)
+            for _ in range(self._together if lanes else 1)
+        ]
+        if lanes:
+            places[0].join(lanes, places)
+        return places[0]
+
+    @property
+    def _together(self) -> int:
+        """How many runs are under way: more than lanes where they are in several modes."""
+        modes = structures.array_at(ctypes.c_int32, self._lanes.is_for, self._plan.compiled.table.modes)
+        return self._lanes.lanes * (IN_MODES if sum(modes) > 1 else 1)
+
+    def look_for_lanes(self, compiles: bool) -> None:
+        """Let runs that follow step many at once, by what is kept or what one ``compiles``."""
+        settings = self._plan.problem.settings
+        of_series = settings.scheme == "located" and settings.method is not None and settings.method.kind == "taylor"
+        if of_series and not settings.moves and not self._kept.logs and len(self._start) >= FEWEST_IN_LANES:
+            self._lanes = self._plan.compiled.lanes(compiles)
 
 
 class ThreadWorkspace:
@@ -161,7 +188,33 @@ class ThreadWorkspace:
             np.empty((log_room, model.width)),
         )
         self._full: list[Logged] = []
+        self.others: list[ThreadWorkspace] = []
+        self.team: Any = None
         self._lay_log(log_room)
+
+    def join(self, lanes: Any, places: list[ThreadWorkspace]) -> None:
+        """Let runs at so many places step together, this one being the first."""
+        task, count = self.table.task, len(places)
+        of = (ctypes.c_void_p * count)(*(ctypes.addressof(place.table) for place in places))
+        room = runtime().hs_lane_memory(task.model, task.method, count, lanes.lanes)
+        memory = (ctypes.c_double * room)()
+        self.others = places[1:]
+        self.team = structures.Team(
+            places=structures.address(of),
+            count=count,
+            program=structures.address(ctypes.pointer(lanes)),
+            memory=structures.address(memory),
+        )
+
+    def run(self) -> None:
+        """Run what is laid here; the interpreter is free meanwhile."""
+        if self.team is None:
+            runtime().hs_run_ensemble(ctypes.addressof(self.table))
+        else:
+            runtime().hs_run_team(ctypes.addressof(self.team))
+        for place in (self, *self.others):
+            if place.workspace.failed:
+                raise place.workspace.failed[0]
 
     def _lay_log(self, room: int) -> None:
         table = self.table

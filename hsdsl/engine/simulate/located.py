@@ -26,7 +26,8 @@ from hsdsl.engine.integrators.taylor import proposed_step
 from hsdsl.engine.kernel import Series
 from hsdsl.engine.scheme.control import accept, begin_steps, reject, struggles
 from hsdsl.engine.scheme.pace import creeps, is_slow
-from hsdsl.engine.scheme.roots import slope_of, stays_below, value_of
+from hsdsl.engine.scheme.polynomials import slope_of, value_of
+from hsdsl.engine.scheme.roots import stays_below
 from hsdsl.engine.simulate.contact import (
     at_limit,
     behind_end,

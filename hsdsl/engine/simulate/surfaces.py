@@ -25,7 +25,8 @@ from typing import TYPE_CHECKING, Literal
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.engine.integrators.stepper import Polynomial, State
 from hsdsl.engine.kernel import ModeKernel, Vector
-from hsdsl.engine.scheme.roots import Cut, Roots, Walk, next_root, slope_of, value_of
+from hsdsl.engine.scheme.polynomials import slope_of, value_of
+from hsdsl.engine.scheme.roots import Cut, Roots, Walk, next_root
 from hsdsl.engine.simulate.settings import Settings
 from hsdsl.mathematics.program import EdgeProgram
 

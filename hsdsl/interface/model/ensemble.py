@@ -404,7 +404,9 @@ def _samples(given: Any) -> int | Array | str | None:
 
 
 SHARE = 4  # a thread takes this part of what is its share of the instances that are left, so that all end together
+MOST_AT_ONCE = 4096  # instances that a thread takes at a time
 INTERVAL = 0.1  # seconds between looks at how far it is
+PATIENCE = 0.25  # seconds until code is compiled that steps many runs at once, unless it is kept: that takes a second
 Progress = Callable[[int, int], None]
 
 
@@ -418,42 +420,50 @@ def run_compiled(
 ) -> None:
     """Run all instances on ``threads`` threads; Ctrl-C keeps the finished ones."""
     ensemble, count = CompiledEnsemble(plan, instances, kept, names), instances.count
-    slices, failed = iter(_slices(count, threads)), list[BaseException]()
+    ensemble.look_for_lanes(compiles=False)
+    slices, failed = iter(_slices(count, threads, ensemble.fewest)), list[BaseException]()
 
     def work() -> None:
         try:
-            place = ensemble.place()
+            place = None
             while not ensemble.stopped and (taken := next(slices, None)) is not None:  # one at a time: the GIL
+                place = ensemble.place(place)
                 ensemble.work(*taken, place)
         except BaseException as error:
             failed.append(error)
             ensemble.stop()
 
     workers = [threading.Thread(target=work, daemon=True) for _ in range(min(threads, count))]
+    began, compiler = time.perf_counter(), threading.Thread(target=ensemble.look_for_lanes, args=(True,), daemon=True)
     for worker in workers:
         worker.start()
     try:
         for worker in workers:
             while worker.is_alive():
                 worker.join(INTERVAL)
+                done = int(np.count_nonzero(kept.reason >= 0))
+                if time.perf_counter() - began > PATIENCE and 2 * done < count and compiler.ident is None:
+                    compiler.start()
                 if progress is not None:
-                    progress(int(np.count_nonzero(kept.reason >= 0)), count)
+                    progress(done, count)
     except KeyboardInterrupt:
         pass
     finally:
         ensemble.stop()
-        for worker in workers:
-            worker.join()
+        for thread in (*workers, compiler):
+            if thread.ident is not None:
+                thread.join()
     if failed:
         raise failed[0]
     kept.told()
 
 
-def _slices(count: int, threads: int) -> list[tuple[int, int]]:
+def _slices(count: int, threads: int, fewest: int) -> list[tuple[int, int]]:
     """Instances that a thread takes at a time, from the first up to the last: fewer towards the end."""
     found, first = list[tuple[int, int]](), 0
     while first < count:
-        last = first + -(-(count - first) // (SHARE * threads))
+        share = -(-(count - first) // (SHARE * threads))
+        last = min(count, first + max(fewest, min(MOST_AT_ONCE, share)))
         found.append((first, last))
         first = last
     return found

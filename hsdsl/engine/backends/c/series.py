@@ -251,7 +251,8 @@ class Shared:
         """Begin the sums, as `hs_product` does; ``names`` are those of arrays of pairs."""
         half = f"l{self.line}[k / 2]"
         for i, other, is_first in self._apart:
-            yield f"hs_real low{i} = 0.0, high{i} = k % 2 ? 0.0 : {_term(half, f'l{other}[k / 2]', is_first)};"
+            middle = _term(half, f"l{other}[k / 2]", is_first)
+            yield f"hs_real low{i} = HS_ALL(0.0), high{i} = k % 2 ? HS_ALL(0.0) : {middle};"
         if not self.pairs:
             return
         yield f"hs_pair {', '.join(f'low{i} = {{0.0, 0.0}}, high{i} = {{0.0, 0.0}}' for i in self.paired)};"

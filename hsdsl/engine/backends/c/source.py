@@ -26,7 +26,7 @@ from hsdsl.engine.backends.c.routine import (
 from hsdsl.engine.backends.c.series import flow_lines, is_large, line_count, piecewise, read_by_surfaces, surface_lines
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program, Queue, Routines, Tape
 
-_DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
+DEFINITION = re.compile(r"^    def (\w+)(\(.*?)(?=^    (?:def|return) )", re.MULTILINE | re.DOTALL)
 _GIVEN = re.compile(r"^ +[px]\d+ = given\[\d+\]\n", re.MULTILINE)
 _SIGNATURE = re.compile(r"^int \w+\([^{]*\)(?= \{)", re.MULTILINE)
 PART = 1 << 14  # characters of functions that are worth a file of their own
@@ -104,9 +104,9 @@ def _visible(function: str) -> str:
     return function[:start] + function[start:].removeprefix("static ")
 
 
-def _written(program: Program) -> tuple[_Writer, str]:
+def _written(program: Program) -> tuple[Writer, str]:
     """The functions and tables of a program, and the last of them."""
-    writer = _Writer(program)
+    writer = Writer(program)
     modes = [writer.mode(k, mode) for k, mode in enumerate(program.flows)]
     table = writer.table("hs_mode", "modes", modes)
     model = (
@@ -176,7 +176,7 @@ def data_names(program: Program) -> dict[str, str]:
 
 def _bodies(routines: Routines, names: dict[str, str]) -> dict[str, str]:
     found: dict[str, str] = {}
-    for name, text in _DEFINITION.findall(routines.source):
+    for name, text in DEFINITION.findall(routines.source):
         definition = ast.parse(dedent(f"    def routine{_GIVEN.sub('', text)}")).body[0]
         assert isinstance(definition, ast.FunctionDef)
         found[name] = function_body(definition, names)
@@ -185,14 +185,14 @@ def _bodies(routines: Routines, names: dict[str, str]) -> dict[str, str]:
 
 def routine_functions(routines: Routines, program: Program, prefix: str) -> str:
     """Further routines over a program's data as functions of C, each named by a prefix and its own name."""
-    writer = _Writer(program)
+    writer = Writer(program)
     found: list[str] = []
-    for name, text in _DEFINITION.findall(routines.source):
+    for name, text in DEFINITION.findall(routines.source):
         found.append(routine_function(f"{prefix}{name}", text, writer.data))
     return "".join(found)
 
 
-class _Writer:
+class Writer:
     def __init__(self, program: Program) -> None:
         self.data = data_names(program)
         self.states, self.queues = program.all_states, program.queues
@@ -201,7 +201,7 @@ class _Writer:
         self._names: dict[str, str] = {}
         self._tables: dict[tuple[str, str], str] = {}
         self._count = count()
-        texts = (text for mode in program.flows for _, text in _DEFINITION.findall(mode.routines.source))
+        texts = (text for mode in program.flows for _, text in DEFINITION.findall(mode.routines.source))
         self._alike = Counter(shape_of(text, self.data)[0] for text in dict.fromkeys(texts))
         self.read: dict[object, set[int]] = {}  # by the operations of flows, the lines that surfaces read
         for tape in (mode.tape for mode in program.flows if mode.tape):
@@ -262,7 +262,7 @@ class _Writer:
         Models with derivatives are not exported: they may use what some compilers lack.
         """
         own, further = tape.constant_count, tape.surface_constant_count
-        texts, size = dict[str, str](_DEFINITION.findall(tape.constants.source)), max(1, own + further)
+        texts, size = dict[str, str](DEFINITION.findall(tape.constants.source)), max(1, own + further)
         first = f"{self.function(texts['flow'])}(p, 0.0, 0, c) || " if own else ""
         second = f"{self.function(texts['surfaces'])}(p, 0.0, 0, c + {own}) || " if further else ""
         found = [str(-1 if line is None else line) for line in tape.surfaces]
@@ -326,7 +326,7 @@ class _Writer:
 
     def routines(self, routines: Routines) -> dict[str, str]:
         """Write a mode's routines; returns their names in C."""
-        return {name: self.function(text, name == "outputs") for name, text in _DEFINITION.findall(routines.source)}
+        return {name: self.function(text, name == "outputs") for name, text in DEFINITION.findall(routines.source)}
 
     def shared(self, kind: str, text: str) -> str:
         """Write a function whose name is ``NAME`` in its text; equal texts are one function."""

@@ -127,18 +127,33 @@ static void keep(hs_ensemble *e) {
   copy(e->outputs + i * m, chunk->outputs + last * m, (int)m);
 }
 
+/* Begin an instance, which is not the one before. */
+static void begin_instance(hs_ensemble *e) {
+  hs_task *const task = &e->task;
+  e->base = e->made = e->next = e->layout = 0;
+  task->timeline = &e->timeline[e->done];
+  task->settings = e->settings[e->done];
+  task->x = e->start + e->done * task->dimension;
+  hs_forget_waits(task->model, task->tail);
+}
+
+/* Keep what is kept of a run that is over; 0 where it was to stop. */
+static int end_instance(hs_ensemble *e) {
+  if (*e->stop && e->task.stop.reason == HS_INTERRUPTED) return 0;
+  if (e->task.chunk.rows) keep(e);
+  return 1;
+}
+
+static void open_place(hs_ensemble *e) {
+  e->task.flush = let_go;
+  e->task.poll = asked_to_stop;
+}
+
 void hs_run_ensemble(hs_ensemble *e) {
-  hs_task *task = &e->task;
-  task->flush = let_go;
-  task->poll = asked_to_stop;
+  open_place(e);
   for (; e->done < e->instances && !*e->stop; e->done++) {
-    e->base = e->made = e->next = e->layout = 0;
-    task->timeline = &e->timeline[e->done];
-    task->settings = e->settings[e->done];
-    task->x = e->start + e->done * task->dimension;
-    hs_forget_waits(task->model, task->tail);
-    hs_simulate(task);
-    if (*e->stop && task->stop.reason == HS_INTERRUPTED) return;
-    if (task->chunk.rows) keep(e);
+    begin_instance(e);
+    hs_simulate(&e->task);
+    if (!end_instance(e)) return;
   }
 }

@@ -10,6 +10,7 @@
 
 enum { RAISED = -1 };
 enum { GOES_ON = -1 }; /* instead of a reason to stop */
+enum { PARKED = -6 }; /* instead of a reason to stop, of a run before steps that are made in lanes */
 enum { PAUSED = -5 }; /* instead of a reason to stop, of a run that goes on later */
 enum { LANDED = -2, AT_BOUNDARY = -3 }; /* how flow() ends, else GOES_ON or a reason to stop */
 enum { WITHOUT_VALUE = -4 }; /* how first_event() ends, else GOES_ON, LANDED or a reason to stop */

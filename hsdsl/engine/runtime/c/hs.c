@@ -11,7 +11,11 @@
 #include "control.c"
 #include "pace.c"
 #include "cascade.c"
+#include "polynomials.c"
 #include "roots.c"
+
+#include "root.h"
+#include "span.h"
 
 #include "taylor.c"
 #if defined(__GNUC__) && !defined(__clang__)
@@ -214,10 +218,16 @@ static hs_run open_run(hs_task *task) {
   return run;
 }
 
+/* Enter the task's mode. */
+static int begin_run(hs_run *run, hs_task *task) {
+  *run = open_run(task);
+  start_sizes(run, task->mode, 0.0);
+  return enter(run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
+}
+
 void hs_simulate(hs_task *task) {
-  hs_run run = open_run(task);
-  start_sizes(&run, task->mode, 0.0);
-  const int entered = enter(&run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
+  hs_run run;
+  const int entered = begin_run(&run, task);
   if (task->settings.scheme == HS_LOCATED)
     located(&run, entered);
   else

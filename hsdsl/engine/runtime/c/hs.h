@@ -21,6 +21,10 @@ typedef float hs_real;
 typedef double hs_real;
 #endif
 typedef double hs_time;
+typedef hs_real hs_number;
+
+/* Some text is compiled for numbers, and for vectors of them (lane.h), where a number is not one without HS_ALL. */
+#define HS_ALL(number) ((hs_real)(number))
 
 #if defined(__GNUC__)
 #define HS_APART __attribute__((noinline)) /* a piece of a routine: a compiler takes long for large functions */

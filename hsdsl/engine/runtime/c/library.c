@@ -5,6 +5,7 @@
 #define HS_MOVES /* exported programs have no verdict, so none of their runs is moved */
 #include "hs.c"
 #include "ensemble.c"
+#include "lanes.c"
 
 /* What a run has written, taken out of its chunk: its record, then column after column in one stretch of memory that is
    as long as they are. See Packed in hsdsl/engine/simulate/columns.py. */

@@ -2,9 +2,6 @@
    See hsdsl/engine/simulate/located.py. */
 
 #define BLUR 2
-#define UNKNOWN_TOLERANCE 1e-10
-#define LAST_TERM 4
-#define TERM_BEFORE 32
 
 /* Let steps go to the other stages, and to `end` (of a step from run->x), for a shorter step. */
 static void aside(hs_run *run, hs_real **end) {
@@ -149,38 +146,12 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
   }
 }
 
-/* The smaller of two steps; of not-a-number and another one the other. */
-static hs_real smaller(hs_real least, hs_real h) { return h != h ? least : least != least ? h : hs_min(h, least); }
-
-/* The step at which the first terms of a state that are left out stay below the tolerance beside the first that is not
-   0; not-a-number where there are none, or where that is in the later half. */
-static hs_real from_zero(const hs_run *run, int s, hs_real tolerance) {
-  const int order = run->method->order;
-  const hs_real *c = series_of(run, s);
-  hs_real least = NAN;
-  int first = 1;
-  while (first < order && c[first] == 0) first++;
-  const hs_real allowed = tolerance * fabs(c[first]);
-  if (first > (order + 2) / 2 || !(allowed > HS_NOTHING)) return NAN;
-  for (int m = order; m <= order + 1; m++)
-    if (c[m] != 0) least = smaller(least, root(fabs(c[m]) / allowed, m - first));
-  return least;
-}
-
 /* The step at which the first terms that are left out stay below the tolerance; not-a-number where all vanish.
    See hsdsl/engine/integrators/taylor.py. */
 static hs_real proposed_step(const hs_run *run, int n, hs_real tolerance) {
-  const int order = run->method->order;
-  hs_real least = NAN, before = 0.0;
-  for (int m = order; m <= order + 1; m++) {
-    hs_real largest = 0.0;
-    for (int s = 0; s < n; s++)
-      if (tolerance * run->scales[s] > HS_NOTHING) largest = hs_max(largest, fabs(series_of(run, s)[m]) / (tolerance * run->scales[s]));
-    if (largest > 0 && (least != least || largest * least > before)) least = smaller(least, root(largest, m));
-    before = largest;
-  }
+  hs_real least = step_of_terms(run->lines, run->scales, n, run->method->order, tolerance);
   for (int s = 0; s < n; s++)
-    if (!(tolerance * run->scales[s] > HS_NOTHING)) least = smaller(least, from_zero(run, s, tolerance));
+    if (!(tolerance * run->scales[s] > HS_NOTHING)) least = smaller(least, from_zero(series_of(run, s), 1, run->method->order, tolerance));
   return least;
 }
 
@@ -253,30 +224,34 @@ static int series_curves(hs_run *run) {
   return 0;
 }
 
+/* Whether a step of Taylor's method does not solve the equation at its end. */
+HS_INLINE int is_too_wrong(hs_run *run, hs_real h) {
+  return error_ratio(run, h) > hs_max(1, 64 * HS_UNIT / run->control.tolerance);
+}
+
 /* Try a step of Taylor's method, or say what is in its way. */
 HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_time t1) {
   const hs_mode *mode = run->here.table;
-  const hs_real *p = run->here.p, tolerance = run->control.tolerance;
+  const hs_real *p = run->here.p;
   begin_span(run, h, t1);
-  taylor_span(run, n, h, &run->span.piece);
+  hs_real powers[HS_MOST_ORDER + 1];
+  fill_powers(powers, run->method->order, h);
+  run->span.piece.degree = run->method->order;
+  taylor_span(run->lines, run->x, n, run->width, run->method->order, powers, run->span.piece.c, run->z, run->error);
   if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
   if (!hs_finite(sum_of(run->z, n) + sum_of(run->end, n))) return HS_NOT_FINITE;
-  if (tolerance > 0) {
-    left_of(run, n, h);
-    if (error_ratio(run, h) > hs_max(1, 64 * HS_UNIT / tolerance)) return HS_ERROR;
+  if (run->control.tolerance > 0) {
+    left_of(run->error, run->end, n, run->method->order, h);
+    if (is_too_wrong(run, h)) return HS_ERROR;
   }
   return mode->values(p, t1, run->z, run->ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
-/* Make one step of Taylor's method, as long as the terms left out allow; halved where its end does not solve the
-   equation. */
-HS_INLINE hs_step_failure next_series(hs_run *run, const int n, hs_time limit) {
+/* Make one step of Taylor's method of a length that is halved where its end does not solve the equation. */
+HS_INLINE hs_step_failure halved_series(hs_run *run, const int n, hs_time limit, hs_real h, int halvings) {
   const hs_time t = run->here.t;
-  if (run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines)) return HS_NOT_FINITE;
-  hs_real h = within_reach(run, longest(run, n));
-  hs_time t1;
-  for (int i = 0; i < MOST_HALVINGS; i++) {
-    t1 = end_of_step(t, &h, limit);
+  for (int i = halvings; i < MOST_HALVINGS; i++) {
+    const hs_time t1 = end_of_step(t, &h, limit);
     if (!(t1 > t)) break;
     run->refused = 0;
     if (try_series(run, n, h, t1) == HS_CLEAR) return slow_enough(run, h), HS_CLEAR;
@@ -284,6 +259,16 @@ HS_INLINE hs_step_failure next_series(hs_run *run, const int n, hs_time limit) {
     h = h / 2;
   }
   return HS_NOT_FINITE;
+}
+
+static int expands(hs_run *run) {
+  return !run->here.table->series(run->here.p, run->method->order, run->here.t, run->x, run->lines);
+}
+
+/* Make one step of Taylor's method, as long as the terms left out allow. */
+HS_INLINE hs_step_failure next_series(hs_run *run, const int n, hs_time limit) {
+  if (!expands(run)) return HS_NOT_FINITE;
+  return halved_series(run, n, limit, within_reach(run, longest(run, n)), 0);
 }
 
 /* Make one step that the error allows, not beyond `limit`; or return what is in the way. */
@@ -663,32 +648,62 @@ HS_INLINE void go_to_end(hs_run *run) {
   run->k[run->method->stages] = run->end;
 }
 
-/* Step until a surface is crossed, or to a time in the segment. */
-static int follow(hs_run *run, hs_time limit) {
-  hs_mode_state *const here = &run->here;
-  const int n = here->dimension;
+/* Begin to step through a flow. */
+static void begin_following(hs_run *run) {
   run->sloped = run->has_before = 0;
   run->ratio = 1;
   forget_steps(run);
   begin_pace(run);
-  while (here->t < limit && !is_slow(&run->pace, here->t)) {
-    if (interrupted(run)) return stopped(run, HS_INTERRUPTED, here->t);
-    const hs_step_failure failure = next_span(run, n, limit);
-    if (failure != HS_CLEAR) return located_stuck(run, failure);
-    const int event = first_event(run);
-    if (event == WITHOUT_VALUE) {
-      copy(run->task->stop.slope, run->z, run->here.dimension);
-      stopped(run, HS_STEP_NOT_FINITE, here->t);
-      run->task->stop.h = run->span.t1;
-      return HS_STEP_NOT_FINITE;
-    }
-    if (event != GOES_ON) return event;
-    if (here->active) leave(run, run->span.t1, run->z);
-    HS_MOVE(run, move_along(run, run->span.t1, run->z, run->span.h));
-    append(run, run->span.t1, run->z, &run->span.piece);
-    go_to_end(run);
-  }
-  return here->t < limit ? located_stuck(run, HS_SLOW) : AT_BOUNDARY;
+}
+
+/* Whether there is a step to make before `limit`: GOES_ON, or what ends the flow. */
+HS_INLINE int before_step(hs_run *run, hs_time limit) {
+  if (!(run->here.t < limit)) return AT_BOUNDARY;
+  if (is_slow(&run->pace, run->here.t)) return located_stuck(run, HS_SLOW);
+  return interrupted(run) ? (int)stopped(run, HS_INTERRUPTED, run->here.t) : GOES_ON;
+}
+
+/* Go on at the end of a step on which nothing happens. */
+HS_INLINE int pass(hs_run *run) {
+  if (run->here.active) leave(run, run->span.t1, run->z);
+  HS_MOVE(run, move_along(run, run->span.t1, run->z, run->span.h));
+  append(run, run->span.t1, run->z, &run->span.piece);
+  go_to_end(run);
+  return GOES_ON;
+}
+
+/* Go on behind a step that was made: GOES_ON, or what happens on it. */
+static int behind_step(hs_run *run) {
+  const int event = first_event(run);
+  if (event == GOES_ON) return pass(run);
+  if (event != WITHOUT_VALUE) return event;
+  copy(run->task->stop.slope, run->z, run->here.dimension);
+  stopped(run, HS_STEP_NOT_FINITE, run->here.t);
+  run->task->stop.h = run->span.t1;
+  return HS_STEP_NOT_FINITE;
+}
+
+HS_INLINE int behind(hs_run *run, hs_step_failure failure) {
+  return failure == HS_CLEAR ? behind_step(run) : located_stuck(run, failure);
+}
+
+/* Make one step: GOES_ON, or what ends the flow. */
+HS_INLINE int one_step(hs_run *run, const int n, hs_time limit) { return behind(run, next_span(run, n, limit)); }
+
+/* Step until a surface is crossed, or to a time in the segment. */
+static int follow_on(hs_run *run, hs_time limit) {
+  const int n = run->here.dimension;
+  int event;
+  do {
+    event = before_step(run, limit);
+    if (event == GOES_ON) event = one_step(run, n, limit);
+  } while (event == GOES_ON);
+  return event;
+}
+
+static int follow(hs_run *run, hs_time limit) {
+  begin_following(run);
+  return follow_on(run, limit);
 }
 
 /* Forget the ends of contacts among what else might have been. */
@@ -762,7 +777,7 @@ static int located_flow(hs_run *run) {
   const hs_mode *const own = run->here.table;
   const int n = run->here.dimension, held = contact_at(run);
   if (held != GOES_ON) return held;
-  if (run->here.table == own) return follow(run, limit);
+  if (run->here.table == own) return run->parks ? PARKED : follow(run, limit);
   copy(run->began, run->x, n);
   for (int k = 0; k < own->edges; k++) run->held[k] = in_touch(run, k);
   const int outcome = along_guards(run, limit);
@@ -846,18 +861,21 @@ static int located_at_boundary(hs_run *run) {
   return count ? jump(run) : (int)stopped(run, HS_UNTIL, t);
 }
 
-/* Follow the execution until it stops or pauses. */
+/* Go on behind a flow that has ended. */
+static int behind_flow(hs_run *run, int outcome) {
+  if (outcome == LANDED)
+    outcome = jump(run);
+  else if (outcome == AT_BOUNDARY)
+    outcome = located_at_boundary(run);
+  return outcome == GOES_ON && pauses(run) ? PAUSED : outcome;
+}
+
+/* Follow the execution until it stops, pauses or, where it does so, parks before the steps of a flow. */
 static int located(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
-    if (interrupted(run))
-      outcome = stopped(run, HS_INTERRUPTED, run->here.t);
-    else
-      outcome = run->here.t < segment_end(run) ? located_flow(run) : AT_BOUNDARY;
-    if (outcome == LANDED)
-      outcome = jump(run);
-    else if (outcome == AT_BOUNDARY)
-      outcome = located_at_boundary(run);
-    if (outcome == GOES_ON && pauses(run)) return PAUSED;
+    if (interrupted(run)) return stopped(run, HS_INTERRUPTED, run->here.t);
+    outcome = run->here.t < segment_end(run) ? located_flow(run) : AT_BOUNDARY;
+    outcome = behind_flow(run, outcome);
   }
   return outcome;
 }

@@ -6,15 +6,15 @@
 #include "functions.h"
 
 /* C(n, 0) to C(n, n) for n up to `most`. */
-static void fill_binomials(hs_real *row, int most) {
+static void fill_binomials(hs_number *row, int most) {
   for (int n = 0; n <= most; n++, row += n)
     for (int k = 0; k <= n; k++) row[k] = k == 0 || k == n ? 1.0 : (row - n)[k - 1] + (row - n)[k];
 }
 
 /* Each number has the one before added to it n times, of which the first more stay each time. Two such passes are made
    in one. */
-HS_INLINE void fill_bernstein(const hs_real *binomials, const hs_real *c, int n, hs_real *b) {
-  const hs_real *choose = binomials + n * (n + 1) / 2;
+HS_INLINE void fill_bernstein(const hs_number *binomials, const hs_real *c, int n, hs_real *b) {
+  const hs_number *choose = binomials + n * (n + 1) / 2;
   HS_SIMD for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
   for (int k = 1; k <= n; k += 2) {
     hs_real before = b[k], once = before + b[k - 1];
@@ -39,6 +39,7 @@ HS_INLINE hs_real least_of(const hs_real *b, int n) {
   return least;
 }
 
+#if !defined(HS_WIDTH) /* of one run */
 /* Four sums at a time need not wait for each other. */
 HS_INLINE hs_real sum_of(const hs_real *v, int n) {
   hs_real a = 0.0, b = 0.0, c = 0.0, d = 0.0;
@@ -74,5 +75,6 @@ static int flow_between(hs_run *run, int k, hs_time t, const hs_real *x, hs_time
   *f = run->source[k];
   return 0;
 }
+#endif
 
 #endif

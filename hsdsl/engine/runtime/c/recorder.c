@@ -40,7 +40,7 @@ HS_INLINE void write_row(hs_run *run, hs_time t, const hs_real *x, const hs_poly
   chunk->depth[row] = depth;
   if (m && (!outputs || outputs(p, t, x, chunk->outputs + row * m)))
     for (int i = 0; i < m; i++) chunk->outputs[row * m + i] = NAN;
-  if (run->method->degree > 0) write_piece(run, n, piece, chunk->pieces + row * run->method->degree * w);
+  if (run->method->degree > 0 && !run->bare) write_piece(run, n, piece, chunk->pieces + row * run->method->degree * w);
   chunk->rows++;
   run->row++;
   run->task->now = t;

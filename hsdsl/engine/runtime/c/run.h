@@ -208,6 +208,7 @@ typedef struct {
   hs_time pause; /* see hs.c: when to pause, and whether to do so behind a transition */
   int after_jump;
   int64_t jumps_before;
+  int parks, bare; /* whether steps are made in lanes, and rows have no pieces: see lanes.c */
 } hs_run;
 
 /* All that a paused run needs to go on: plain data. `data` has the numbers that routines were bound to; there are

@@ -2,38 +2,6 @@
    tell tables and series apart, at most. Sums of a Butcher tableau go left to right, as in the functions that
    hsdsl/engine/integrators/stepper.py writes out. */
 
-#if !defined(HS_FLOAT32)
-/* 2**k, where that is a normal number. */
-static double power_of_two(int k) {
-  const uint64_t bits = (uint64_t)(k + 1023) << 52;
-  double power;
-  memcpy(&power, &bits, sizeof power);
-  return power;
-}
-#endif
-
-/* exponent / m, rounded down, of exponents of numbers; this division need not wait for the exponent. */
-static int rounded_down(int exponent, int m) {
-  const int64_t inverse = (1 << 30) / m + 1;
-  return (int)(((exponent + 2048 * m) * inverse) >> 30) - 2048;
-}
-
-/* x**(-1/m); of x 2**(k m) it is exactly 2**-k times as much. */
-static hs_real root(hs_real x, int m) {
-#if !defined(HS_FLOAT32)
-  if (x >= 0x1p-900 && x <= 0x1p900) { /* frexp and ldexp cost as much as pow */
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    const int shift = rounded_down((int)(bits >> 52) - 1022, m);
-    return pow(x * power_of_two(-shift * m), -1.0 / m) * power_of_two(-shift);
-  }
-#endif
-  int exponent;
-  const hs_real fraction = frexp(x, &exponent);
-  const int shift = rounded_down(exponent, m);
-  return ldexp(pow(ldexp(fraction, exponent - shift * m), (hs_real)-1 / m), -shift);
-}
-
 HS_INLINE hs_real weighted_row(const hs_row *row, hs_real *const *k, int state) {
   if (!row->terms) return 0.0;
   hs_real total = row->weight[0] * k[row->stage[0]][state];
@@ -186,15 +154,6 @@ static hs_real ratio_closer(hs_run *run, hs_real h, hs_real ratio) {
 HS_INLINE hs_real error_ratio(hs_run *run, hs_real h) {
   const hs_real ratio = ratio_with(run, h, error_scales(run));
   return !(ratio > 1) ? ratio : ratio_closer(run, h, ratio);
-}
-
-#define ALMOST (1 - 0x1p-30)
-
-/* End of a step of length h from t, which is stretched to the limit where it nearly gets there. */
-static hs_time end_of_step(hs_time t, hs_real *h, hs_time limit) {
-  if (*h < (limit - t) * ALMOST) return t + *h;
-  *h = limit - t;
-  return limit;
 }
 
 /* Cut a step to what the surfaces of the mode allow. */

@@ -32,11 +32,6 @@ static int taylor_step(hs_run *run, hs_time t, hs_real h) {
   return 0;
 }
 
-static void fill_powers(hs_real *powers, int order, hs_real h) {
-  hs_real power = h;
-  for (int m = 1; m <= order; m++, power = power * h) powers[m] = power;
-}
-
 HS_INLINE void taylor_piece(const hs_run *run, const int n, hs_real h, hs_polynomial *piece) {
   const int order = run->method->order, w = run->width;
   piece->degree = order;
@@ -50,11 +45,6 @@ HS_INLINE void taylor_piece(const hs_run *run, const int n, hs_real h, hs_polyno
   }
 }
 
-/* How badly the polynomial solves the equation at its end: (h X' - h f) / (order + 1), of h X' in run->error. */
-HS_INLINE void left_of(hs_run *run, const int n, hs_real h) {
-  for (int s = 0; s < n; s++) run->error[s] = (run->error[s] - h * run->end[s]) / (run->method->order + 1);
-}
-
 HS_INLINE void taylor_error(hs_run *run, const int n, hs_real h) {
   const int order = run->method->order;
   hs_real powers[HS_MOST_ORDER + 1];
@@ -65,43 +55,5 @@ HS_INLINE void taylor_error(hs_run *run, const int n, hs_real h) {
     for (int m = order - 1; m > 0; m--) moved = m * (c[m] * powers[m]) + moved;
     run->error[s] = moved;
   }
-  left_of(run, n, h);
-}
-
-/* What is done for each of the states s to s + 1, or s + 3, the last one again where there are fewer. */
-#define OF_TWO(what) what(0) what(1)
-#define OF_FOUR(what) OF_TWO(what) what(2) what(3)
-#define BEGIN(i)                                       \
-  const int s##i = s + i < n ? s + i : n - 1;          \
-  const hs_real *const line##i = series_of(run, s##i); \
-  hs_real z##i = line##i[order] * powers[order], moved##i = order * z##i;
-#define KEEP_LAST(i) c[s##i] = z##i;
-#define ADD(i)                                       \
-  const hs_real part##i = line##i[m] * powers[m];    \
-  c[s##i] = part##i;                                 \
-  z##i = part##i + z##i;                             \
-  moved##i = factor * part##i + moved##i;
-#define END(i) run->z[s##i] = run->x[s##i] + z##i, run->error[s##i] = moved##i;
-
-#define SPAN_OF(each)                                  \
-  {                                                    \
-    hs_real *c = piece->c + (order - 1) * w, factor = order; \
-    each(BEGIN) each(KEEP_LAST)                        \
-    for (int m = order - 1; m > 0; m--) {              \
-      c -= w, factor -= 1;                             \
-      each(ADD)                                        \
-    }                                                  \
-    each(END)                                          \
-  }
-
-/* The same step, of coefficients that are known: its polynomial to `piece`, its end to run->z, and h X' there to
-   run->error. Up to four states go together, since the sums of one wait for each other. */
-HS_INLINE void taylor_span(hs_run *run, const int n, hs_real h, hs_polynomial *piece) {
-  const int order = run->method->order, w = run->width;
-  hs_real powers[HS_MOST_ORDER + 1];
-  fill_powers(powers, order, h);
-  piece->degree = order;
-  int s = 0;
-  for (; s + 2 < n; s += 4) SPAN_OF(OF_FOUR)
-  if (s < n) SPAN_OF(OF_TWO)
+  left_of(run->error, run->end, n, order, h);
 }

@@ -1,0 +1,149 @@
+/* Numbers of several runs as one vector. What is included behind this file means such vectors by `hs_real`. Each lane has
+   the bits that a number has: the same operations, and functions of the C library called lane by lane. */
+
+#ifndef HS_LANE_H
+#define HS_LANE_H
+
+#undef HS_COLUMNS
+#include "hs_math.h"
+#include "hs_lanes.h"
+#include "root.h"
+
+#if defined(__AVX512F__)
+#define HS_WIDTH 8
+#else
+#define HS_WIDTH 4
+#endif
+#if defined(__AVX__)
+#include <immintrin.h>
+#endif
+
+typedef double hs_wide __attribute__((vector_size(8 * HS_WIDTH)));
+typedef __typeof__((hs_wide){0} == (hs_wide){0}) hs_mask;
+
+HS_INLINE hs_wide wide_all(double x) {
+  hs_wide all;
+  for (int i = 0; i < HS_WIDTH; i++) all[i] = x;
+  return all;
+}
+
+/* A bit for each lane. */
+HS_INLINE uint32_t bits_of(hs_mask mask) {
+#if defined(__AVX512DQ__)
+  return _mm512_movepi64_mask((__m512i)mask);
+#elif defined(__AVX__)
+  return (uint32_t)_mm256_movemask_pd((__m256d)mask);
+#else
+  uint32_t bits = 0;
+  for (int i = 0; i < HS_WIDTH; i++) bits |= (uint32_t)(mask[i] & 1) << i;
+  return bits;
+#endif
+}
+
+HS_INLINE int hs_any(hs_mask mask) { return bits_of(mask) != 0; }
+
+HS_INLINE hs_wide hs_choose(hs_mask mask, hs_wide yes, hs_wide no) {
+  return (hs_wide)((mask & (hs_mask)yes) | (~mask & (hs_mask)no));
+}
+
+HS_INLINE hs_wide wide_fabs(hs_wide x) { return (hs_wide)((hs_mask)x & ~(hs_mask)wide_all(-0.0)); }
+HS_INLINE hs_wide wide_min(hs_wide a, hs_wide b) { return hs_choose(b < a, b, a); }
+HS_INLINE hs_wide wide_max(hs_wide a, hs_wide b) { return hs_choose(b > a, b, a); }
+
+HS_INLINE hs_wide wide_smaller(hs_wide least, hs_wide h) {
+  return hs_choose(h != h, least, hs_choose(least != least, h, wide_min(h, least)));
+}
+
+HS_INLINE hs_wide wide_root(hs_wide x, int m) {
+  hs_wide found = x;
+  for (int i = 0; i < HS_WIDTH; i++) found[i] = root(x[i], m);
+  return found;
+}
+
+/* from_zero() in some lanes; in the others there is none. */
+static hs_wide wide_from_zero(hs_mask small, const hs_wide *c, int order, double tolerance) {
+  hs_wide found = wide_all(NAN);
+  for (int i = 0; i < HS_WIDTH; i++)
+    if (small[i]) found[i] = from_zero((const double *)c + i, HS_WIDTH, order, tolerance);
+  return found;
+}
+
+HS_INLINE hs_wide wide_div(hs_wide a, hs_wide b, int *bad) {
+  *bad |= hs_any(b == 0.0);
+  return a / b;
+}
+
+HS_INLINE hs_wide wide_abs(hs_wide x, int *bad) { return (void)bad, wide_fabs(x); }
+
+#define OF_ONE(name)                                                        \
+  static inline hs_wide wide_##name(hs_wide x, int *bad) {                  \
+    hs_wide found = x;                                                      \
+    for (int i = 0; i < HS_WIDTH; i++) found[i] = hs_##name(x[i], bad);     \
+    return found;                                                           \
+  }
+#define OF_TWO(name)                                                            \
+  static inline hs_wide wide_##name(hs_wide x, hs_wide y, int *bad) {           \
+    hs_wide found = x;                                                          \
+    for (int i = 0; i < HS_WIDTH; i++) found[i] = hs_##name(x[i], y[i], bad);   \
+    return found;                                                               \
+  }
+OF_ONE(sin) OF_ONE(cos) OF_ONE(tan) OF_ONE(asin) OF_ONE(acos) OF_ONE(atan)
+OF_ONE(sinh) OF_ONE(cosh) OF_ONE(tanh) OF_ONE(asinh) OF_ONE(acosh) OF_ONE(atanh)
+OF_ONE(exp) OF_ONE(log) OF_ONE(floor) OF_ONE(sign) OF_ONE(heaviside)
+OF_TWO(pow) OF_TWO(atan2)
+
+HS_INLINE hs_wide wide_sqrt(hs_wide x, int *bad) {
+  hs_wide found = x;
+  *bad |= hs_any(x < 0.0);
+  for (int i = 0; i < HS_WIDTH; i++) found[i] = sqrt(x[i]);
+  return found;
+}
+
+#define hs_real hs_wide
+#define hs_time hs_wide
+#undef HS_ALL
+#define HS_ALL(number) wide_all(number)
+#define fabs wide_fabs
+#define root wide_root
+#define smaller wide_smaller
+#define hs_min wide_min
+#define hs_max wide_max
+#define hs_div wide_div
+#define hs_abs wide_abs
+#define hs_sin wide_sin
+#define hs_cos wide_cos
+#define hs_tan wide_tan
+#define hs_asin wide_asin
+#define hs_acos wide_acos
+#define hs_atan wide_atan
+#define hs_sinh wide_sinh
+#define hs_cosh wide_cosh
+#define hs_tanh wide_tanh
+#define hs_asinh wide_asinh
+#define hs_acosh wide_acosh
+#define hs_atanh wide_atanh
+#define hs_exp wide_exp
+#define hs_log wide_log
+#define hs_floor wide_floor
+#define hs_sign wide_sign
+#define hs_heaviside wide_heaviside
+#define hs_pow wide_pow
+#define hs_atan2 wide_atan2
+#define hs_sqrt wide_sqrt
+
+#include "hs_series.h"
+#include "span.h"
+#include "primitives.h"
+#include "polynomials.c"
+
+/* The routines of a mode, for lanes. */
+typedef struct {
+  int dimension, surfaces;
+  int (*flow)(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
+  int (*values)(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
+  int (*series)(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines);
+  int (*surface_series)(const hs_real *p, int order, hs_real *lines);
+  const int *surface_line;
+} hs_lane_mode;
+
+#endif

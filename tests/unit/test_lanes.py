@@ -1,0 +1,125 @@
+"""Ensembles whose runs step many at once: every one has the bits of its single run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from conformance.test_conformance import CASES
+from engines import needs_compiler
+from shipped import MODELS
+
+import hsdsl
+from hsdsl.engine.backends.c.lanes import lane_source
+from hsdsl.engine.runtime.library import vectors
+from hsdsl.engine.simulate import ensemble
+from hsdsl.engine.simulate.ensemble import BY_INSTANCE, CompiledEnsemble, Kept, ThreadWorkspace
+
+pytestmark = [needs_compiler, pytest.mark.skipif(vectors() is None, reason="no vectors are known of this processor")]
+COUNT = 20  # instances: the lanes are filled again, and at the end some are empty
+BY: dict[str, Any] = {"scheme": "located", "method": "taylor", "threads": 1}
+TEXT = """
+hsdsl: 1
+modes:
+  a: {flow: {x: y, y: "FLOW"}, transitions: [{when: x >= 1, to: a, reset: {x: -1}}]}
+initial: {mode: a, x: 0, y: 1}
+experiment: {until: 9}
+"""
+
+
+class Together:
+    """Runs ensembles with lanes and without, and compares what is kept of them."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.teams: list[Any] = []
+        self.kept: list[Kept] = []
+        self.lanes = False
+        look, join, told = CompiledEnsemble.look_for_lanes, ThreadWorkspace.join, Kept.told
+        monkeypatch.setattr(ensemble, "FEWEST_IN_LANES", 1)
+        monkeypatch.setattr(CompiledEnsemble, "look_for_lanes", lambda own, compiles: self.lanes and look(own, True))
+        monkeypatch.setattr(ThreadWorkspace, "join", lambda own, *given: (join(own, *given), self.teams.append(own))[0])
+        monkeypatch.setattr(Kept, "told", lambda own: (self.kept.append(own), told(own))[1])
+
+    def compare(self, model: hsdsl.Model, **call: Any) -> hsdsl.Ensemble:
+        """The ensemble, of which every number that is kept has the same bits with lanes and without."""
+        self.kept.clear()
+        for self.lanes in (False, True):
+            found = model.ensemble(**BY | {"transition_times": 30} | call)
+        alone, together = self.kept
+        for name in BY_INSTANCE:
+            assert getattr(alone, name).tobytes() == getattr(together, name).tobytes(), name
+        return found
+
+    @property
+    def stepped(self) -> int:
+        """Steps that lanes have made."""
+        return sum(team.team.stepped - team.team.failed for team in self.teams)
+
+
+@pytest.fixture
+def together(monkeypatch: pytest.MonkeyPatch) -> Together:
+    return Together(monkeypatch)
+
+
+def varied(model: hsdsl.Model, seed: int = 1) -> dict[str, Any]:
+    """Initial values near those of the model."""
+    rng = np.random.default_rng(seed)
+    first = model.simulate(until=0).values[0].tolist()
+    return {
+        name: value * rng.uniform(0.99, 1.01, COUNT) + rng.uniform(-1e-3, 1e-3, COUNT) * (k % 2)
+        for k, (name, value) in enumerate(zip(model.program.initial_states, first, strict=False))
+    }
+
+
+@pytest.mark.parametrize("samples", [None, 33])
+@pytest.mark.parametrize("tolerance", [1e-5, 1e-10])
+@pytest.mark.parametrize("name", ["oscillator-with-stop-1", "oscillator-with-stop-2", "pronking-runner", "thermostat"])
+def test_models(together: Together, name: str, tolerance: float, samples: int | None) -> None:
+    model = hsdsl.load(MODELS / f"{name}.yaml")
+    until = {"until": 25} if name.startswith("oscillator") else {}
+    together.compare(model, initial=varied(model), samples=samples, tolerance=tolerance, **until)
+    assert together.stepped > 100
+
+
+def test_parameters_limits_and_ends(together: Together) -> None:
+    rng = np.random.default_rng(2)
+    model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
+    given = {"parameters": {"c": rng.uniform(0.3, 0.95, COUNT)}, "until": 30}
+    assert set(together.compare(model, **given, max_transitions=7).stop) == {"transition_limit"}
+    assert set(together.compare(model, **given, threads=2).stop) == {"until"}
+    assert set(together.compare(model, **given, scale={"x": 100}).stop) == {"until"}
+
+
+def test_fixed_steps(together: Together) -> None:
+    model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
+    together.compare(model, initial=varied(model), until=12, step=0.05)
+    assert together.stepped > 1000
+
+
+@pytest.mark.parametrize(
+    "flow", ["-x", "cos(3*t) - x**3", "sqrt(1 + x*x) - 2*exp(y/4)", "(1 + x*x)**(1/3) - atan(y) - x"]
+)
+def test_flows(together: Together, flow: str) -> None:
+    model = hsdsl.loads(TEXT.replace("FLOW", flow))
+    together.compare(model, initial={"x": np.linspace(-0.9, 0.9, COUNT), "y": np.linspace(-2, 2, COUNT)}, samples=9)
+    assert together.stepped > 100
+
+
+def test_lanes_without_a_value_are_left_to_single_runs(together: Together) -> None:
+    model = hsdsl.loads(TEXT.replace("FLOW", "log(1/2 - x)"))
+    found = together.compare(model, initial={"x": np.linspace(-0.9, 0.9, COUNT), "y": 0.1})
+    assert len(set(found.stop)) > 1
+
+
+def test_a_program_has_lanes_where_a_flow_is_smooth() -> None:
+    assert lane_source(hsdsl.loads(TEXT.replace("FLOW", "max(x, y)")).program) is None
+    assert "hs_lane_mode" in (lane_source(hsdsl.loads(TEXT.replace("FLOW", "-x")).program) or "")
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("name", CASES)
+def test_every_case(together: Together, name: str) -> None:
+    model = hsdsl.load(CASES[name])
+    together.compare(model, initial=varied(model), samples=17)
+    together.compare(model, initial=varied(model, 2), tolerance=1e-6)
