@@ -15,7 +15,7 @@ from functools import cache, cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.base.errors import UsageError
-from hsdsl.base.limits import Limits, applied
+from hsdsl.base.limits import Limits, applied, uncollected
 from hsdsl.base.names import did_you_mean
 from hsdsl.base.numbers.arithmetic import TIE, Arithmetic, Number
 from hsdsl.base.numbers.roundoff import following, moved
@@ -61,6 +61,7 @@ _RUNNING = (
 )
 
 
+@uncollected()
 def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes | None = None) -> Pipeline:
     """Read a model file once, or take the bytes given for it, and find its program in the cache or elaborate them."""
     began = time.perf_counter()
@@ -137,7 +138,7 @@ class Pipeline:
         """Apply the model's limits, and count the time."""
         began = time.perf_counter()
         try:
-            with applied(None if self._files is None else self._files.limits):
+            with applied(None if self._files is None else self._files.limits), uncollected():
                 yield
         finally:
             self.seconds["compile"] += time.perf_counter() - began

@@ -97,7 +97,7 @@ def by_constants(expr: Any, constants: frozenset[Any]) -> Any:
             against = -(-against).args[0]
         return below(against, *rest)
 
-    return expr.replace(below, number) if isinstance(expr, sp.Basic) and expr.has(below) else expr
+    return expr.replace(below, number) if isinstance(expr, sp.Basic) and expr.has(below) and expr.has(sign) else expr
 
 
 def truth_of(condition: Any) -> Any:

@@ -17,6 +17,7 @@ from hsdsl.base.names import SINCE, WORDS, did_you_mean, shown
 from hsdsl.language.expression.parse import Call, ExpressionError, Name, Number, Product, Tree, walk
 
 TIME = sp.Symbol("t", real=True)
+_MISSING: Any = object()
 RESERVED = (TIME.name, *CONSTANTS, *FUNCTIONS, *WORDS)
 
 
@@ -118,9 +119,8 @@ class Scope:
 
     def broken(self, tree: Tree) -> bool:
         """Whether a name in it has a definition that is reported already."""
-        missing = object()
         called = (self.values.get(name) for name in functions_called(tree))
-        return any(isinstance(n, Name) and self.values.get(n.name, missing) is None for n in walk(tree)) or any(
+        return any(isinstance(n, Name) and self.values.get(n.name, _MISSING) is None for n in walk(tree)) or any(
             isinstance(function, Function) and function.tree is None for function in called
         )
 
@@ -128,14 +128,14 @@ class Scope:
         """Why a name cannot be used; one that is ``measured`` is the factor behind a number."""
         if name in CONSTANTS:
             return None
-        if name in FUNCTIONS or isinstance(self.values.get(name), Function):
+        value = self.values.get(name, _MISSING)  # of parts it is worked out at each look
+        if name in FUNCTIONS or isinstance(value, Function):
             return Refusal("HS112", f"`{name}` is a function and needs its arguments", f"write {name}(...)")
-        if name not in self.values:
+        if value is _MISSING:
             from hsdsl.language.diagnosis.expressions import unknown_name
 
             known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
             return Refusal("HS111", f"nothing here is called '{shown(name)}'", unknown_name(name, known, measured))
-        value = self.values[name]
         if not isinstance(value, Value) or self._reachable(value):
             return value if isinstance(value, Refusal) else None
         assert self.states is not None

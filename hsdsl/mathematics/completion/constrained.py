@@ -11,7 +11,7 @@ Q f - Q u (w Q f)/(w Q u). This is exact in symbols, so what is at rest has the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -47,11 +47,11 @@ class ConstrainedMode(NamedTuple):
 
 def constrained_modes(system: HybridSystem) -> list[ConstrainedMode | None]:
     """The motions along guards of each mode of a system."""
-    numbers, moving = numbered(system.parts), slopes_of_inputs(system)
+    numbers, moving = frozenset(numbered(system.parts)), slopes_of_inputs(system)
     return [constrained_mode(mode, numbers, moving) for mode in system.modes]
 
 
-def constrained_mode(mode: Mode, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES) -> ConstrainedMode | None:
+def constrained_mode(mode: Mode, numbers: Collection[str] = (), moving: Slopes = NO_SLOPES) -> ConstrainedMode | None:
     """The motions along guards of a mode, None without any; for ``numbers`` and ``moving`` see `contact`."""
     contacts = [found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers, moving))]
     if not contacts:

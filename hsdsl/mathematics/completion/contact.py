@@ -11,7 +11,7 @@ the rate of the guard is positive (M2), which decides that of what is zero at re
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import takewhile
 
@@ -92,7 +92,7 @@ class Contact:
         return replace(self.base, flow=tuple(flow), flow_texts=tuple(texts), edges=(*edges, *self.further))
 
 
-def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO_SLOPES) -> Contact | None:
+def contact(mode: Mode, k: int, numbers: Collection[str] = (), moving: Slopes = NO_SLOPES) -> Contact | None:
     """The motion along the guard of edge k of a mode; None where there is none, or where it is not unique.
 
     ``numbers`` are states that are modes of parts, ``moving`` has the slopes of inputs.
@@ -101,9 +101,9 @@ def contact(mode: Mode, k: int, numbers: Sequence[str] = (), moving: Slopes = NO
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived or not fires(edge):
         return None
     kept = [i for i, name in enumerate(mode.states) if not without_memory([name])] if edge.of_event else []
-    near = Nearby(mode, edge, mode_of_part(edge, numbers), kept, moving=moving)
-    if any(mode.states[i] in numbers for i in near.changed):
+    if any(mode.states[i] in numbers for i in edge.reset.changes if i not in kept):
         return None
+    near = Nearby(mode, edge, mode_of_part(edge, numbers), kept, moving=moving)
     near = branched(near) if near.changed and near.is_small() else near
     if near is None:
         return None

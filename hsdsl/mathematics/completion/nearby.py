@@ -16,7 +16,6 @@ from typing import Any
 
 import sympy as sp
 
-from hsdsl.base.functions import below
 from hsdsl.base.numbers.arithmetic import Number, multiprecision
 from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.scope import slope_symbol, symbol
@@ -114,15 +113,11 @@ def size(expressions: Iterable[sp.Expr]) -> int:
     return sum(map(nodes, map(sp.sympify, expressions)))
 
 
-def mode_of_part(edge: Edge, numbers: Sequence[str]) -> dict[sp.Symbol, sp.Integer]:
-    """The number of the mode that an edge of a part leaves; nothing where its part has one mode."""
-    residual = edge.surface.residual
-    for name in numbers:
-        number = symbol(name)
-        if edge.name.startswith(f"{name}.") and residual.has(number):
-            most = max(int(node.args[1] + 1) for node in residual.atoms(below) if node.args[0] == number)
-            return next({number: k} for k in map(sp.Integer, range(1, most + 1)) if residual.subs(number, k) != -1)
-    return {}
+def mode_of_part(edge: Edge, numbers: Collection[str]) -> dict[sp.Symbol, sp.Integer]:
+    """The number of the mode that an edge of a part leaves, where its surface depends on that."""
+    name, k = edge.part or ("", 0)
+    known = name in numbers and symbol(name) in edge.surface.residual.free_symbols
+    return {symbol(name): sp.Integer(k)} if known else {}
 
 
 def cancelled(value: sp.Expr) -> sp.Expr:
