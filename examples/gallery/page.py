@@ -59,6 +59,20 @@ ten-thousandth of the run, and at most {most:,} transitions; fixed steps are est
 engine, which agrees with the compiled one to the last bit, runs `paoli-schatzman`, and three methods in some scenes.
 A dash stands for a tool that has not been run.
 
+## Which event other tools see
+
+`findings/events-of-peers.sh` installs these versions and shows each of these on x' = 1:
+
+- diffrax 0.7.2: of two guards crossed in one step, the first in its list ends the step, not the earlier one. This
+  decides no row: where diffrax is wrong here, no other guard was crossed before the one that ended an arc.
+- CasADi 3.8.2: an event is where `zero` falls through zero, and one that is zero at the start is none. This decides
+  [event-at-start](#event-at-start): with the ball 1e-12 higher, CasADi is right there.
+- CasADi 3.8.2: `rk` loses an event on an output time. This decides no row: the table has `rosenbrock`, which does not.
+- heyoka 7.13.2: an event with a direction passes a triple root, where the derivative is zero. This decides no row: the
+  guards here have simple and double roots.
+- scikit-SUNDAE 1.2.0: a solver keeps counting the events of earlier calls. This decides no row: each call here ends at
+  its first event.
+
 """
 
 
