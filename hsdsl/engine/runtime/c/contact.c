@@ -348,7 +348,9 @@ static int behind_end(hs_run *run, int j, hs_time *t) {
 }
 
 /* Transition `back` before the last one. */
-static const hs_made *made_before(const hs_run *run, int back) { return &run->made[(run->jump - 1 - back) % FREE]; }
+static const hs_made *made_before(const hs_run *run, int back) {
+  return &run->made[(uint64_t)(run->jump - 1 - back) % FREE];
+}
 
 /* The last few flights between transitions of the last edge that was reached, the last one first; 0 where they are not
    as many. Where they are `of_flow`, time in strips does not count. */
@@ -391,7 +393,7 @@ static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *r
     flights[i] = made_before(run, i * n)->time - made_before(run, (i + 1) * n)->time;
   if (!n && !last_flights(run, of_flow, flights)) return 0;
   *flight = flights[0], *ratio = 0.0;
-  for (int i = 0; i < LEAST_FLIGHTS; i++) {
+  for (int i = 0; i < LEAST_FLIGHTS && *ratio < 1; i++) {
     if (!(flights[i] > 0)) return 0;
     if (i) *ratio = hs_max(*ratio, flights[i - 1] / flights[i]);
   }
