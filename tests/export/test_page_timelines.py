@@ -14,8 +14,8 @@ from hsdsl.engine.runtime.library import RUNTIME
 from hsdsl.engine.simulate import Problem
 from hsdsl.export import source_of
 from hsdsl.export.c.sources import c_sources
+from hsdsl.export.web import PARTS
 from hsdsl.export.web.model import page_numbers
-from hsdsl.export.web.wasm import PARTS
 
 MAIN = r"""
 #include <stdio.h>

@@ -27,9 +27,8 @@ import hsdsl
 from hsdsl.analysis.report import as_json
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import without_memory
-from hsdsl.export import files_of, source_of
+from hsdsl.export import files_of, source_of, web
 from hsdsl.export.web import model as page
-from hsdsl.export.web import wasm
 from hsdsl.export.web.model import model_of
 from hsdsl.interface.cli.verbs import obey
 from hsdsl.interface.model import Model
@@ -408,7 +407,7 @@ class TestText:
 
     @pytest.mark.slow
     def test_the_same_model_gives_the_same_bytes(self, monkeypatch):
-        monkeypatch.setattr(wasm, "find", lambda kind, key: None)  # compiled anew
+        monkeypatch.setattr(web, "find", lambda kind, key: None)  # compiled anew
         assert page_of(STAND) == page_of(STAND)
 
     def test_texts_of_a_model_are_no_markup(self):
@@ -437,7 +436,7 @@ class _Markup(HTMLParser):
 
 
 def test_without_its_compiler_it_is_refused_before_anything_is_written(monkeypatch, tmp_path, capsys):
-    monkeypatch.setattr(wasm, "zig_compiler", lambda: None)
+    monkeypatch.setattr(web, "zig_compiler", lambda: None)
     model = str(MODELS / "thermostat.yaml")
     assert obey(["export", model, "--to", "web", "--out", str(tmp_path / "out")]) == 2
     printed = capsys.readouterr().err

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import ast
 from bisect import bisect_right
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 from hsdsl.engine.backends.c.source import width
+from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text
 from hsdsl.engine.integrators import ButcherTableau
 from hsdsl.engine.integrators.tableau import table_numbers
 from hsdsl.engine.simulate import Problem
-from hsdsl.export.jax.language import function, literal
 from hsdsl.export.source import Source, data_names, definitions, derived, followed, mode_definitions, parameters_in
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 
@@ -244,3 +244,33 @@ def _samples(source: Source, i: int) -> list[str]:
 
 def _row(items: list[str]) -> str:
     return f"[{', '.join(items)}]"
+
+
+def literal(value: float) -> str:
+    """Write a number without loss."""
+    return number_text(value, "NAN", "INF")
+
+
+def _results(values: Sequence[str]) -> list[str]:
+    return [f"return ({''.join(f'{value}, ' for value in values).rstrip()})"]
+
+
+JAX = Language(
+    literal=literal,
+    assign="{name} = {value}",
+    results=_results,
+    divide="f_div({left}, {right})",
+    choose="jnp.where({test}, {body}, {other})",
+    call="f_{name}({arguments})",
+    fold="f_{name}({left}, {right})",
+    truths=("jnp.asarray(False)", "jnp.asarray(True)"),
+    operators={**C_OPERATORS, ast.And: "&", ast.Or: "|", ast.Not: "~"},
+)
+
+
+def function(name: str, definition: ast.FunctionDef, data: Mapping[str, str], signature: str) -> str:
+    """One routine as a function of this name; states are ``x[0], ...``, sizes ``s[0], ...``."""
+    names = (argument.arg for argument in definition.args.args)
+    states = {name: f"{name[0]}[{name[1:]}]" for name in names if name[0] in "xs"}
+    body = "\n".join(f"    {line}" for line in JAX.body(definition, {"t": "t", **data, **states}))
+    return f"def {name}({signature}):\n{body}\n"

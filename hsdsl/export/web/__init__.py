@@ -1,22 +1,31 @@
-"""The model as one HTML page that runs it: sliders, live plots, transitions, scene; without server or network."""
+"""The model as one HTML page that runs it: sliders, live plots, transitions, scene; without server or network.
+
+The model with its runtime is a WebAssembly module without imports but a clock, for `parts/worker.js`.
+"""
 
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from hsdsl.analysis.plot.parts import filled, inert, scripts, shared
+from hsdsl.base import limits
+from hsdsl.base.cache import find, keep, key_of
+from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible
 from hsdsl.engine.preparation.visible import visible_run
-from hsdsl.engine.runtime.compiler import NoCompiler
+from hsdsl.engine.runtime.compiler import Compiler, NoCompiler, zig_compiler
 from hsdsl.engine.runtime.kernel import CompiledModel
+from hsdsl.engine.runtime.process import workshop
 from hsdsl.engine.simulate import prepare
+from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
 from hsdsl.export.source import Source
-from hsdsl.export.web.model import model_of
-from hsdsl.export.web.wasm import PARTS, wasm_module
+from hsdsl.export.web.model import model_of, page_numbers
 
 SCRIPTS = ("controls.js", "scene.js", "facts.js", "parts.js", "page.js")
 
@@ -66,3 +75,54 @@ def page(model: dict[str, Any], module: bytes) -> str:
 
 def _part(name: str) -> str:
     return (Path(PARTS) / name).read_text(encoding="utf-8")
+
+
+PARTS = Path(__file__).parent / "parts"
+FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-Wl,--strip-all", *EXACT_FLAGS)
+COMPILED = ("model.c", "problem.c", "page.c", "runtime/hs.c")
+OWN = ("page.c", "page.h", "settings.c", "timeline.c", "samples.c")
+KIND = "pages"
+FIRST_TIME = 10  # times the limit: before its first module the compiler makes its C library
+
+
+def wasm_module(source: Source) -> bytes:
+    """Compile a model; the same model gives the same bytes with the same compiler. What was compiled before is kept.
+
+    Raises UsageError: there is no compiler for WebAssembly, it fails, or the runtime has no such scheme.
+    """
+    sources = c_sources(source)  # what no C program can keep is refused first
+    compiler = zig_compiler()
+    if compiler is None:
+        raise UsageError("a page needs a compiler for WebAssembly: the package ziglang", "pip install 'hsdsl[web]'")
+    sources |= {name: (PARTS / name).read_bytes() for name in OWN}
+    sources["page_numbers.h"] = page_numbers(source.problem).encode()
+    key = key_of(compiler.identity, *FLAGS, *(part for item in sources.items() for part in item))
+    if made := find(KIND, key):
+        return made.read_bytes()
+    try:
+        module = _compiled(compiler, sources)
+    except NoCompiler as error:
+        raise UsageError(f"the page cannot be compiled: {error}") from None
+    except OSError as error:
+        raise UsageError(f"there is no room to compile the page: {error.strerror or error}") from None
+    with suppress(OSError):  # then it is compiled again
+        keep(KIND, key, ".wasm", lambda path: _write(path, module))
+    return module
+
+
+def _write(path: Path, module: bytes) -> None:
+    path.write_bytes(module)
+
+
+def _compiled(compiler: Compiler, sources: Mapping[str, bytes]) -> bytes:
+    with workshop() as folder:
+        for name, content in sources.items():
+            path = folder / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(content)
+        module = folder / "page.wasm"
+        includes = [folder, folder / "runtime"]
+        given = limits.current()
+        with limits.applied(replace(given, compile=given.compile * FIRST_TIME)):
+            compiler.build([folder / name for name in COMPILED], includes, module, "-O2", FLAGS)
+        return module.read_bytes()
