@@ -281,7 +281,7 @@ COMP = """<sbml xmlns="http://www.sbml.org/sbml/level3/version1/core" level="3" 
 def test_submodels_are_written_out_by_libsbml() -> None:
     text = COMP.format(rate("x", "2*x"))
     if find_spec("libsbml") is None:
-        with pytest.raises(hsdsl.ModelError, match=r"the package 'comp' \(pip install python-libsbml"):
+        with pytest.raises(hsdsl.ModelError, match=r"the package 'comp' \(pip install 'hsdsl\[sbml\]'"):
             of(text)
         return
     final = hsdsl.loads(of(text, "1")).simulate(engine="python").final.state

@@ -11,7 +11,7 @@ from hsdsl.interface.imports.sbml.document import NotExpressible
 from hsdsl.language.source.xml import Element, read_xml
 
 COMP = "comp:required"
-HINT = "pip install python-libsbml, which writes its submodels out"
+HINT = "pip install 'hsdsl[sbml]': libSBML writes its submodels out"
 
 
 def flattened(root: Element, deepest: int) -> Element:
