@@ -226,6 +226,7 @@ def test_random_events_against_a_grid():
         assert times(run, "e") == pytest.approx(rises, abs=3e-5)
 
 
+IDIOM = ("up", "divide", "then", "down", "join")
 MADE = {  # flow, transitions, initial values, and the transitions that are made until t = 2
     # one of two opposite comparisons holds everywhere, and both nowhere
     "always": ("x: 1", "{name: e, event: x <= 1/2 or x > 1/2, reset: {x: 0}}", "x: 0", []),
@@ -263,6 +264,19 @@ MADE = {  # flow, transitions, initial values, and the transitions that are made
         "x: 1, n: 0",
         [("low", 1.0)],
     ),
+    # what one crossing gets ready goes at the opposite one: where x = sin(3 t) falls through 1/2, rises through -1/2
+    **{
+        f"gets ready: {over} {under} {low} {high}": (
+            "x: 3*y, y: -3*x, f: 0, g: 0, h: 0",
+            f"{{name: up, event: x {over} 1/2, reset: {{f: 1}}}}, {{name: down, event: x {low} -1/2, reset: {{g: 1}}}},"
+            f"{{name: divide, event: x {under} 1/2 and f >= 1, reset: {{f: 0, h: 1}}}},"
+            f"{{name: then, event: x {under} 1/2 and h >= 1, reset: {{h: 0}}}},"
+            f"{{name: join, event: x {high} -1/2 and g >= 1, reset: {{g: 0}}}}",
+            "x: 0, y: 1, f: 0, g: 0, h: 0",
+            [(name, k * math.pi / 18) for name, k in zip(IDIOM, (1, 5, 5, 7, 11), strict=True)],
+        )
+        for over, under, low, high in ((">", "<=", "<", ">="), (">=", "<", "<=", ">"), (">", "<", "<", ">"))
+    },
 }
 
 

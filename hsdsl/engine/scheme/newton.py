@@ -81,14 +81,18 @@ def enough_of(unit: Number, tolerance: Number, root: Number) -> Number:
 
 @inline
 def scaled(steps: Radau, of: Blocks, x: Vector) -> Number:
-    """The largest change relative to the scales; of a state that has been zero so far, to where it is now."""
+    """The largest change relative to the scales; of a state that has been zero so far, to where it is now.
+
+    A scale by the round-off of what made that zero, no more than the tolerance times where it is now, is none.
+    """
     size: Number = 0
     u, v, w = steps.z[0], steps.z[1], steps.z[2]
     for s in range(of.n):
         change, reach = steps.largest[s], steps.scales[s]
         if change > 0:
-            if not reach > 0:
-                reach = max(abs(x[s] + u[s]), abs(x[s] + v[s]), abs(x[s] + w[s]))
+            if not reach > 0 or (steps.lifted and x[s] == 0):
+                now = max(abs(x[s] + u[s]), abs(x[s] + v[s]), abs(x[s] + w[s]))
+                reach = reach if reach > steps.tolerance * now else now
             size = max(size, change / reach if reach > 0 else reach + 1)
     return size
 
