@@ -17,14 +17,16 @@ from time import process_time
 from typing import Any
 
 import hsdsl
+from hsdsl.base.limits import Limits
 
 MODEL = Path(__file__).parent.parent / "models" / "thermostat.yaml"
+LIMITS = Limits(memory=1 << 32)  # bytes that a run may keep
 SETTINGS: dict[str, Any] = {"until": 1e12, "method": "taylor", "tolerance": 1e-9, "engine": "c"}
 
 
 def measure(how: str, transitions: int, file: Path) -> None:
     """Print a line for one run of this process."""
-    model = hsdsl.load(MODEL)
+    model = hsdsl.load(MODEL, limits=LIMITS)
 
     def run(most: int) -> int:
         settings: dict[str, Any] = {**SETTINGS, "max_transitions": most}
