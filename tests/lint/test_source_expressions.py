@@ -8,9 +8,8 @@ from hsdsl.analysis.lint.source_expressions import Role, written
 from hsdsl.analysis.lint.units import Units
 from hsdsl.base.errors import Findings
 from hsdsl.language.schema import documents as schema
-from hsdsl.language.schema import fields
+from hsdsl.language.schema import fields, read
 from hsdsl.language.schema.fields import Document
-from hsdsl.language.schema.read import read
 from hsdsl.language.source import ABSENT, Scalar, compose, decode
 
 OF_EXPRESSIONS = (

@@ -45,8 +45,8 @@ from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
 from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, timebox
 from hsdsl.language.files import ModelFiles
+from hsdsl.language.schema import read
 from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, SystemDocument
-from hsdsl.language.schema.read import read
 from hsdsl.language.source import Node, Text, compose, decode
 from hsdsl.language.system import HybridSystem, switch_parameter
 
