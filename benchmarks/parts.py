@@ -1,12 +1,17 @@
-"""What a system of twenty legs costs against the runner with two: first load and compile, memory, time per event.
+"""What systems of many parts cost: rooms in a row, `count: n`, by n; twenty legs against the runner with two.
 
-python benchmarks/parts.py
+For each number of rooms: seconds to load and lower, seconds of the first run with its compiler, microseconds of a
+transition, all of processor time, and the memory of the whole. The more rooms, the shorter the run.
+
+    python benchmarks/parts.py                      the runner and the centipede
+    python benchmarks/parts.py 50 200 1000 5000     rooms
 """
 
 from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -34,6 +39,41 @@ print(json.dumps([first, best / len(run.transitions) * 1e6, memory, len(run.tran
 """
 
 
+UNTIL = 250.0  # over the number of rooms
+ROOMS = """
+import json, resource, sys, time
+import hsdsl
+from hsdsl.base.limits import Limits
+def spent():
+    return time.process_time() + resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+began = spent()
+model = hsdsl.load(sys.argv[1], limits=Limits(seconds=3600, compile=3600))
+model.program
+loaded = spent()
+until = float(sys.argv[2])
+run = model.simulate(until=until)
+first, each = spent(), []
+for _ in range(5):
+    start = spent()
+    model.simulate(until=until)
+    each.append((spent() - start) / len(run.transitions) * 1e6)
+memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+print(json.dumps([loaded - began, first - loaded, min(each), memory, len(run.transitions)]))
+"""
+
+
+def rooms(n: int, folder: str) -> list[float]:
+    """Seconds to load, seconds of the first run, microseconds of a transition, MiB and transitions of rooms.
+
+    What is compiled is kept in a folder.
+    """
+    path = Path(folder, f"{n}.yaml")
+    path.write_text(re.sub("count: .*", f"count: {n}", (MODELS / "parts" / "rooms.yaml").read_text()))
+    words = [sys.executable, "-c", ROOMS, str(path), repr(UNTIL / n)]
+    environment = {**os.environ, "XDG_CACHE_HOME": folder}
+    return json.loads(subprocess.run(words, env=environment, check=True, capture_output=True).stdout)
+
+
 def measured(path: str, initial: dict[str, float]) -> list[float]:
     """Seconds to the end of the first run with an empty cache, microseconds per event, MiB and events."""
     with tempfile.TemporaryDirectory() as folder:
@@ -43,6 +83,19 @@ def measured(path: str, initial: dict[str, float]) -> list[float]:
 
 
 def main() -> None:
+    """Print the rows of rooms that are asked for, or those of the runner."""
+    if len(sys.argv) == 1:
+        return legs()
+    print(f"{'rooms':>6} {'load':>10} {'first run':>11} {'transition':>13} {'memory':>11} {'transitions':>12}")
+    with tempfile.TemporaryDirectory() as folder:
+        rooms(3, folder)  # compiles the loop, which all models share
+        for n in map(int, sys.argv[1:]):
+            load, first, each, memory, count = rooms(n, folder)
+            print(f"{n:6} {load:8.2f} s {first:9.2f} s {each:10.1f} us {memory:7.0f} MiB {count:12.0f}", flush=True)
+    return None
+
+
+def legs() -> None:
     """Print medians of rounds in which the scenes take turns, and ratios to the flat runner."""
     rounds = [{name: measured(*scene) for name, scene in SCENES.items()} for _ in range(ROUNDS)]
     rows = {name: [median(r[name][k] for r in rounds) for k in range(4)] for name in SCENES}
