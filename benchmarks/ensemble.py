@@ -4,20 +4,29 @@ Timed on all cores, warm. Then each run's impacts are compared with those of the
 float64 from impact to impact: between two samples of 2e-3 it looks at every maximum that comes near the stop, so that a
 short visit is not missed. That takes minutes; `--checked` says how many of the runs are.
 
-    python benchmarks/ensemble.py [--instances 10000] [--checked 10000] [--tolerance 1e-10]
+With `--against hand,heyoka` one thread is first compared in turns with a program written by hand and with heyoka's
+batches of eight runs, by processor time; `alone` is one thread that steps one run at a time.
+
+    python benchmarks/ensemble.py [--instances 10000] [--checked 10000] [--tolerance 1e-10] [--against hand,heyoka]
 """
 
 from __future__ import annotations
 
 import argparse
+import ctypes
 import math
+import tempfile
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, process_time
+from typing import Any
 
 import numpy as np
+from engines import compiled
 
 import hsdsl
+from hsdsl.engine.simulate import ensemble
 
 FILE = Path(__file__).parent.parent / "models" / "oscillator-with-stop-1.yaml"
 A, W, STOP, START = 0.05, 2.5, 14.0, (11.36, 31.4)
@@ -26,6 +35,8 @@ UNTIL = 40 * math.pi
 GRID = np.arange(1, 4001) * 2e-3
 DECAY, COSINE, SINE = np.exp(-A * GRID), np.cos(WD * GRID), np.sin(WD * GRID)
 MOST = 200  # impacts of one run
+BATCH = 8
+Columns = dict[str, np.ndarray]
 Curve = Callable[[float], float]
 
 
@@ -85,18 +96,87 @@ def bisected(low: float, high: float, beyond: Callable[[float], bool]) -> float:
         low, high = (low, middle) if beyond(middle) else (middle, high)
 
 
+def by_hand(parameters: Columns, tolerance: float) -> Callable[[], None]:
+    """The program by hand, which has the model written into its loop."""
+    folder = tempfile.TemporaryDirectory()
+    library = compiled(Path(folder.name), "taylor_by_hand")
+    library.prepare()
+    double = ctypes.c_double
+
+    def run() -> None:
+        for c, amplitude in zip(parameters["c"], parameters["A"], strict=True):
+            model = A, c, amplitude, W, W, STOP, *START, 0.0, tolerance, UNTIL
+            library.taylor(*map(double, model), 0, None, None)
+        assert folder
+
+    return run
+
+
+def by_heyoka(parameters: Columns, tolerance: float) -> Callable[[], None]:
+    """Batches of eight runs, whose resets are callbacks."""
+    import heyoka as hy
+
+    x, v = hy.make_vars("x", "v")
+    c = np.zeros(BATCH)
+
+    def bounce(ta: Any, _: int, k: int) -> bool:
+        ta.state[1, k] *= -c[k]
+        return True
+
+    event = hy.t_event_batch(x - STOP, callback=bounce, direction=hy.event_direction.positive)
+    flow = [(x, v), (v, hy.par[0] * hy.cos(W * hy.time) - 2 * A * v - W * W * x)]
+    start, pars = np.zeros((2, BATCH)), np.zeros((1, BATCH))
+    ta = hy.taylor_adaptive_batch(flow, start, tol=tolerance, t_events=[event], pars=pars)
+
+    def run() -> None:
+        for k in range(0, len(parameters["c"]) // BATCH * BATCH, BATCH):
+            ta.set_time(0.0)
+            ta.state[:] = np.array(START)[:, None]
+            ta.pars[0], c[:] = parameters["A"][k : k + BATCH], parameters["c"][k : k + BATCH]
+            ta.reset_cooldowns()
+            ta.propagate_until(UNTIL)
+
+    return run
+
+
+def compare(tools: dict[str, Callable[[], Any]], instances: int, turns: int) -> None:
+    """Print the processor time of a run, the least and the median of some turns."""
+    spent: dict[str, list[float]] = {name: [] for name in tools}
+    for _ in range(turns):
+        for name, run in tools.items():
+            began = process_time()
+            run()
+            spent[name].append((process_time() - began) / instances * 1e6)
+    for name, times in spent.items():
+        print(f"{name:8} {min(times):8.1f} us a run, median {np.median(times):8.1f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--instances", type=int, default=10_000)
     parser.add_argument("--checked", type=int)
     parser.add_argument("--tolerance", type=float, default=1e-10)
-    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--repetitions", type=int, default=9)
+    parser.add_argument("--against", default="", help="hand, heyoka")
     options = parser.parse_args()
     rng = np.random.default_rng(20_260)
     parameters = {"c": rng.uniform(0.3, 0.95, options.instances), "A": rng.uniform(8, 30, options.instances)}
     settings = {"scheme": "located", "method": "taylor", "tolerance": options.tolerance, "until": UNTIL}
     model = varied()
     model.ensemble(parameters={name: values[:8] for name, values in parameters.items()}, **settings)
+    if options.against:
+        few = {name: values[: options.instances // BATCH * BATCH] for name, values in parameters.items()}
+
+        def alone() -> None:
+            least, ensemble.FEWEST_IN_LANES = ensemble.FEWEST_IN_LANES, options.instances + 1
+            model.ensemble(parameters=few, threads=1, **settings)
+            ensemble.FEWEST_IN_LANES = least
+
+        tools = {"hsdsl": partial(model.ensemble, parameters=few, threads=1, **settings), "alone": alone}
+        peers = {"hand": by_hand, "heyoka": by_heyoka}
+        tools |= {name: peers[name](few, options.tolerance) for name in options.against.split(",")}
+        tools["hsdsl"]()  # compiles its lanes, where that takes it long enough
+        compare(tools, len(few["c"]), options.repetitions)
     spent: list[float] = []
     for _ in range(options.repetitions):
         began = perf_counter()

@@ -243,10 +243,7 @@ def compiled(program: Program) -> ctypes.CDLL:
 
 
 LANES = "hs_the_lanes"
-VECTORS = {  # flags, by what a processor must have
-    ("avx512f", "avx512dq", "avx512vl"): ("-mavx512f", "-mavx512dq", "-mavx512vl", "-mprefer-vector-width=512"),
-    ("avx2",): ("-mavx2",),
-}
+VECTORS = "avx2"  # what a processor must have, and a flag
 
 
 def compiled_lanes(program: Program, compiles: bool) -> ctypes.CDLL | None:
@@ -270,10 +267,10 @@ def compiled_lanes(program: Program, compiles: bool) -> ctypes.CDLL | None:
 def vectors() -> tuple[str, ...] | None:
     """The flags for the vectors of this processor; None where it has none, or does not say."""
     try:
-        told = set(Path("/proc/cpuinfo").read_text().split("flags", 1)[-1].split("\n", 1)[0].split())
+        told = Path("/proc/cpuinfo").read_text().split("flags", 1)[-1].split("\n", 1)[0].split()
     except OSError:
         return None
-    return next((flags for needed, flags in VECTORS.items() if told.issuperset(needed)), None)
+    return (f"-m{VECTORS}",) if VECTORS in told else None
 
 
 def _content(program: Program) -> str:

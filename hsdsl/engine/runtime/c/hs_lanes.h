@@ -6,7 +6,7 @@
 
 #include "hs_simulate.h"
 
-#define HS_MOST_LANES 8
+#define HS_MOST_LANES 4
 
 typedef struct {
   int32_t mode;  /* that all runs are in */

@@ -1,5 +1,5 @@
-/* Numbers of several runs as one vector. What is included behind this file means such vectors by `hs_real`. Each lane has
-   the bits that a number has: the same operations, and functions of the C library called lane by lane. */
+/* Numbers of several runs as one vector. What is included behind this file means such vectors by `hs_real`. Each lane
+   has the bits that a number has: the same operations, and functions of the C library called lane by lane. */
 
 #ifndef HS_LANE_H
 #define HS_LANE_H
@@ -9,11 +9,7 @@
 #include "hs_lanes.h"
 #include "root.h"
 
-#if defined(__AVX512F__)
-#define HS_WIDTH 8
-#else
-#define HS_WIDTH 4
-#endif
+#define HS_WIDTH 4 /* eight lanes are slower: most of a run's time goes into what is done for one lane at a time */
 #if defined(__AVX__)
 #include <immintrin.h>
 #endif
@@ -29,9 +25,7 @@ HS_INLINE hs_wide wide_all(double x) {
 
 /* A bit for each lane. */
 HS_INLINE uint32_t bits_of(hs_mask mask) {
-#if defined(__AVX512DQ__)
-  return _mm512_movepi64_mask((__m512i)mask);
-#elif defined(__AVX__)
+#if defined(__AVX__)
   return (uint32_t)_mm256_movemask_pd((__m256d)mask);
 #else
   uint32_t bits = 0;

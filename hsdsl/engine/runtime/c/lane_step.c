@@ -1,5 +1,5 @@
-/* One step of Taylor's method in lanes: that of next_series() in located.c, and whether crossings_along() there would find
-   nothing on it. Nothing is decided here that is not plain: in a lane where it is not, the loop for one run decides.
+/* One step of Taylor's method in lanes: that of next_series() in located.c, and whether crossings_along() there would
+   find nothing on it. Nothing is decided here that is not plain: in a lane where it is not, the loop for one run decides.
    The text of a model's routines stands before this file, with the table `lane_modes`. */
 
 #define FAR 0x1p500 /* sums of some numbers below it are finite */
@@ -106,8 +106,10 @@ static int step_lanes(hs_lanes *l) {
     if (mode->surface_series(p, order, lines)) return 0;
     good &= curves_of(mode, l, powers, tolerance > HS_UNIT ? tolerance : HS_UNIT);
   }
-  for (int k = 0; k < mode->surfaces; k++)
-    crossed |= ~passed_by(l->binomials, (hs_real *)l->curves + k * (order + 1), order, standing[k] != 0, ends[k], adaptive);
+  for (int k = 0; k < mode->surfaces; k++) {
+    const hs_real *const c = (hs_real *)l->curves + k * (order + 1);
+    crossed |= ~passed_by(l->binomials, c, order, standing[k] != 0, ends[k], adaptive);
+  }
   l->failed = (int32_t)bits_of(~good);
   l->crossed = (int32_t)bits_of(crossed & good);
   l->doubtful = (int32_t)bits_of(good & ~exact);

@@ -1,7 +1,7 @@
-/* Instances of an ensemble whose steps are made together, in lanes of vectors. Each place has one run under way, which is
-   that of located.c up to where a flow needs steps; there it parks. As many runs of one mode as there are lanes then make
-   a step at once, by code that is compiled for the model (lane_step.c). What that code does not decide is done by the
-   functions for one run, on the same step. So a run has the bits that it has alone. */
+/* Instances of an ensemble whose steps are made together, in lanes of vectors. Each place has one run under way, which
+   is that of located.c up to where a flow needs steps; there it parks. As many runs of one mode as there are lanes then
+   make a step at once, by code that is compiled for the model (lane_step.c). What that code does not decide is done by
+   the functions for one run, on the same step. So a run has the bits that it has alone. */
 
 #include "hs_lanes.h"
 
@@ -24,7 +24,8 @@ static hs_lanes lay_out_lanes(const hs_model *model, const hs_method *method, in
   const int64_t n = model->width, m = model->surfaces, order = method->order;
   const hs_lanes none = {0};
   hs_lanes l = none;
-  double **const one[] = {&l.t, &l.limit, &l.longest, &l.h, &l.t1}, **const states[] = {&l.x, &l.scales, &l.z, &l.end, &l.error};
+  double **const one[] = {&l.t, &l.limit, &l.longest, &l.h, &l.t1};
+  double **const states[] = {&l.x, &l.scales, &l.z, &l.end, &l.error};
   double **const surfaces[] = {&l.standing, &l.starts, &l.ends};
   for (int i = 0; i < 5; i++) *one[i] = numbers(store, lanes);
   for (int i = 0; i < 5; i++) *states[i] = numbers(store, n * lanes);
@@ -72,12 +73,12 @@ static void scatter_piece(const hs_run *run, const double *from, int order, int6
 }
 
 /* Put the step of a lane where next_series() writes its own. */
-static void scatter(hs_run *run, const hs_lanes *l, int64_t lanes, int lane) {
+static void scatter(hs_run *run, const hs_lanes *l, int64_t lanes, int lane, int doubtful) {
   begin_span(run, l->h[lane], l->t1[lane]);
   for (int s = 0; s < run->here.dimension; s++) {
     run->z[s] = l->z[s * lanes + lane];
     run->end[s] = l->end[s * lanes + lane];
-    run->error[s] = l->error[s * lanes + lane];
+    if (doubtful) run->error[s] = l->error[s * lanes + lane];
   }
 }
 
@@ -139,7 +140,7 @@ static int made_step(hs_team *team, hs_lanes *l, hs_seat *seat, int lane) {
   team->lost[run->here.mode] += failed ? LOST : -1;
   team->failed += failed, team->crossed += crossed, team->doubtful += doubtful;
   if (failed) return one_step(run, n, seat->limit);
-  scatter(run, l, lanes, lane);
+  scatter(run, l, lanes, lane, doubtful);
   if (doubtful && is_too_wrong(run, run->span.h)) {
     expands(run);
     return behind(run, halved_series(run, n, seat->limit, run->span.h / 2, 1));
@@ -204,8 +205,9 @@ static int steps_alone(const hs_team *team, const hs_seat *seat) {
 /* Choose runs of one mode that may make a step, all places in turn; how many. */
 static int choose_lanes(hs_team *team, const hs_lanes *l, hs_seat **chosen) {
   int count = 0;
-  for (int64_t i = 0, from = team->turn; i < team->count && count < team->program->lanes; i++) {
-    hs_seat *const seat = seat_of(team, (from + i) % team->count);
+  for (int64_t i = 0, at = team->turn; i < team->count && count < team->program->lanes; i++) {
+    hs_seat *const seat = seat_of(team, at);
+    at = at + 1 < team->count ? at + 1 : 0;
     while (seat->mode >= 0 && !(count && seat->mode != chosen[0]->mode)) {
       hs_run *const run = &seat->run;
       const int alone = steps_alone(team, seat);
@@ -213,7 +215,7 @@ static int choose_lanes(hs_team *team, const hs_lanes *l, hs_seat **chosen) {
       const int outcome = alone ? follow_on(run, seat->limit) : before_step(run, seat->limit);
       if (outcome == GOES_ON) {
         chosen[count++] = seat;
-        team->turn = (from + i + 1) % team->count;
+        team->turn = at;
         break;
       }
       settle_piece(seat, l, l->piece, team->program->lanes);
