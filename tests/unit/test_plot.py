@@ -100,6 +100,19 @@ def test_bands_too_narrow_to_see_are_of_several_modes():
     assert bands[0][2] == pytest.approx(2001, abs=3)
 
 
+def test_of_many_switches_the_shares_are_drawn():
+    """On for 1 and off for 1: one half each; then the first stay is as long as a quarter of all others."""
+    assert curves(hand_made.thermostat(300)).shares is None
+    run = hand_made.thermostat(1199)
+    edges, of = curves(run).shares
+    assert (edges[0], edges[-1], len(edges)) == (0, 1200, 101) and list(of) == ["on", "off"]
+    assert np.allclose(of["on"], 0.5) and np.allclose(of["on"] + of["off"], 1)
+    late = curves(replace(run, times=np.where(run.times >= 1, run.times + 300, 0))).shares
+    assert np.allclose(late.of["on"][:20], 1) and np.allclose(late.of["on"][21:], 0.5, atol=0.05)
+    figure = _figure(run)
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [f"{m}, share of the time" for m in of]
+
+
 def test_a_mode_occupied_too_shortly_to_see_has_no_band():
     run = hand_made.thermostat(4)
     times = np.where(run.times >= 2, run.times - 1 + 1e-7, run.times)  # the second arc takes 1e-7

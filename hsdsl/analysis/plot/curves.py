@@ -6,7 +6,7 @@ import ast
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ POINTS = 4000  # that a curve should have at least, where its pieces are not str
 CELLS = 3000  # of the picture's width and height: two points in one cell look like one
 BANDS = 400  # with more changes of mode than this, time is cut into BINS and a bin may be of several modes
 BINS = 1500
+STAYS, MOST_SHARES = 12, 300  # stays in modes that a bin of shares has, and the most bins
 MOVING = 1000  # points of a guard that moves
 SEVERAL = "several modes"
 ROUND_OFF = 1e-12  # of the size of a state
@@ -40,12 +41,20 @@ class GuardLine(NamedTuple):
     moving: Callable[[Array], Array] | None = None
 
 
+class Shares(NamedTuple):
+    """Times at which bins begin, and the last one's end, (n + 1,); by mode the share of each bin's time, (n,)."""
+
+    edges: Array
+    of: dict[str, Array]
+
+
 @dataclass(frozen=True, eq=False)
 class Curves:
     """The points of a run, in float64.
 
     ``begins`` marks the first point of each arc, ``jumps`` are the indices of points behind transitions. ``bands`` are
-    the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many.
+    the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many, and then
+    ``shares`` says how much of a time each mode takes.
     ``error`` is how much of its size a state may be off: one that changes by less is drawn as a constant.
     """
 
@@ -55,6 +64,7 @@ class Curves:
     bands: list[tuple[str, float, float]]
     ends_badly: bool = False
     error: float = ROUND_OFF
+    shares: Shares | None = None
 
     @property
     def span(self) -> tuple[float, float]:
@@ -104,7 +114,9 @@ def curves(execution: Execution) -> Curves:
     begins[np.searchsorted(rows, first)] = True
     jumps = np.flatnonzero(np.diff(samples.jump)) + 1
     error = max(ROUND_OFF, 10 * float(run.settings.get("tolerance") or 0))
-    return Curves(samples, begins, jumps, _bands(run), not run.stop.complete, error)
+    stays = merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
+    shares = _shares(stays) if len(stays) > BANDS else None
+    return Curves(samples, begins, jumps, _bands(stays), not run.stop.complete, error, shares)
 
 
 def _in_float64(execution: Execution) -> Execution:
@@ -131,8 +143,18 @@ def _points(run: Execution) -> tuple[Array, Array]:
     return rows, run.times[rows] + duration[rows] * (within / parts[rows])
 
 
-def _bands(run: Execution) -> list[tuple[str, float, float]]:
-    bands = merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
+def _shares(stays: list[tuple[str, float, float]]) -> Shares:
+    """The share of each mode in bins that have some stays each."""
+    ends: list[float] = [stays[0][1], *(end for _, _, end in stays)]
+    edges: list[float] = np.linspace(ends[0], ends[-1], min(MOST_SHARES, len(stays) // STAYS) + 1).tolist()
+    found: dict[str, Array] = {}
+    for mode in dict.fromkeys(mode for mode, _, _ in stays):
+        lasted = [(end - begin) * (name == mode) for name, begin, end in stays]
+        found[mode] = np.diff(np.interp(edges, ends, [0.0, *accumulate(lasted)])) / np.diff(edges)
+    return Shares(np.array(edges), found)
+
+
+def _bands(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
     if len(bands) <= BANDS:
         return _visible(bands)
     edges = np.linspace(bands[0][1], bands[-1][2], BINS + 1)

@@ -229,6 +229,12 @@ def _legend(
         handles += [
             Patch(label=shown(names[mode], LONGEST), **fill) for mode, fill in fills(modes, light=False).items()
         ]
+    elif (shares := data[0].shares) is not None:
+        named = short_names([*shares.of])
+        handles = [
+            Patch(label=f"{shown(named[mode], LONGEST)}, share of the time", **fill)
+            for mode, fill in fills([*shares.of]).items()
+        ]
     elif modes and not name_bands(top, data[0], plan.room):
         handles = [Patch(label=shown(names[mode], LONGEST), **fill) for mode, fill in fills(modes).items()]
     rows = legend_below(figure, handles, plan.size[0])
@@ -261,10 +267,7 @@ def draw_panel(
     axis.set_ylim(low, high)
     if len(runs) == 1:
         if len(runs[0].modes) <= MOST_BANDS:
-            data = runs[0]
-            for mode, fill in fills(data.modes).items():
-                spans = [(begin, end - begin) for name, begin, end in data.bands if name == mode]
-                axis.broken_barh(spans, (0, 1), transform=axis.get_xaxis_transform(), zorder=0, label=mode, **fill)
+            _draw_bands(axis, runs[0])
         _draw_guards(axis, runs[0], [guard for guard in guards if guard.moving is None], (low, high), room)
     elif guards:
         for level in dict.fromkeys(guard.value for guard in guards if guard.moving is None):
@@ -276,6 +279,22 @@ def draw_panel(
     if not any(run.has_values(name) for run in runs):
         axis.text(0.5, 0.5, "no value in this run", transform=axis.transAxes, ha="center", va="center", color=FAINT)
     axis.set_ylabel(label(name, view.units), parse_math=False)
+
+
+def _draw_bands(axis: Axes, run: Curves) -> None:
+    """Draw a band for each stay in a mode; of very many, areas as high as the mode's share of the time there."""
+    whole: Look = {"transform": axis.get_xaxis_transform(), "zorder": 0}
+    if run.shares is None:
+        for mode, fill in fills(run.modes).items():
+            spans = [(begin, end - begin) for name, begin, end in run.bands if name == mode]
+            axis.broken_barh(spans, (0, 1), label=mode, **whole, **fill)
+        return
+    low = np.zeros(len(run.shares.edges))
+    for mode, fill in fills([*run.shares.of]).items():
+        share = run.shares.of[mode]
+        high = low + np.append(share, share[-1])
+        axis.fill_between(run.shares.edges, low, high, step="post", label=mode, **whole, **fill)
+        low = high
 
 
 def _draw_curve(axis: Axes, run: Curves, name: str, look: Look, ends: tuple[float, float, float, float]) -> None:
