@@ -21,7 +21,7 @@ parentheses and functions. An *inequality* has an expression on either side of o
 
 `floor`, `sign`, `abs`, `min`, `max` and `atan2` of `t`, parameters and inputs alone switch at boundaries of steps,
 [each at its own time](../meaning.md#m9-inputs): `floor(t) - floor(t - 0.01)` is a pulse of 0.01 every second, and
-`sign(0.3 - (t - floor(t)))` a pulse width of 30 %. Where they contain a state they are looked at within steps.
+`sign(0.3 - (t - floor(t)))` a pulse width of 30 %. Where they contain a state they are examined within steps.
 
 `since` is [the time since the mode was entered](../meaning.md#m12-time-in-a-mode): `when: since >= 2` leaves a mode
 after 2. A transition with `event` in the place of `when` is made where

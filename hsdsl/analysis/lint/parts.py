@@ -1,7 +1,7 @@
 # pyright: basic
 """Lint of systems of parts: what is found in the whole file, and each automaton as a subject of rules.
 
-In the file these are names that nothing uses, and modes that no instance can be in. An automaton is looked at as the
+In the file these are names that nothing uses, and modes that no instance can be in. An automaton is examined as the
 modes of one instance, with all that others provide as inputs: these may have any value at any time, and any rate; the
 number of a mode is one of its whole numbers. Rules on what never happens are right then. Rules that find a point where
 something happens look only at automata that depend on no other one.
@@ -102,7 +102,7 @@ def _unreachable(document: SystemDocument, name: Key, kind: AutomatonDocument) -
 OF_UNITS = ("HS601", "HS602", "HS603", "HS604", "HS605")
 OF_ALL = ("HS426", "HS427", "HS428", "HS501", *OF_UNITS)
 OF_CLOSED = (*OF_ALL, "HS502", "HS506", "HS507", "HS508", "HS510")
-MOST = 8  # instances of an automaton that are looked at: those with other parameters or another start
+MOST = 8  # instances of an automaton that are examined: those with other parameters or another start
 
 
 def automata_of(subject: Subject) -> Iterator[AutomatonSubject]:

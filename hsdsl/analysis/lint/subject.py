@@ -189,7 +189,7 @@ class Subject:
 
 
 INSIDE, ON, BEYOND = -1, 0, 1
-_DEEPEST = 4  # derivatives along the flow that are looked at
+_DEEPEST = 4  # derivatives along the flow that are examined
 Number = Any  # an mpmath number; NaN where there is no value
 Point = Mapping[sp.Symbol, Number]
 

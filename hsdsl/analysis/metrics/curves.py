@@ -265,7 +265,7 @@ class Supremum:
 
     The search stops when ``upper - lower <= max(gap * lower, floor)``, when bounds at single times allow no less, after
     about ``most`` evaluations, or when the budget is spent. ``points`` is the largest upper bound at any single time,
-    ``evaluations`` how many times were looked at.
+    ``evaluations`` how many times were examined.
     """
 
     def __init__(self, cells: Cells, distance: Labelled, gap: float, floor: float, most: int, budget: Budget) -> None:

@@ -16,7 +16,7 @@ SEARCHED = "searched"
 
 
 def up_to_hops(hops: int) -> str:
-    """The status of a distance whose paths with more passages were not looked at."""
+    """The status of a distance whose paths with more passages were not examined."""
     return f"up to {hops} hops"
 
 

@@ -335,7 +335,7 @@ class _Batch:
             self.looked_at = verdicts == UNDECIDED
 
     def status(self) -> str:
-        """What the bounds rest on: local solves, straight lines looked at in points, or proofs alone."""
+        """What the bounds rest on: local solves, straight lines examined at points, or proofs alone."""
         apart = self.upper > self.lower * (1 + CLOSED)
         if np.any(apart & (self.done | self.shortened)):
             return SEARCHED
@@ -348,7 +348,7 @@ class _Batch:
         self.lower[chosen] = np.maximum(self.lower[chosen], passing)
 
     def open(self, enough: float) -> Indices:
-        """The pairs not yet looked at that may matter and whose bounds are apart."""
+        """The pairs not yet examined that may matter and whose bounds are apart."""
         return np.flatnonzero(~self.done & (self.upper > np.maximum(enough, self.lower * (1 + CLOSED) + 1e-300)))
 
     def carry(self, chosen: Indices) -> None:

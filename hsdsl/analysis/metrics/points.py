@@ -319,7 +319,7 @@ def _sentence(found: SearchResult, status: str) -> str:
 def _of_local_solves(found: SearchResult) -> str:
     if found.upper == np.inf:
         return "lower end certified; no path was found, though one may exist"
-    unproved = "" if found.proved else "; that it stays in its domains was looked at in points, not proved"
+    unproved = "" if found.proved else "; that it stays in its domains was examined in points, not proved"
     if found.upper > found.lower * (1 + CLOSED):
         early = ", ended early for want of time" if found.ended_early else ""
         return f"upper end: the best path that local solves found{early}; lower end certified, not tight{unproved}"

@@ -41,7 +41,7 @@ from hsdsl.base.numbers.rational import Exact, maximise, never_negative
 Indices = NDArray[np.intp]
 TOLERANCE = 2e-10  # relative: bounds this near to the best path are not examined; the lower end allows for it
 NEAR = 1e-3  # relative: a bound so near to the best path is examined more closely
-NEIGHBOURS_AT = {16, 128, 1024}  # sequences looked at: when the best path's neighbours are
+NEIGHBOURS_AT = {16, 128, 1024}  # sequences examined: when the best path's neighbours are
 MOST_CHANGES = 20
 HOPS = 8  # more than the fewest that lead from one mode to the other
 Bound = Callable[[tuple[int, ...], Indices, int], Array]  # of paths that begin with a sequence
@@ -60,7 +60,7 @@ class End(NamedTuple):
 class SearchResult:
     """What a search knows of N distances: the best paths, and the least that anything else can have.
 
-    ``upper``, ``lower`` and ``cut`` are arrays (N,). ``lower`` is the least of what was looked at or left out as too
+    ``upper``, ``lower`` and ``cut`` are arrays (N,). ``lower`` is the least of what was examined or left out as too
     long, ``cut`` that of paths with more passages than the cap. The path is that of a single distance.
     """
 

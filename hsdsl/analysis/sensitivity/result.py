@@ -181,7 +181,7 @@ class Sensitivity:
             for name, size in self.execution.sizes(arcs.get(made.index, ())).items():
                 sizes[name] = max(sizes.get(name, 0.0), size)
             if any(abs(made.time - tie.time) <= view.problem.tie(tie.time) for tie in self.ties):
-                continue  # its orders have been looked at
+                continue  # its orders have been examined
             after = made.after or {}
             time = self._shifts(after)
             state = self._followed(made.target, made.time, after, time, True)

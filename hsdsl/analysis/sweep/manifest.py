@@ -8,7 +8,7 @@ Readers of Parquet skip files whose names begin with an underscore. How a run en
 ``transitions``         every transition: time, name, states before and after, as lists
 ``outputs:every=0.1``   states and outputs at the multiples of a time, an expression of parameters
 ``outputs:count=101``   or at so many equally spaced times from 0 to the end
-``verdict``             whether the theorem holds, with its reasons; each run is looked at by itself
+``verdict``             whether the theorem holds, with its reasons; each run is examined by itself
 ======================= ==============================================================================
 
 The columns of the dataset:
@@ -17,7 +17,7 @@ The columns of the dataset:
 ``row``                                 the number of the run
 a varied name                           its value; ``parameter.stop`` for a parameter with the name of a column
 ``stop``, ``message``                   why it ended, a sentence where it did not get to where it was going
-``verdict``                             whether the theorem holds; null where that was not looked at
+``verdict``                             whether the theorem holds; null where that was not examined
 ``warnings``                            codes of `errors.WARNINGS`, with a space between two: what the run itself
                                         noted, and with verdicts all of its warnings, but for those of the file alone
 ``time``, ``mode``, ``transitions``     when and where it ended, and how many transitions it made

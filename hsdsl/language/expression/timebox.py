@@ -18,7 +18,7 @@ LONGEST_WAIT = 3600.0  # a lock cannot wait for ever
 AGAIN = 1.0  # Python forgets an exception in a destructor: the next one follows after so many seconds
 PARTS = 15  # into which the time for a file is divided: one expression may take one
 
-_python: Any = getattr(ctypes, "pythonapi", None)  # CPython; elsewhere the time is looked at between parts
+_python: Any = getattr(ctypes, "pythonapi", None)  # CPython; elsewhere the time is examined between parts
 _send: Any = None if _python is None else _python.PyThreadState_SetAsyncExc
 
 

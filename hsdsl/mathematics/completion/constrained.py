@@ -122,7 +122,7 @@ def _size(found: Contact, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
 def _released(found: Contact, chosen: sp.Expr, flag: sp.Symbol, push: sp.Expr, size: sp.Expr) -> Edge:
     """An edge that, in contact, is reached where the push on its guard falls through zero.
 
-    Where it is looked at, the parts of its `if` hold that motion along its guard keeps at their limits.
+    Where it is examined, the parts of its `if` hold that motion along its guard keeps at their limits.
     """
     edge = found.near.edge
     was, condition = edge.surface, edge.condition

@@ -254,7 +254,7 @@ def zero_surface(residual: sp.Expr) -> Surface:
 
 
 KINKED = (absolute, maximum, minimum, sign)
-SPEEDS = (1e-6, 1e-9, 1e-12)  # of the rate of the guard: impacts that are looked at
+SPEEDS = (1e-6, 1e-9, 1e-12)  # of the rate of the guard: impacts that are examined
 SEEDS = range(1, 9)  # of points where they are
 
 

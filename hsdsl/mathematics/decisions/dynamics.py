@@ -293,7 +293,7 @@ class Proof:
 
     @property
     def searched(self) -> tuple[tuple[Any, float, float], ...]:
-        """The bounds that all of it holds within: what was looked at in every question."""
+        """The bounds that all of it holds within: what was examined in every question."""
         ends: dict[Any, tuple[float, float]] = {}
         for answer in self.found:
             for name, low, high in answer.searched:

@@ -22,7 +22,7 @@ from hsdsl.mathematics.decisions.dynamics import Clause, Dynamics
 from hsdsl.mathematics.decisions.search import Constraint, StraightLine, too_large
 from hsdsl.mathematics.decisions.singularities import SmoothPiece, breaks, pieces
 
-DEEPEST = 6  # derivatives along the flow that are looked at
+DEEPEST = 6  # derivatives along the flow that are examined
 NEAR = 1e-8
 _STEP = 2.0**-13  # of a difference quotient, relative to a name's size
 _SMALL = 1e-6  # of how far a name is searched: nothing that is computed with it is more exact than NEAR of that

@@ -31,7 +31,7 @@ from hsdsl.mathematics.decisions.mode_point import ModePoint, Unsure, chain, ran
 from hsdsl.mathematics.decisions.search import UNKNOWN, Answer, Constraint, at_most_zero, negative, positive, zero
 from hsdsl.mathematics.decisions.singularities import KINKED, SmoothPiece, breaks, discontinuities, influencing, pieces
 
-DEEPEST = 6  # derivatives along the flow that are looked at
+DEEPEST = 6  # derivatives along the flow that are examined
 
 
 def uncrossed(dynamics: Dynamics, edge: Edge) -> tuple[str, Proof] | None:

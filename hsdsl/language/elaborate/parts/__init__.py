@@ -75,7 +75,7 @@ class Parts:
                 self.parts = (*self.parts[:k], timed, *self.parts[k + 1 :])
         self.initial = self._initial()
         self.units = dict(self._units())
-        if not symbols.findings.diagnostics:  # else what reads them may not have been looked at
+        if not symbols.findings.diagnostics:  # else what reads them may not have been examined
             self.board.check_ends()
 
     def _units(self) -> Iterator[tuple[str, str]]:

@@ -115,7 +115,7 @@ def roster_of(symbols: SymbolTable, document: SystemDocument) -> Roster:
         if label not in document.automata and label != ABSENT:
             message = f"there is no automaton '{shown(label)}'"
             symbols.report(given.automaton.place, "HS350", message, did_you_mean(label, document.automata))
-            label = closest(label, map(str, document.automata)) or label  # so what it means is looked at, too
+            label = closest(label, map(str, document.automata)) or label  # so what it means is examined, too
         kind = document.automata.get(label)  # pyright: ignore[reportArgumentType]
         if not isinstance(kind, AutomatonDocument):
             roster.broken |= {str(key), ANY}
