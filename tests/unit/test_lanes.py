@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conformance.test_conformance import CASES
+from conformance.test_conformance import model as of_case
 from engines import needs_compiler
 from shipped import MODELS
 
@@ -120,6 +121,6 @@ def test_a_program_has_lanes_where_a_flow_is_smooth() -> None:
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", CASES)
 def test_every_case(together: Together, name: str) -> None:
-    model = hsdsl.load(CASES[name])
+    model = of_case(name)
     together.compare(model, initial=varied(model), samples=17)
     together.compare(model, initial=varied(model, 2), tolerance=1e-6)
