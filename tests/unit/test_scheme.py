@@ -126,6 +126,7 @@ OUTSIDE = {
     "a name that nothing sets": "    return y\n",
     "too many results": "    return x, x\n",
     "a call of itself": "    return f(x, n, v)\n",
+    "a second function of its name": "    return x\ndef f(x: Number) -> Number:\n    return x\n",
     "a lambda": "    g = lambda: x\n    return g()\n",
     "values that are set before they are read": "    a, b = x, x\n    a, b = b, a\n    return a\n",
     "a number in between that is computed twice": "    return x if 0 < f(x, n, v) < 1 else x\n",
@@ -207,5 +208,58 @@ static hs_time both(hs_pair *p, hs_time t, int *result1) {
   }
   *result1 = 1;
   return t + found;
+}
+""")
+
+
+def test_records_by_value_parts_and_records_that_may_be_none() -> None:
+    source = '''\
+"""A sample."""
+from hsdsl.base.graphs import Elimination
+
+
+@dataclass(frozen=True)
+class Size:
+    """A size."""
+
+    n: int
+    pattern: Elimination | None
+
+
+@dataclass
+class Inner:
+    """Rooms."""
+
+    rows: list[Room]
+
+
+@dataclass
+class Outer:
+    """A record in a record."""
+
+    inner: Inner
+
+
+def fill(of: Size, by: Outer, places: Indices) -> int:
+    """Count and fill."""
+    pattern = of.pattern
+    row = by.inner.rows[of.n // 2]
+    for k in each(of.n):
+        row[k] = places[k] % 3
+    return 0 if pattern is None else pattern.size
+'''
+    text = Text.of("sample", source)
+    scheme = Scheme([text])
+    assert "typedef struct {\n  int n;\n  const hs_elimination *pattern;\n} hs_size;\n" in scheme.header()
+    assert "typedef struct {\n  hs_inner inner;\n} hs_outer;\n" in scheme.header()
+    assert scheme.module(text).endswith("""\
+static int fill(hs_size of, hs_outer *by, const int *places) {
+  const hs_elimination *pattern = of.pattern;
+  hs_real *row = by->inner.rows[of.n / 2];
+  HS_SIMD
+  for (int k = 0; k < of.n; k++) {
+    row[k] = places[k] % 3;
+  }
+  return (!pattern) ? 0 : pattern->size;
 }
 """)

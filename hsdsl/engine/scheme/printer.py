@@ -127,6 +127,8 @@ class Scheme:
                 elif name not in self.given and "frozen=True" in ast.unparse(part.decorator_list[0]):
                     self.values.add(name)
             case ast.FunctionDef(name=name, args=arguments, returns=returns):
+                if name in self.functions:
+                    raise text.refused(part, "a second function of this name")
                 result = "None" if returns is None else ast.unparse(returns)
                 given = {one.arg: _kind(one.annotation) for one in arguments.args if one.annotation is not None}
                 optional, result = result.endswith(MAY_BE_NONE), result.removesuffix(MAY_BE_NONE)
