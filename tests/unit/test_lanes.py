@@ -67,9 +67,11 @@ def varied(model: hsdsl.Model, seed: int = 1) -> dict[str, Any]:
     """Initial values near those of the model."""
     rng = np.random.default_rng(seed)
     first = model.simulate(until=0).values[0].tolist()
+    parts = {name.partition(".")[0] for name in model.program.all_states if "." in name}
     return {
         name: value * rng.uniform(0.99, 1.01, COUNT) + rng.uniform(-1e-3, 1e-3, COUNT) * (k % 2)
         for k, (name, value) in enumerate(zip(model.program.initial_states, first, strict=False))
+        if name not in parts  # whose mode it is
     }
 
 
