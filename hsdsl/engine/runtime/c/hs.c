@@ -6,8 +6,8 @@
 #pragma GCC optimize("tree-pre") /* of what -O2 does beyond -O1 the part that makes it faster, by a tenth */
 #endif
 
+#include "primitives.h" /* by hand: what the printed files call */
 /* printed from hsdsl/engine/scheme */
-#include "primitives.h"
 #include "control.c"
 #include "pace.c"
 #include "cascade.c"
@@ -22,10 +22,12 @@
 #pragma GCC push_options
 #pragma GCC optimize("O2")
 #endif
+/* printed as well */
 #include "linear.c"
 #include "scales.c"
 #include "newton.c"
 #include "radau.c"
+/* by hand again */
 #include "implicit.c"
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC pop_options

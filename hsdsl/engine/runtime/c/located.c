@@ -87,7 +87,7 @@ static int blur(hs_run *run, int n, hs_time t1) {
   return 0;
 }
 
-/* Try a step of a table or of an implicit method, or say what is in its way. */
+/* Try a step of a table or of an implicit method, or say what is in its way; `TableSteps._try`. */
 HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time t1) {
   hs_span *const span = &run->span;
   const hs_mode *mode = run->here.table;
@@ -229,7 +229,7 @@ HS_INLINE int is_too_wrong(hs_run *run, hs_real h) {
   return error_ratio(run, h) > hs_max(1, 64 * HS_UNIT / run->control.tolerance);
 }
 
-/* Try a step of Taylor's method, or say what is in its way. */
+/* Try a step of Taylor's method, or say what is in its way; `SeriesSteps._try`. */
 HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_time t1) {
   const hs_mode *mode = run->here.table;
   const hs_real *p = run->here.p;
@@ -395,7 +395,8 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
   return span_point(run, best, &crossing->time, &crossing->state);
 }
 
-/* Find where surface k first rises along the step: run->waiting says so; 1 where it is reached without a rise, else 0. */
+/* Find where surface k first rises along the step: run->waiting says so; 1 where it is reached without a rise, else 0.
+   The Python twin is `rises_of`. */
 static int first_rise(hs_run *run, int k, hs_crossing *crossing) {
   hs_riser *const waiting = &run->waiting[k];
   hs_real first, last;
@@ -620,7 +621,7 @@ static int first_event(hs_run *run) {
   return largest(run) ? WITHOUT_VALUE : LANDED;
 }
 
-/* No step is short enough: take a guard on which the state is, or stop with the reason. */
+/* No step is short enough: take a guard on which the state is, or stop with the reason; `stuck` in Python. */
 static int located_stuck(hs_run *run, hs_step_failure kind) {
   const int count = kind == HS_NOT_FINITE || kind == HS_UNSOLVED ? standing_on(run) : 0;
   if (count) {
@@ -800,7 +801,8 @@ static int crowded(hs_run *run, const hs_crossing *crossing) {
   return !(of_contacts(run) && run->here.table->edge[k].contact >= 0 && !keeps(run, t, crossing->state, k));
 }
 
-/* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. */
+/* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. The Python
+   twin is `make_transition`. */
 static int jump(hs_run *run) {
   const hs_crossing *crossing = &run->chosen;
   const hs_time t = crossing->time, until = run->until;
@@ -846,7 +848,8 @@ static int jump(hs_run *run) {
   return closed == GOES_ON ? unresolved(run, k) : closed;
 }
 
-/* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */
+/* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. The
+   Python twin is `at_boundary`. */
 static int located_at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
   if (t >= run->pause) return PAUSED;

@@ -82,7 +82,7 @@ typedef struct {
   hs_polynomial piece;
 } hs_trial;
 
-/* What a trial step found: crossings, an failure, or nothing. */
+/* What a trial step found: crossings, a failure, or nothing. */
 typedef struct {
   hs_step_failure failure;
   int surface;

@@ -260,7 +260,8 @@ static hs_real *off_of(const hs_curves *curves, int part, int k) { return &curve
 
 static int *degree_of(const hs_curves *curves, int part, int k) { return &curves->degree[part * curves->count + k]; }
 
-/* Give the next point where the surface rises through zero and goes on above its level: 1; 0 where there is none. */
+/* Give the next point where the surface rises through zero and goes on above its level: 1; 0 where there is none. A
+   walk in place of the iterator `rises_along`. */
 static int next_rise(hs_run *run, hs_path *path, hs_rise *rise) {
   const hs_curves *curves = &run->curves;
   for (; path->part < curves->parts; path->part++, path->walk.at = 0.0) {
