@@ -31,7 +31,7 @@ def same_state(a: Vector, b: Vector, n: int) -> bool:
 
 
 def returns(cascade: Cascade, flowed: bool, mode: int, x: Vector, n: int) -> bool:
-    """Count a transition that led to a state; whether one of the same cascade has led there before."""
+    """Count a transition that led to a state; return whether one of the same cascade has led there before."""
     if not flowed and cascade.room > 0:
         if mode == cascade.mode and same_state(x, cascade.x, n):
             return True

@@ -10,12 +10,12 @@ from hsdsl.engine.scheme.words import Count, Time, Vector, inline
 SAFETY = 0.9
 LEAST = 0.2
 MOST = 5
-MOST_REJECTIONS = 2000  # in a stretch
+MOST_REJECTIONS = 2000  # in a stretch of time
 STRETCH = 1e-3  # of the largest step: the time in which rejections are counted together
 BAND_FROM = 0.9  # an implicit step is kept where it would change by a factor between these
 BAND_TO = 1.2
 LEAST_SEEN = 1e-10  # an error ratio below this counts as this
-LEAST_BEFORE = 0.3  # a root of the one before likewise
+LEAST_BEFORE = 0.3  # a root of the error ratio of the step before below this counts as this
 
 
 @dataclass
@@ -45,7 +45,10 @@ class Control:
 
 @inline
 def ratio_to(control: Control, h: Number, error: Vector, z: Vector, scales: Vector, had: Vector, n: int) -> Number:
-    """Error ratio of a step of length h to z; at most 1 is acceptable. The sizes that states had may be below those."""
+    """Return the error ratio of a step of length h to z; at most 1 is acceptable.
+
+    ``scales`` may be lifted by round-off of the flow; the states ``had`` these sizes before that.
+    """
     worst = control.h * 0
     tiny = h <= control.least
     for k in range(n):
@@ -59,7 +62,7 @@ def ratio_to(control: Control, h: Number, error: Vector, z: Vector, scales: Vect
 
 
 def factor(control: Control, ratio: Number) -> Number:
-    """Factor from one step to the next."""
+    """Return the factor from one step to the next, by the error ratio of that step alone."""
     if ratio == 0:
         return MOST
     return min(MOST, max(LEAST, SAFETY * ratio ** (-1 / (ratio * 0 + control.order))))
@@ -78,7 +81,10 @@ def begin_steps(control: Control, scales: Vector, slope: Vector, n: int) -> None
 
 
 def predicted(control: Control, taken: Number, ratio: Number) -> Number:
-    """Factor from one step to the next for an implicit method."""
+    """Return the factor to the next step of an implicit method, by the ratios of this step and of the one before.
+
+    This is Gustafsson's predictive controller (Hairer and Wanner 1996, IV.8). It remembers the step.
+    """
     root = max(LEAST_SEEN, ratio) ** (1 / (ratio * 0 + control.order))
     found = min(MOST, max(LEAST, SAFETY / root))
     if control.before > 0:

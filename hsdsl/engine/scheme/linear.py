@@ -37,7 +37,7 @@ class Blocks:
 
 
 def is_larger(a: Number, of_a: Number, b: Number, of_b: Number) -> bool:
-    """Whether a is larger than b, each relative to the scale of its row's unknown; without one only than zero."""
+    """Return whether a is larger than b, each relative to the scale of its row's unknown; without scales, than 0."""
     return a * of_b > b * of_a if of_a > 0 and of_b > 0 else b == 0 and a > 0
 
 
@@ -60,7 +60,7 @@ def exchange_places(order: IndexRoom, i: int, k: int) -> None:
 
 @inline
 def factored(n: int, a: Room, order: IndexRoom, scales: Vector, of: Variation | None) -> bool:
-    """Factor a square matrix in place, inverse pivots on its diagonal; whether it has an inverse.
+    """Factor a square matrix in place, inverse pivots on its diagonal; return whether it has an inverse.
 
     Its rows, as its columns, belong to unknowns of these scales. Of varied states only rows of one group exchange
     places.
@@ -105,7 +105,7 @@ def solve(n: int, a: Vector, order: Indices, right: Vector, found: Room) -> None
 
 @inline
 def factored_complex(n: int, re: Room, im: Room, order: IndexRoom, scales: Vector, of: Variation | None) -> bool:
-    """The same of a complex matrix; the size of a pivot is the sum of its parts' sizes."""
+    """Factor a complex matrix as `factored` does; the size of a pivot is the sum of the sizes of its two parts."""
     for i in range(n):
         order[i] = i
     for k in range(n):
@@ -143,7 +143,7 @@ def factored_complex(n: int, re: Room, im: Room, order: IndexRoom, scales: Vecto
 
 @inline
 def take_off(n: int, re: Vector, im: Vector, a: Room, b: Room, i: int, first: int, end: int) -> None:
-    """Take the products of row i with what is known off its right-hand side a + i b."""
+    """Subtract the products of row i with what is known from its right-hand side a + i b."""
     for j in range(first, end):
         c, d = re[i * n + j], im[i * n + j]
         a[i] = a[i] - (c * a[j] - d * b[j])
@@ -154,7 +154,7 @@ def take_off(n: int, re: Vector, im: Vector, a: Room, b: Room, i: int, first: in
 def solve_complex(
     n: int, re: Vector, im: Vector, order: Indices, real: Vector, imaginary: Vector, a: Room, b: Room
 ) -> None:
-    """Solve for a right-hand side: the solution is a + i b."""
+    """Solve for a complex right-hand side: the solution is a + i b."""
     for i in range(n):
         a[i] = real[order[i]]
         b[i] = imaginary[order[i]]
@@ -168,7 +168,10 @@ def solve_complex(
 
 
 def sparse_factored(n: int, of: Elimination, a: Room, row: Room) -> bool:
-    """Factor a matrix, given by all entries of the pattern, likewise; ``row`` is room for n numbers."""
+    """Factor a matrix in place, given by all entries of the pattern, inverse pivots on its diagonal.
+
+    Return whether every pivot has an inverse; ``row`` is room for n numbers.
+    """
     for i in range(n):
         for at in range(of.start[i], of.start[i + 1]):
             row[of.column[at]] = a[at]
@@ -202,7 +205,7 @@ def sparse_solve(n: int, of: Elimination, values: Vector, right: Vector, y: Room
 
 
 def sparse_factored_complex(n: int, of: Elimination, re: Room, im: Room, c: Room, d: Room) -> bool:
-    """Factor a complex matrix, likewise."""
+    """Factor a complex matrix as `sparse_factored` does; c and d are room for n numbers each."""
     for i in range(n):
         for at in range(of.start[i], of.start[i + 1]):
             c[of.column[at]] = re[at]
@@ -284,7 +287,7 @@ def solve_own(of: Blocks, by: Factors, right: Vector, found: Room) -> None:
 
 @inline
 def solve_own_complex(of: Blocks, by: Factors, real: Vector, imaginary: Vector, a: Room, b: Room) -> None:
-    """Solve with the factors of the complex matrix."""
+    """Solve for a right-hand side of the own states with the factors of the complex matrix."""
     pattern = of.pattern
     if pattern is None:
         solve_complex(of.own, by.re, by.im, by.turned, real, imaginary, a, b)
@@ -294,7 +297,7 @@ def solve_own_complex(of: Blocks, by: Factors, real: Vector, imaginary: Vector, 
 
 @inline
 def add_links(v: Variation, by: Factors, own: Vector, right: Room) -> None:
-    """Add what the changes of the own states make of the right-hand sides of the columns."""
+    """Add to the right-hand sides of the columns what the changes of the own states contribute."""
     for e in range(v.links):
         right[v.linked[e]] = right[v.linked[e]] + by.links[e] * own[v.linking[e]]
 
@@ -314,7 +317,7 @@ def spread_column(of: Blocks, v: Variation, k: int, all: Vector, column: Room) -
 
 @inline
 def place_column(of: Blocks, v: Variation, k: int, column: Vector, all: Room) -> None:
-    """Put such a vector back."""
+    """Put a vector of the own states back as a column; what the column does not have is left out."""
     if of.whole:
         for i in range(of.own):
             all[(k + 1) * of.own + i] = column[i]
@@ -340,14 +343,14 @@ def solve_columns(of: Blocks, by: Factors, right: Room, found: Room) -> None:
 
 @inline
 def solve_all(of: Blocks, by: Factors, right: Room, found: Room) -> None:
-    """Solve with the factors of the real matrix."""
+    """Solve for the own states and all columns with the factors of the real matrix."""
     solve_own(of, by, right, found)
     solve_columns(of, by, right, found)
 
 
 @inline
 def solve_all_complex(of: Blocks, by: Factors, real: Room, imaginary: Room, a: Room, b: Room) -> None:
-    """The same with those of the complex one."""
+    """Solve for the own states and all columns with the factors of the complex matrix: the solution is a + i b."""
     v = of.varied
     solve_own_complex(of, by, real, imaginary, a, b)
     if v is not None:

@@ -10,78 +10,69 @@ from hsdsl.engine.scheme.primitives import Collocation, flow_at, sum_of
 from hsdsl.engine.scheme.scales import Resolved, is_finite
 from hsdsl.engine.scheme.words import Here, Room, Time, Vector, each, inline, may_fail
 
-MOST_ITERATIONS = 7  # iterations of a step that has a tolerance
-RENEWED = 1e-3  # an iteration that leaves more than this of the one before has old derivatives,
-FEW = 2  # which matters where a step takes more than these
-LEAST_LEFT = 1e-3  # of the tolerance: what the iterations of such a step may leave,
-MOST_LEFT = 0.03  # and at most
-DIVERGING = 0.99  # an iteration that leaves more than this of the one before is one of too long a step
-SLOW_RATE = 0.5  # likewise for iterations that go on to round-off
-NEWTON_NOISE = 1024  # units of round-off, relative to the scales: a correction this small may be all noise
-NEWTON_SHARE = 1e-2  # of the tolerance, likewise: what an iteration may leave in a badly conditioned step
+MOST_ITERATIONS = 7  # A step that has a tolerance iterates at most so often.
+RENEWED = 1e-3  # Derivatives are old where an iteration leaves more than this share of the one before.
+FEW = 2  # Old derivatives are renewed only where a step took more iterations than these.
+LEAST_LEFT = 1e-3  # Iterations of a step that has a tolerance may always leave this share of it.
+MOST_LEFT = 0.03  # They may never leave more than this share.
+DIVERGING = 0.99  # A step is too long where an iteration leaves more than this share of the one before.
+SLOW_RATE = 0.5  # The same limit holds for iterations that go on to round-off.
+NEWTON_NOISE = 1024  # A correction of at most so many units of round-off, relative to the scales, may be all noise.
+NEWTON_SHARE = 1e-2  # A badly conditioned step may be left with a correction of this share of the tolerance.
 
 
 @dataclass
 class Radau:
-    """Steps along one stretch of flow, and what one leaves for the next.
+    """Steps along one stretch of flow, and what one leaves for the next; lists have an item for each of 3 stages."""
 
-    A step has a ``tolerance``, or 0, and is made to leave ``enough`` of it; a run tries the length ``soon`` first. To
-    round-off it iterates ``most`` times. There are derivatives of the flow (``rows``), ``derived_at`` a time, and
-    factors of their matrices for the length ``factored_for``; ``last`` has the increments of a step from ``start`` of
-    this ``length``. The last iteration left the share ``rate`` of the one before it, 1 where that is not known; all
-    that follow would have added ``left`` of the last one; derivatives that have ``aged`` are renewed for the next step.
-    ``scales`` are those that the last step was solved with, where round-off of the flow ``lifted`` them not below
-    ``least``.
-    """
-
-    unit: Number
-    tolerance: Number
-    enough: Number
-    soon: Number
-    most: int
-    derived: bool
-    stepped: bool
-    factored: bool
-    derived_at: Time
+    unit: Number  # of round-off
+    tolerance: Number  # of a step; 0 where steps are solved to round-off
+    enough: Number  # share of the tolerance that iterations may leave
+    soon: Number  # length that a run tries first
+    most: int  # iterations to round-off
+    derived: bool  # whether ``rows`` are of this stretch
+    stepped: bool  # whether ``last`` is of this stretch
+    factored: bool  # whether ``factors`` are those of ``rows`` for the length ``factored_for``
+    derived_at: Time  # of ``rows``
     factored_for: Number
-    start: Time
-    length: Number
-    rate: Number
-    left: Number
-    aged: bool
-    lifted: bool
-    rows: Room
-    fresh: Room
-    lasting: Room
-    scales: Vector
+    start: Time  # of the step whose increments are in ``last``
+    length: Number  # of that step
+    rate: Number  # share of the one before that the last iteration left; 1 where it is not known
+    left: Number  # what all further iterations would have added, relative to the last one
+    aged: bool  # whether the next step renews the derivatives
+    lifted: bool  # whether round-off of the flow has lifted scales: none is below ``least`` then
+    rows: Room  # derivatives of the flow
+    fresh: Room  # room for the next derivatives
+    lasting: Room  # share of an error of each derivative of states that lasts over the next step
+    scales: Vector  # with which the last step was solved
     least: Room
-    z: list[Room]
-    last: list[Room]
-    apart: list[Room]
-    change: list[Room]
-    slopes: list[Room]
-    right: list[Room]
-    largest: Room
-    error: Room
-    at: Room
+    z: list[Room]  # increments Z
+    last: list[Room]  # Z of the last step that was solved
+    apart: list[Room]  # transformed increments, the inverse of T times Z
+    change: list[Room]  # what an iteration adds to ``apart``
+    slopes: list[Room]  # the flow at the stages
+    right: list[Room]  # right-hand sides of an iteration
+    largest: Room  # largest size in ``change`` of each state
+    error: Room  # estimate for each state
+    at: Room  # room for a point at which the flow is evaluated
     factors: Factors
     resolved: Resolved
 
 
 @inline
 def weighted(w: Vector, a: Number, b: Number, c: Number) -> Number:
-    """A weighted sum of three."""
+    """Return a weighted sum of three."""
     return w[0] * a + w[1] * b + w[2] * c
 
 
 def enough_of(unit: Number, tolerance: Number, root: Number) -> Number:
-    """The share of the tolerance that iterations may leave; ``root`` is that of the tolerance."""
+    """Return the share of the tolerance that iterations may leave; ``root`` is that of the tolerance."""
     return max(10 * unit / tolerance, min(MOST_LEFT, max(LEAST_LEFT, root)))
 
 
 @inline
 def scaled(steps: Radau, of: Blocks, x: Vector) -> Number:
-    """The largest change relative to the scales; of a state that has been zero so far, to where it is now.
+    """Return the largest change relative to the scales; of a state that has been zero so far, to where it is now.
 
     A scale by the round-off of what made that zero, no more than the tolerance times where it is now, is none.
     """
@@ -99,7 +90,7 @@ def scaled(steps: Radau, of: Blocks, x: Vector) -> Number:
 
 @inline
 def followers(steps: Radau, of: Blocks, x: Vector) -> int:
-    """How many states that have been zero so far no longer are: each may follow another one, an iteration later."""
+    """Count the states that have been zero so far and no longer are: each may follow another, an iteration later."""
     count = 0
     for s in range(of.n):
         if not steps.scales[s] > 0:
@@ -115,7 +106,7 @@ def followers(steps: Radau, of: Blocks, x: Vector) -> int:
 def iterate(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector) -> bool:
     """Iterate once by Newton's method on Z = h A f(x + Z), in the coordinates that take A apart.
 
-    Whether the increments after it, and the largest change of each state, are finite.
+    Return whether the increments after it, and the largest change of each state, are finite.
     """
     n = of.n
     for i in range(3):
@@ -155,6 +146,7 @@ def to_tolerance(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Ti
     False where it will not be, within the iterations that a step may take.
     """
     noise = NEWTON_NOISE * steps.unit / steps.tolerance
+    # the first iteration has no rate: eta_0 = max(eta of the step before, unit)**0.8 (Hairer and Wanner 1996, IV.8)
     left = max(steps.left, steps.unit) ** ((steps.unit * 0 + 4) / 5)
     before: Number = 0
     for count in range(1, MOST_ITERATIONS + 1):

@@ -36,22 +36,22 @@ class Pace:
     turns: int = 0
 
 
-def creeps(pace: Pace, halvings: int) -> bool:
-    """Count a step that was halved so often; whether too many in a row were far below the full step."""
+def count_creeping(pace: Pace, halvings: int) -> bool:
+    """Count a step that was halved so often; return whether too many in a row were far below the full step."""
     pace.creeping = pace.creeping + 1 if halvings >= CREEPING else 0
     return pace.creeping > MOST_CREEPING
 
 
-def is_slow(pace: Pace, t: Time) -> bool:
-    """Count a step from t; whether there were too many within a millionth of the run."""
+def count_step(pace: Pace, t: Time) -> bool:
+    """Count a step from t; return whether there were too many within a millionth of the run."""
     pace.made += 1
     if t - pace.since > pace.brief:
         pace.since, pace.made = t, 0
     return pace.made > MOST_SHORT
 
 
-def is_idle(pace: Pace, t: Time, t1: Time, full: Number) -> bool:
-    """Begin to count a step that was cut short; whether round-off of time shows it."""
+def count_cut_short(pace: Pace, t: Time, t1: Time, full: Number) -> bool:
+    """Note where a step that was cut short ends; return whether it is idle, so that `count_idle` counts it."""
     if t != pace.reached:
         pace.idle = 0
         pace.creeping = 0
@@ -59,15 +59,15 @@ def is_idle(pace: Pace, t: Time, t1: Time, full: Number) -> bool:
     return t1 - t <= IDLE_UNITS * pace.unit * max(t, full)
 
 
-def gets_nowhere(pace: Pace, idle: bool) -> bool:
-    """Count a step that is idle or not; whether too many in a row were."""
+def count_idle(pace: Pace, idle: bool) -> bool:
+    """Count a step that is idle or not; return whether too many in a row were."""
     pace.idle = pace.idle + 1 if idle else 0
     return pace.idle > MOST_IDLE
 
 
 @inline
-def chatters(pace: Pace, slope: Vector, end: Vector, n: int) -> bool:
-    """Count a step, by whether a component of the flow has the other sign at its end; whether those are very many."""
+def count_turns(pace: Pace, slope: Vector, end: Vector, n: int) -> bool:
+    """Count a step, by whether a component of the flow has the other sign at its end; return whether very many had."""
     turned = False
     for k in range(n):
         turned |= slope[k] * end[k] < 0
@@ -82,7 +82,7 @@ def chatters(pace: Pace, slope: Vector, end: Vector, n: int) -> bool:
 
 
 def jump_between(here: Here, k: int, t: Time, x: Vector, t1: Time, z: Vector) -> tuple[Number, Number, Number] | None:
-    """The share of the way from (t, x) to (t1, z) at which component k of the flow jumps, and its values there.
+    """Find the share of the way from (t, x) to (t1, z) at which component k of the flow jumps, and its values there.
 
     They are those before and behind the jump. None where it does not jump, or has no value.
     """

@@ -17,7 +17,7 @@ def value_of(c: Vector, n: int, s: Number) -> Number:
 
 @inline
 def value_at_end(c: Vector, n: int) -> Number:
-    """The same at 1."""
+    """Evaluate c_0 + c_1 + ..., the value at 1."""
     total = c[n]
     for k in range(n - 1, -1, -1):
         total = c[k] + total
@@ -36,7 +36,7 @@ def value_and_slope(c: Vector, n: int, s: Number) -> tuple[Number, Number]:
 
 
 def slope_of(c: Vector, n: int, s: Number) -> Number:
-    """Evaluate the derivative."""
+    """Evaluate the derivative of c_0 + c_1 s + ... (Horner)."""
     slope = s * 0
     for k in range(n, 0, -1):
         slope = k * c[k] + s * slope

@@ -53,7 +53,7 @@ def begin_stretch(steps: Radau, of: Blocks) -> None:
 
 @inline
 def fill_diagonal(of: Blocks, rows: Vector, diagonal: Room) -> None:
-    """Find the derivative of each state's flow by itself."""
+    """Find the derivative of each state's flow with respect to that state."""
     at = 0
     for s in range(of.width):
         diagonal[s] = 0
@@ -66,6 +66,7 @@ def fill_diagonal(of: Blocks, rows: Vector, diagonal: Room) -> None:
 @may_fail
 def derive(here: Here, of: Blocks, steps: Radau, t: Time, x: Vector) -> None:
     """Take the derivatives of the flow, and which share of an error of a varied state lasts over the next step."""
+    # into `fresh` first, then exchanged: where this fails, `rows` still has the earlier derivatives
     derivatives_at(here, t, x, steps.fresh)
     rows = steps.fresh
     steps.fresh = steps.rows
@@ -80,7 +81,7 @@ def derive(here: Here, of: Blocks, steps: Radau, t: Time, x: Vector) -> None:
 
 
 def factor_sparse(of: Blocks, pattern: Elimination, known: Collocation, steps: Radau, h: Number) -> bool:
-    """Factor the same matrices in the pattern of a sparse elimination."""
+    """Factor gamma - h J and alpha - i beta - h J in the pattern of a sparse elimination, as `factor_dense` does."""
     by = steps.factors
     for i in range(pattern.size):
         by.real[i] = 0
@@ -101,7 +102,7 @@ def factor_sparse(of: Blocks, pattern: Elimination, known: Collocation, steps: R
 
 @inline
 def factor_dense(of: Blocks, known: Collocation, steps: Radau, h: Number, scales: Vector) -> bool:
-    """Factor them where they are dense."""
+    """Factor gamma - h J and alpha - i beta - h J as dense matrices; return whether they have inverses."""
     n, by = of.own, steps.factors
     for i in range(n * n):
         by.real[i] = 0
@@ -122,7 +123,7 @@ def factor_dense(of: Blocks, known: Collocation, steps: Radau, h: Number, scales
 
 @inline
 def factor_all(of: Blocks, known: Collocation, steps: Radau, h: Number, scales: Vector) -> bool:
-    """Factor gamma - h J and alpha - i beta - h J, unless that is done; whether they have inverses."""
+    """Factor gamma - h J and alpha - i beta - h J, unless that is done; return whether they have inverses."""
     if not (steps.factored and steps.factored_for == h):
         v, pattern = of.varied, of.pattern
         if v is not None:
@@ -139,6 +140,7 @@ def factor_all(of: Blocks, known: Collocation, steps: Radau, h: Number, scales: 
 @inline
 def guess(of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number) -> None:
     """Go on with the last step's polynomial: behind its end, or inside it where it was tried from here."""
+    # x, y, z are increments, not states; u, v, w are the transformed ones
     x, y, z = steps.z[0], steps.z[1], steps.z[2]
     u, v, w = steps.apart[0], steps.apart[1], steps.apart[2]
     behind = steps.stepped and t == steps.start + steps.length
@@ -187,10 +189,11 @@ def solve_step(
     here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector, scales: Vector,
     exactly: bool,
 ) -> bool:  # fmt: skip
-    """Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do; whether that is done."""
+    """Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do; return whether it is solved."""
     if not steps.derived or (steps.aged and steps.derived_at != t):
         derive(here, of, steps, t, x)
     closer = False
+    # at most three tries: with the derivatives at hand; with those at t; with these, and scales by a closer look
     while True:
         steps.scales = scales
         if steps.lifted:
@@ -215,7 +218,7 @@ def solve_step(
 
 @inline
 def larger(a: Number, b: Number) -> Number:
-    """The one of larger size."""
+    """Return the one of larger size."""
     return a if abs(a) >= abs(b) else b
 
 
@@ -260,7 +263,7 @@ def radau_step(
     here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector, slope: Vector,
     scales: Vector, z: Room,
 ) -> bool:  # fmt: skip
-    """Try a step to z, solved as well as its tolerance asks for; whether it is solved."""
+    """Try a step to z, solved as well as its tolerance asks for; return whether it is solved."""
     if of.n == 0:
         return True
     solved = solve_step(here, of, known, steps, t, h, x, scales, not steps.tolerance > 0)
@@ -321,7 +324,7 @@ def radau_landing(
 
 
 def fill_piece(of: Blocks, known: Collocation, steps: Radau, room: int, piece: Room) -> None:
-    """The polynomial through the increments: coefficient m of the step's share at m ``room``."""
+    """Write the polynomial through the increments: coefficient m of the step's share at m ``room``."""
     for m in range(3):
         for s in range(of.width):
             piece[m * room + s] = weighted(known.power[m], steps.z[0][s], steps.z[1][s], steps.z[2][s])

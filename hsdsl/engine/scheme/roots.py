@@ -26,7 +26,9 @@ class Cut:
 class Roots:
     """Room to look for roots: own has the Bernstein coefficients on [0, 1] of the polynomial ``of``, if there is one.
 
-    The parts in cuts are still to be looked at. ``binomials`` are those of all degrees, row by row.
+    ``of`` is compared by address, so a caller that overwrites its coefficients clears it. ``binomials`` are those of
+    all degrees, row by row. ``cuts`` is a stack of the parts that a search still has to examine: ``open`` of them, at
+    most MOST_CUTS of run.h. Of a part that is cut, the half nearer to where the search begins is on top.
     """
 
     unit: Number
@@ -52,7 +54,7 @@ class Walk:
 
 @inline
 def bernstein_of(roots: Roots, c: Vector, n: int) -> Vector:
-    """The Bernstein coefficients of a polynomial, made once for it."""
+    """Return the Bernstein coefficients of a polynomial, made once for it."""
     if roots.of is not c:
         fill_bernstein(roots.binomials, c, n, roots.own)
     roots.of = c
@@ -84,7 +86,7 @@ def split(b: Room, n: int, s: Number, left: Room) -> None:
 
 
 def changes(b: Vector, n: int) -> int:
-    """Count the changes of sign, zeros left out."""
+    """Count the changes of sign, zeros left out; not-a-number counts as negative."""
     count = 0
     before = 0
     for i in range(n + 1):
@@ -97,7 +99,8 @@ def changes(b: Vector, n: int) -> int:
 def rises(roots: Roots, c: Vector, n: int, sign: Number, level: Number, start: Number) -> Number | None:
     """Find a point from start on where sign times the polynomial is above a level, not having come back down before it.
 
-    None where it is nowhere above, up to intervals shorter than a unit of round-off.
+    That is the start itself where it is above there. None where it is nowhere above, up to intervals shorter than a
+    unit of round-off.
     """
     own = bernstein_of(roots, c, n)
     first = roots.cuts[0].b
@@ -114,7 +117,7 @@ def rises(roots: Roots, c: Vector, n: int, sign: Number, level: Number, start: N
         b, low, high = cut.b, cut.low, cut.high
         if largest_of(b, n) <= 0:
             continue
-        if b[0] > 0:
+        if b[0] > 0:  # already above where this part begins
             return low
         if b[n] > 0 and (changes(b, n) == 1 or high - low <= roots.unit):
             return high
@@ -152,6 +155,7 @@ def refined(roots: Roots, c: Vector, n: int, start: Number, end: Number) -> Numb
     for k in range(n + 1):
         sizes = sizes + abs(c[k])
     noise = ROUNDING * roots.unit * sizes
+    # falls: at a it may come back down to zero; stays: at b it may not have risen yet
     falls = not fa < -noise
     stays = not fb > noise
     if falls:

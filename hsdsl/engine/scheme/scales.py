@@ -16,8 +16,8 @@ from hsdsl.engine.scheme.primitives import flow_at, has_terms, terms_at
 from hsdsl.engine.scheme.words import Here, IndexRoom, Room, Time, Vector, inline, may_fail
 
 SHARE = 32  # the terms of a flow may move a state by at least so many times its scale in a step
-NOISE_UNITS = 64  # of round-off of what they move it by: no tolerance asks for less,
-ITERATED = 1024  # nor an iteration
+NOISE_UNITS = 64  # units of round-off of what they move it by: no tolerance asks for less
+ITERATED = 1024  # units of it: no iteration asks for less
 BLUR_UNITS = 4  # units of round-off of its terms that a flow changes by with them
 
 

@@ -25,7 +25,7 @@ from hsdsl.engine.integrators.stepper import Polynomial, Stages, State
 from hsdsl.engine.integrators.taylor import proposed_step
 from hsdsl.engine.kernel import Series
 from hsdsl.engine.scheme.control import accept, begin_steps, reject, struggles
-from hsdsl.engine.scheme.pace import creeps, is_slow
+from hsdsl.engine.scheme.pace import count_creeping, count_step
 from hsdsl.engine.scheme.polynomials import slope_of, value_of
 from hsdsl.engine.scheme.roots import stays_below
 from hsdsl.engine.simulate.contact import (
@@ -135,7 +135,7 @@ def follow(run: Run, here: ModeState, limit: Number) -> Event | ModeState | Stop
     t, x, arc = here.t, here.x, here.arc
     method, before = run.settings.method, None
     steps = SeriesSteps(run, here) if method is not None and method.is_series else TableSteps(run, here)
-    while t < limit and not is_slow(steps.pace, t):
+    while t < limit and not count_step(steps.pace, t):
         span = steps.next(t, x, limit)
         if isinstance(span, StepFailure):
             return stuck(run, here.moved(t, x), span)
@@ -503,7 +503,7 @@ class TableSteps(Steps):
                 if control.tolerance > 0 and halvings == 0:
                     accept(control, h, self._ratio)
                 control.slow_enough(mode, h)
-                return StepFailure("creeping") if creeps(self.pace, halvings) else tried
+                return StepFailure("creeping") if count_creeping(self.pace, halvings) else tried
             if halvings == 0 and (tried is TOO_WRONG or (tried is UNSOLVED and control.tolerance > 0)):
                 reject(control, h, self._ratio, tried is not UNSOLVED)
                 h = control.within_reach(mode, control.h)

@@ -18,7 +18,7 @@ from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper,
 from hsdsl.engine.kernel import Vector
 from hsdsl.engine.scheme.cascade import takes_back
 from hsdsl.engine.scheme.control import accept, begin_steps, reject, struggles
-from hsdsl.engine.scheme.pace import is_slow
+from hsdsl.engine.scheme.pace import count_step
 from hsdsl.engine.simulate.contact import holds_next, unresolved
 from hsdsl.engine.simulate.control import error_ratio
 from hsdsl.engine.simulate.run import ModeState, Run
@@ -78,7 +78,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     except DOMAIN_ERRORS:
         return run.standstill(here).not_finite([(t, x)])
     begin_steps(control, arc.scales, slope, len(x))
-    while t < limit and not is_slow(pace, t):
+    while t < limit and not count_step(pace, t):
         h, halvings, ratio, failure = control.h, 0, None, TOO_WRONG
         while True:
             h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)

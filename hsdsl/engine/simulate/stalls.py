@@ -20,7 +20,16 @@ from hsdsl.engine.integrators.tableau import ButcherTableau
 from hsdsl.engine.integrators.taylor import NoSeries, terms
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.runtime import structures
-from hsdsl.engine.scheme.pace import MOST_SHORT, SHORT, Pace, chatters, creeps, gets_nowhere, is_idle, jump_between
+from hsdsl.engine.scheme.pace import (
+    MOST_SHORT,
+    SHORT,
+    Pace,
+    count_creeping,
+    count_cut_short,
+    count_idle,
+    count_turns,
+    jump_between,
+)
 from hsdsl.engine.simulate import stops
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.problem import Problem
@@ -42,10 +51,10 @@ def stall_ends(
     t: Number, x: State, t1: Number, z: State,
 ) -> StepFailure | None:  # fmt: skip
     """Count a step from (t, x) to (t1, z) that was halved because of ``failure``; say what ends the run, if so."""
-    small, k = is_idle(pace, t, t1, full), failure.surface
+    small, k = count_cut_short(pace, t, t1, full), failure.surface
     # the surface in the way did not come nearer: its round-off is larger than what the step adds
     still = k is not None and here.kernel.surfaces(t1, *z)[k] == here.kernel.surfaces(t, *x)[k]
-    nowhere, creeping = gets_nowhere(pace, small or still), creeps(pace, halvings)
+    nowhere, creeping = count_idle(pace, small or still), count_creeping(pace, halvings)
     if nowhere or (small and z == x):
         return failure
     return StepFailure("creeping", k) if creeping else None
@@ -55,7 +64,7 @@ def across_jump(
     pace: Pace, here: ModeState, t: Number, x: State, slope: State, t1: Number, z: State, end: State
 ) -> bool:
     """Count a step; say whether it is one of very many across a jump. Smooth flows that turn around are none."""
-    if not chatters(pace, slope, end, len(x)):
+    if not count_turns(pace, slope, end, len(x)):
         return False
     turned = [k for k, (a, b) in enumerate(zip(slope, end, strict=True)) if a * b < 0]
     return any(jump_between(here.kernel, k, t, x, t1, z) is not None for k in turned)

@@ -133,7 +133,7 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
       if (control->tolerance > 0 && across_jump(run, n, t1)) return HS_JUMP;
       if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
       slow_enough(run, h);
-      return creeps(&run->pace, halvings) ? HS_CREEPING : HS_CLEAR;
+      return count_creeping(&run->pace, halvings) ? HS_CREEPING : HS_CLEAR;
     }
     if (halvings == 0 && (tried == HS_ERROR || (tried == HS_UNSOLVED && control->tolerance > 0))) {
       reject(control, h, run->ratio, tried != HS_UNSOLVED);
@@ -660,7 +660,7 @@ static void begin_following(hs_run *run) {
 /* Whether there is a step to make before `limit`: GOES_ON, or what ends the flow. */
 HS_INLINE int before_step(hs_run *run, hs_time limit) {
   if (!(run->here.t < limit)) return AT_BOUNDARY;
-  if (is_slow(&run->pace, run->here.t)) return located_stuck(run, HS_SLOW);
+  if (count_step(&run->pace, run->here.t)) return located_stuck(run, HS_SLOW);
   return interrupted(run) ? (int)stopped(run, HS_INTERRUPTED, run->here.t) : GOES_ON;
 }
 

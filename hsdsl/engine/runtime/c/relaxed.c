@@ -356,7 +356,7 @@ static int flow(hs_run *run) {
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
   begin_steps(control, run->scales, run->slope, n);
   begin_pace(run);
-  while (here->t < limit && !is_slow(&run->pace, here->t)) {
+  while (here->t < limit && !count_step(&run->pace, here->t)) {
     hs_real h = control->h, ratio = NAN;
     hs_time t1;
     int halvings = 0;

@@ -20,8 +20,8 @@ static int unmoved(const hs_run *run) {
 /* Count a step from run->x to run->z that was halved because of `failure`; say what ends the run, if anything. */
 static hs_step_failure stall_ends(hs_run *run, int halvings, hs_step_failure failure, int surface, hs_time t1) {
   hs_pace *const pace = &run->pace;
-  const int small = is_idle(pace, run->here.t, t1, run->control.h);
-  const int nowhere = gets_nowhere(pace, small || still(run, surface, t1)), creeping = creeps(pace, halvings);
+  const int small = count_cut_short(pace, run->here.t, t1, run->control.h);
+  const int nowhere = count_idle(pace, small || still(run, surface, t1)), creeping = count_creeping(pace, halvings);
   if (nowhere || (small && unmoved(run))) return failure;
   return creeping ? HS_CREEPING : HS_CLEAR;
 }
@@ -37,7 +37,7 @@ static void begin_pace(hs_run *run) {
    a jump. */
 HS_INLINE int across_jump(hs_run *run, const int n, hs_time t1) {
   hs_real share, before, behind;
-  if (!chatters(&run->pace, run->slope, run->end, n)) return 0;
+  if (!count_turns(&run->pace, run->slope, run->end, n)) return 0;
   for (int s = 0; s < n; s++)
     if (run->slope[s] * run->end[s] < 0 &&
         jump_between(run, s, run->here.t, run->x, t1, run->z, &share, &before, &behind))
