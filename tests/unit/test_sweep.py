@@ -444,7 +444,7 @@ def test_a_cluster_gives_the_same(model, tmp_path):
 
 def test_a_cluster_that_does_not_answer_is_refused(model, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("hsdsl.analysis.sweep.cluster.PATIENCE", 0.2)
+    monkeypatch.setattr("hsdsl.analysis.sweep.cluster.CONNECTION_TIMEOUT", 0.2)
     with pytest.raises(UsageError, match="no scheduler answers there"):
         model.sweep(VARY, tmp_path / "s", cluster="tcp://127.0.0.1:9")
     assert not (tmp_path / "s").exists()
@@ -453,7 +453,7 @@ def test_a_cluster_that_does_not_answer_is_refused(model, tmp_path, monkeypatch)
 @pytest.mark.slow
 def test_a_cluster_that_is_lost_loses_nothing(model, tmp_path, monkeypatch):
     distributed = pytest.importorskip("distributed")
-    monkeypatch.setattr("hsdsl.analysis.sweep.cluster.PATIENCE", 0.5)
+    monkeypatch.setattr("hsdsl.analysis.sweep.cluster.CONNECTION_TIMEOUT", 0.5)
     arguments = {"vary": {"c": "0.7:0.9:200"}, "out": tmp_path / "s", "chunk": 5}
     options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
     cluster = distributed.LocalCluster(**options)
