@@ -30,8 +30,8 @@ where it is called: `hill(x, 2)`. The unknowns of `solve` are what
 [linear equations](../meaning.md#words) give.
 
 An *output* belongs to the modes in which all its names mean something. One of the whole model is read in each mode with
-that mode's own `let`; one of a mode goes before it. Elsewhere it has no value: not-a-number in arrays, an empty cell in
-tables, `null` in JSON. A final mode without `flow` has the outputs of the mode it is entered from.
+that mode's own `let`; an output of a mode takes precedence. Elsewhere it has no value: not-a-number in arrays, an
+empty cell in tables, `null` in JSON. A final mode without `flow` has the outputs of the mode it is entered from.
 
 ## Model
 

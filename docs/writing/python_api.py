@@ -48,7 +48,7 @@ SECTIONS: dict[str, tuple[tuple[str, str], ...]] = {
         ("hsdsl.store.read_sidecar", ""),
     ),
     "Ensemble": (
-        ("hsdsl.engine.execution.ensemble.Ensemble", "reasons failed failures run to_pandas"),
+        ("hsdsl.engine.execution.ensemble.Ensemble", "reasons failed failures run plot to_pandas"),
         ("hsdsl.engine.execution.ensemble.TransitionTable", ""),
         ("hsdsl.engine.execution.ensemble.Failure", ""),
     ),

@@ -91,6 +91,8 @@ def test_the_worst_rows_are_listed_with_the_command_of_the_first(command, model,
     assert "0.818730753" in table[1] and "x = 0.8187307531" in command(*again).out
     shown = command("sweep", "--show", tmp_path / "s", "--best", "final.x", "--json")
     assert [row["rate"] for row in shown.json["best"]] == [3, 0.5, 0.1]
+    listed = command("sweep", "--show", tmp_path / "s", "--worst", "final.x", "--quiet").out
+    assert listed.startswith("worst rows by final.x\n") and len(listed.splitlines()) == 6
 
 
 def test_without_pyarrow_there_is_a_hint(command, model, tmp_path, monkeypatch):

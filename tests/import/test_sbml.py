@@ -248,8 +248,8 @@ def test_units_are_kept() -> None:
     [
         ("delay(x, 1)", "delay equations"),
         ("INF", "infinity"),
-        ("x*nowhere", "a name that is nowhere: nowhere"),
-        ("twice(x)", "a function that is nowhere: twice"),
+        ("x*nowhere", "nothing in this file is called 'nowhere'"),
+        ("twice(x)", "no function in this file is called 'twice'"),
     ],
 )
 def test_what_has_no_words_is_refused_with_its_place(formula: str, feature: str) -> None:
@@ -423,7 +423,36 @@ def test_the_command_imports_sbml(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert obey(["import", str(file), "--until", "1", "--out", str(tmp_path / "growth.yaml"), "--quiet"]) == 0
     assert hsdsl.load(tmp_path / "growth.yaml").simulate().final.state["x"] == pytest.approx(exp(1))
     assert obey(["import", str(file)]) == 2 and "--until" in capsys.readouterr().err
+    file.write_text(model(Parameters=parameter("x", 1), Rules=rate("x", "x*nowhere")))
+    assert obey(["import", str(file)]) == 1
+    shown = capsys.readouterr().err
+    assert "nothing in this file is called 'nowhere'" in shown and "the end of the run is not given" in shown
+    file.write_text(model(Parameters=parameter("x", 1), Rules=rate("x", "x")))
     assert obey(["import", str(file), "--until", "1", "--urgent"]) == 2
     assert obey(["run", str(file)]) == 1 and "`hsdsl import` makes one of a file of SBML" in capsys.readouterr().err
     file.write_text(file.read_text().replace("<sbml", '<!DOCTYPE sbml [<!ENTITY a "b">]><sbml'))
     assert obey(["import", str(file), "--until", "1"]) == 1 and "document type" in capsys.readouterr().err
+
+
+def test_the_count_of_transitions_is_that_of_validate(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Transitions that arm and trigger an event are not the file's."""
+    out = tmp_path / "events.yaml"
+    (tmp_path / "events.xml").write_text(
+        model(Parameters=parameter("x", 1), Rules=rate("x", "x"), Events=event("x >= 2", {"x": "1"}))
+    )
+    assert obey(["import", str(tmp_path / "events.xml"), "--until", "1", "--out", str(out)]) == 0
+    assert ": 1 mode, 1 transition\n" in capsys.readouterr().err
+    assert obey(["validate", str(out)]) == 0 and "1 mode, 1 transition\n" in capsys.readouterr().out
+
+
+def test_a_flag_that_is_neither_true_nor_false_is_refused() -> None:
+    """A word such as `no` is no boolean of XML."""
+    text = model(Parameters=parameter("x", 1), Rules=rate("x", "x"), Events=event("x >= 2", {"x": "1"}))
+    with pytest.raises(hsdsl.ModelError, match="'useValuesFromTriggerTime': expected true or false, got 'no'"):
+        of(text.replace('TriggerTime="true"', 'TriggerTime="no"'))
+
+
+def test_the_unit_of_time_alone_is_kept() -> None:
+    """A file may give the unit of time and no other."""
+    text = model(Parameters=parameter("x", 1), Rules=rate("x", "x")).replace("<model", '<model timeUnits="second"')
+    assert hsdsl.loads(of(text)).system.units == {"t": "s"}

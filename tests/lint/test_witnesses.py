@@ -99,7 +99,7 @@ def said_of(model):
     [
         ("oscillator-with-stop-2", "HS462", "starts on the guard of 'impact' with the flow pointing out"),
         ("oscillator-with-stop-2", "HS507", "lands on its own guard"),
-        ("oscillator-with-stop-1", "HS505", "x = 14, v = 0, t = 0, where L_f r = 0: runs can graze it"),
+        ("oscillator-with-stop-1", "HS505", "x = 14, v = 0, t = 0, where r does not change along the flow"),
         ("bouncing-ball", "HS507", "Zeno is possible"),
         ("digital-control", "HS508", "overlap, at x = 0, y = 0; they commute"),
         ("pronking-runner", "HS508", "'aerial->left' and 'aerial->right' overlap"),

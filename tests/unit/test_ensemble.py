@@ -275,3 +275,23 @@ def test_samples_at_multiples_of_an_expression(engine):
     assert same(ensemble.samples["energy"][2], one.samples["energy"][0])
     with pytest.raises(UsageError, match="must be positive, not -1"):
         model(MODES).ensemble(parameters={"a": [1]}, samples="-a")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_runs_at_the_centre_of_initial_ranges_say_so(engine):
+    text = "hsdsl: 1\nmodes: {a: {flow: {x: 1}}}\ninitial: {mode: a, x: {min: 0, max: 4}}\nexperiment: {until: 1}"
+    box = hsdsl.loads(text)
+    assert box.ensemble(engine=engine).warning_counts == {"HS707": 1}
+    assert box.ensemble(initial={"x": [1, 2]}, engine=engine).warning_counts == {}
+
+
+def test_pictures_of_ensembles_have_units_and_say_of_which_runs_bands_are(tmp_path):
+    text = "hsdsl: 1\nunits: {t: s, x: m}\nmodes:\n  b: {flow: {y: 1}}\n"
+    text += "  a: {flow: {x: 1}, transitions: [{when: x >= 1, to: b, reset: {y: 0}}]}\n"
+    both = hsdsl.loads(f"{text}initial: {{mode: a, x: 0}}\nexperiment: {{until: 2}}")
+    both.ensemble(initial={"x": [0, 0.5]}, samples=9).plot(tmp_path / "p.svg", ["x"])
+    both.ensemble(initial={"x": [0, 0.5]}, samples=[0, 0.25]).plot(tmp_path / "q.svg", ["x"])
+    drawn, whole = ((tmp_path / f"{name}.svg").read_text() for name in "pq")
+    for words in ("x [m]", "time t [s]"):
+        assert f"<!-- {words} -->" in drawn
+    assert "<!-- 50 % of the runs that have it -->" in drawn and "<!-- 50 % of the runs -->" in whole

@@ -258,7 +258,7 @@ def plot_dots(x: Axis, of: Quantity, where: Any, title: str) -> Figure:
 
 
 @to_file
-def plot_family(curves: Sequence[tuple[Any, Any]], by: Axis, label: str, title: str) -> Figure:
+def plot_family(curves: Sequence[tuple[Any, Any]], by: Axis, label: str, title: str, time: str) -> Figure:
     """Draw a curve (times, values) for each row, in colours that rise with a name."""
     from matplotlib.collections import LineCollection
 
@@ -271,7 +271,7 @@ def plot_family(curves: Sequence[tuple[Any, Any]], by: Axis, label: str, title: 
     axes.autoscale_view()
     figure.colorbar(lines, ax=axes).set_label(by.label, parse_math=False)
     axes.set_ylabel(label, parse_math=False)
-    return _labelled(figure, axes, Axis("time t", None, None, False), title)
+    return _labelled(figure, axes, Axis(time, None, None, False), title)
 
 
 @to_file

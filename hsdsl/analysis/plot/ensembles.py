@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hsdsl.analysis.plot.curves import checked
-from hsdsl.analysis.plot.style import PALETTE, empty, legend_below, to_file
+from hsdsl.analysis.plot.style import PALETTE, empty, label, legend_below, time_label, to_file
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, counted
 from hsdsl.base.numbers.arithmetic import TIE
@@ -45,7 +45,7 @@ def ensemble_plot(
 ) -> None:
     """Draw the samples of an ensemble; see `Ensemble.plot`."""
     if not ensemble.samples:
-        raise UsageError("the ensemble has no samples", "give samples= to model.ensemble")
+        raise UsageError("the ensemble has no samples", "give samples=300 to `ensemble`")
     if wrong := [share for share in shares if not 0 < share < 1]:
         raise UsageError(f"expected shares between 0 and 1, got {wrong[0]:g}")
     names = [checked(name, [*ensemble.samples]) for name in (ensemble.samples if columns is None else columns)]
@@ -58,22 +58,24 @@ def ensemble_plot(
     title = f"{called(ensemble.title, ensemble.model)}: {counted(len(times), 'run')}"
     if failed := int(ensemble.failed.sum()):
         title += f", {failed:,} of which did not reach the end"
-    _draw(path, latest, {name: Spread.of(table, shares) for name, table in tables.items()}, title)
+    spreads = {label(name, ensemble.units): Spread.of(table, shares) for name, table in tables.items()}
+    who = "the runs that have it" if any(np.isnan(table).any() for table in tables.values()) else "the runs"
+    _draw(path, latest, spreads, title, time_label(ensemble.units), who)
 
 
 @to_file
-def _draw(times: Array, spreads: dict[str, Spread], title: str) -> Figure:
+def _draw(times: Array, spreads: dict[str, Spread], title: str, time: str, who: str) -> Figure:
     figure = empty(9, 1.3 + 2.4 * len(spreads))
     axes = figure.subplots(len(spreads), 1, squeeze=False, sharex=True)[:, 0]
     for axis, (name, spread) in zip(axes, spreads.items(), strict=True):
         for k, (share, (low, high)) in enumerate(spread.bands.items()):
             alpha = 0.2 + 0.25 * k / max(1, len(spread.bands) - 1)
-            label = f"{100 * share:.3g} % of the runs"
-            axis.fill_between(times, low, high, color=PALETTE[5], alpha=alpha, linewidth=0, label=label)
+            held = f"{100 * share:.3g} % of {who}"
+            axis.fill_between(times, low, high, color=PALETTE[5], alpha=alpha, linewidth=0, label=held)
         axis.plot(times, spread.median, color=PALETTE[5], linewidth=1.4, label="median")
         axis.set_ylabel(name, parse_math=False)
         axis.margins(x=0)
-    axes[-1].set_xlabel("time t")
+    axes[-1].set_xlabel(time, parse_math=False)
     figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
     legend_below(figure, axes[0].get_legend_handles_labels()[0], 9.0)
     return figure

@@ -92,6 +92,7 @@ class Picture:
         Raises UsageError: as :meth:`check`, or there is nothing to draw.
         """
         from hsdsl.analysis.plot import analyses as plots
+        from hsdsl.analysis.plot.style import time_label
 
         self.check(sweep.manifest)
         fixed = self.slice(sweep.manifest)
@@ -105,7 +106,7 @@ class Picture:
         axes = [_axis(sweep, name, rows) for name in sweep.manifest.variation.names if name not in fixed]
         if self.over:
             curves = [each for each, kept in zip(_curves(sweep, column), rows, strict=True) if kept]
-            plots.plot_family(path, curves, axes[0], label, title)
+            plots.plot_family(path, curves, axes[0], label, title, time_label(sweep.manifest.units))
         elif column.partition(".")[0] in LISTS:
             values, where = _dots(sweep, column, self.tail)
             values, where = values[rows[where]], (np.cumsum(rows) - 1)[where[rows[where]]]

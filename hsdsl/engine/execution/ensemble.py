@@ -83,7 +83,8 @@ class Ensemble:
     warnings : array of str
         The codes of the runs' own warnings (`errors.WARNINGS`), separated by spaces; empty if there are none.
         They concern walls that were not checked, motion along guards, limits of accumulating transitions, sliding, and
-        waits in strips. The other codes need a verdict: ``ensemble.run(...).warnings``.
+        waits in strips; and ranges of `initial` of which the runs take the centre (``HS707``). The other codes need a
+        verdict: ``ensemble.run(...).warnings``.
     transition_times : array, shape (..., n)
         The times of the first n transitions, for a positive n; not-a-number if fewer were made.
     sample_times : array, shape (..., n)
@@ -91,6 +92,8 @@ class Ensemble:
         The states and outputs at these times by name; not-a-number beyond a run's end; empty without sample times.
     transition_table : TransitionTable or None
         Every transition, if they were kept.
+    units : mapping
+        The units of states, of outputs, and of time by ``t``, for pictures.
     """
 
     model: str
@@ -115,6 +118,7 @@ class Ensemble:
     transition_table: TransitionTable | None = field(repr=False)
     again: Callable[[tuple[int, ...]], Execution] = field(repr=False)
     title: str | None = None
+    units: Mapping[str, str] = field(default_factory=dict[str, str], repr=False)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {reason}" for reason, count in self.reasons.items())
@@ -261,7 +265,7 @@ def _runs(ensemble: Ensemble) -> tuple[Array, dict[str, Array]]:
 
 def _samples(ensemble: Ensemble) -> tuple[Array, dict[str, Array]]:
     if not ensemble.samples:
-        raise UsageError("the ensemble has no samples", "give samples= to model.ensemble")
+        raise UsageError("the ensemble has no samples", "give samples=300 to `ensemble`")
     count = ensemble.stop.size
     times = np.broadcast_to(ensemble.sample_times, next(iter(ensemble.samples.values())).shape).reshape(count, -1)
     instances = np.repeat(np.arange(count), times.shape[1])

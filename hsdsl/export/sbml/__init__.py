@@ -46,8 +46,9 @@ def _system(source: Source) -> HybridSystem:
     """The system, with events as conditions; refused where SBML cannot keep it."""
     system = source.system
     if system.inputs:
-        hint = "write it as an expression of time"
-        raise UsageError(f"SBML has no sampled inputs, and `{system.inputs[0].name}` is one", hint)
+        name = system.inputs[0].name
+        hint = f"write it as an expression of time, for example `let: {{{name}: sin(t)}}` without the input"
+        raise UsageError(f"SBML has no sampled inputs, and `{name}` is one", hint)
     if not any(edge.of_event for edge in system.edges):
         return system
     if len(system.modes) > 1:

@@ -11,6 +11,7 @@ from typer import Argument, Option
 import hsdsl
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import counted
+from hsdsl.base.parts import written_edges, written_modes
 from hsdsl.export import ABOUT, Modes, check_folder, check_scheme, files_of, source_of, write
 from hsdsl.export import check_target as check_known
 from hsdsl.interface.cli.console import print_json, say
@@ -123,11 +124,12 @@ def import_(
             return
         with replacing(out) as target:
             target.write(text.encode())
-        edges = sum(len(mode.edges) for mode in system.modes)
+        modes = written_modes(system.modes)
+        edges = sum(len(written_edges(mode.edges)) for mode in modes)
         if json:
-            print_json({"file": str(out), "modes": len(system.modes), "transitions": edges})
+            print_json({"file": str(out), "modes": len(modes), "transitions": edges})
         elif not quiet:
-            say(f"wrote {out}: {counted(len(system.modes), 'mode')}, {counted(edges, 'transition')}")
+            say(f"wrote {out}: {counted(len(modes), 'mode')}, {counted(edges, 'transition')}")
 
 
 def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool, at: list[str]) -> tuple[str, HybridSystem]:
@@ -144,11 +146,16 @@ def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool, at:
     given = [name for name, value in (("--cfg", cfg), ("--urgent", urgent), ("--at", at)) if value]
     if given:
         raise UsageError(f"{given[0]} is for models of SpaceEx, and {file} is one of SBML")
-    text = sbml.imported(root, until)
     try:
-        return text, loads(text).system
+        text = sbml.imported(root, until or "1")  # any end, so that errors of the file are found without one as well
+        try:
+            system = loads(text).system
+        except ModelError as error:
+            raise sbml.placed(error, text, root) from None
     except ModelError as error:
-        raise sbml.placed(error, text, root) from None
+        end = root.fault("HS202", "the end of the run is not given", "SBML does not say it: give --until")
+        raise ModelError([*error.diagnostics, *([] if until else [end])]) from None
+    return (text if until else sbml.imported(root)), system
 
 
 NOTHING = (

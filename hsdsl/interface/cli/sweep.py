@@ -95,7 +95,10 @@ def sweep(
         if target is not None:
             _draw(found, target, picture, plot is not None or bool(given(**drawing)))
         rows = {how: getattr(found, how)(column) for how, column in ranked.items() if column}
-        answer.give(lambda: found.as_json() | rows, lambda: "\n".join([found.summary, *_listed(found, rows, ranked)]))
+        summary = [] if answer.quiet else [found.summary]
+        listed = "\n".join([*summary, *_listed(found, rows, ranked)])
+        asked = answer._replace(quiet=answer.quiet and not rows)  # a list that was asked for is no summary
+        asked.give(lambda: found.as_json() | rows, lambda: listed.lstrip("\n"))
 
 
 def given(**options: Any) -> dict[str, Any]:

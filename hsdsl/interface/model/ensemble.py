@@ -44,6 +44,7 @@ from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.compiled import CompiledPlan
 from hsdsl.engine.simulate.ensemble import CompiledEnsemble, Instances, Kept, Logged
 from hsdsl.engine.simulate.input_segments import Timeline
+from hsdsl.engine.simulate.stops import SENTENCES
 from hsdsl.mathematics.program import Routines
 
 if TYPE_CHECKING:
@@ -171,7 +172,7 @@ class PreparedEnsemble:
             state=columns(zip(self.names, final.T, strict=True)),
             outputs=columns((name, kept.outputs[:, i]) for i, name in enumerate(program.outputs)),
             transitions=placed(kept.transitions, 0),
-            warnings=placed(kept.noted.astype(str), ""),
+            warnings=placed(self._codes(kept.noted.astype(str)), ""),
             transition_times=placed(kept.crossed, math.nan),
             sample_times=placed(self.instances.time, math.nan),
             samples=columns(sampled if self.instances.time.shape[1] else ()),
@@ -180,7 +181,14 @@ class PreparedEnsemble:
             transition_table=self._transition_table(kept, placed(kept.transitions, 0)) if kept.logs else None,
             again=self.request,
             title=self.base.program.title,
+            units=self.base.program.units,
         )
+
+    def _codes(self, noted: Array) -> Array:
+        """The codes of warnings, with that of initial ranges of which the runs take the centre."""
+        given = {*self.request.call["initial"], *self.request.arrays(initial=True)}
+        centred = any(name not in given for name in self.base.program.ranges)
+        return np.char.strip(np.char.add(noted, f" {SENTENCES['assumed'][0]}")) if centred else noted
 
     def _transition_table(self, kept: Kept, counts: Array) -> TransitionTable:
         made, *around = kept.logged()

@@ -35,6 +35,8 @@ _FOREIGN_WORDS = ("if", "else", "for", "in", "is", "lambda", "then", "AND", "OR"
 _UNITS = frozenset(TABLES["units"]["names"].split())
 _QUANTITY = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*((?:[^\W\d]+\s*[*/·]\s*)*)([^\W\d]+)\s*")
 _PLAIN_NUMBER = re.compile("[0-9.]{1,20}(?:[eE][-+]?[0-9]{1,2})?")
+_POWERS = {"G": 9, "M": 6, "k": 3, "c": -2, "m": -3, "u": -6, "µ": -6, "n": -9, "p": -12}
+_PREFIXED = re.compile("(?!cd|Pa)([GMkcmuµnp])(Hz|Pa|mol|Ohm|ohm|[mNVAWJFHKLlC])")  # a prefix, and the unit behind it
 _TIMED = {**dict.fromkeys(("after", "at", "wait"), ">="), "before": "<"}
 _COUNTED = ("elapsed", "temporalCount", "count", "timer")
 _REPEATED = ("every", "sample")
@@ -180,14 +182,22 @@ def _side_by_side(number: str, name: str) -> str | None:
         return f"write {number} where t is in {name}, {other}; `units: {{t: {name}}}` says which{or_product}"
     suffixes = TABLES["suffixes"]  # of SPICE
     if power := suffixes.get(name) or suffixes.get(name.lower() if len(name) > 1 else ""):
-        scaled = f"{number}*1e{power}" if re.search("[eE]", number) else f"{number}e{power}"
+        scaled = _scaled(number, power)
         units = "; units belong under `units`" if name in _UNITS else ""
         return f"write {scaled} for the suffix {name}, or {product}{units}"
     if name.lower() not in _UNITS:
         return None
     if len(name) == 1:
         return f"write {product}; units belong under `units`"
+    if prefixed := _PREFIXED.fullmatch(name):
+        prefix, base = prefixed.groups()
+        scaled = _scaled(number, _POWERS[prefix])
+        return f"write {scaled} with the unit {base}, {number} with {name}: units belong under `units`; or {product}"
     return f"write {number} alone, for units belong under `units`; or {product}"
+
+
+def _scaled(number: str, power: object) -> str:
+    return f"{number}*1e{power}" if re.search("[eE]", number) else f"{number}e{power}"
 
 
 def _another_unit_of_time(number: str, name: str) -> str | None:

@@ -182,7 +182,7 @@ def _follow_both_orders(
     proof = None if different else commute(dynamics, first.edge, second.edge, [(*o, *out) for o in overlaps])
     decided = answer.decided
     if proof is not None:
-        where = f"{' where L_f r > 0 on both' if out else ''}{within(proof.searched)}"
+        where = f"{' where r grows along the flow on both (L_f r > 0)' if out else ''}{within(proof.searched)}"
         then = f"they commute{where}: either order leads to the same state"
         decided = "interval" if proof.decided == "interval" and decided == "symbolic" else decided
     else:

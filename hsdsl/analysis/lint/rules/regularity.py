@@ -183,7 +183,8 @@ def tangency(subject: Subject) -> Iterator[Finding]:
             for _ in range(order):
                 derivatives.append(dynamics.rate(part.mode, derivatives[-1]))
             where = at(dynamics, part.mode, answer, derivatives)
-            message = f"the flow meets the guard of '{edge.edge.name}' {where}, where L_f r = 0: {how}"
+            still = "where r does not change along the flow (L_f r = 0)"
+            message = f"the flow meets the guard of '{edge.edge.name}' {where}, {still}: {how}"
             alike.add(rate, Finding(edge.document.when.place.span, message, None, answer.decided))
     yield from alike
 

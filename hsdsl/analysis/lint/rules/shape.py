@@ -168,8 +168,8 @@ def unused_state(subject: Subject) -> Iterator[Finding]:
     if unused:
         one = len(unused) == 1
         message = f"nothing depends on the state{'s' * (not one)} {listed(unused)}"
-        pronoun, purpose = ("it", "a purpose") if one else ("them", "purposes")
-        hint = f"remove {pronoun}, use {pronoun}, or give {pronoun} {purpose} under `outputs`, by another name"
+        pronoun, shown = ("it", "an output with another name") if one else ("them", "outputs with other names")
+        hint = f"remove {pronoun}, use {pronoun}, or show {pronoun}: {shown}"
         yield Finding(unused[0].place.span, message, hint)
 
 

@@ -55,4 +55,4 @@ def imported(root: Element, until: str | None = None, outputs: Mapping[str, str]
 
 def _refused(feature: NotExpressible, element: Element) -> ModelError:
     place = feature.element or element
-    return ModelError([place.fault(FEATURE, f"a model cannot have {feature}", _HINTS.get(str(feature)))])
+    return ModelError([place.fault(FEATURE, feature.message, _HINTS.get(str(feature)))])

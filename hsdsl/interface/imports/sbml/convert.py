@@ -12,7 +12,16 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
-from hsdsl.interface.imports.sbml.document import Event, Node, NotExpressible, Quantity, Reference, SbmlModel, Species
+from hsdsl.interface.imports.sbml.document import (
+    Event,
+    Node,
+    NotExpressible,
+    Quantity,
+    Reference,
+    SbmlModel,
+    Species,
+    Undefined,
+)
 from hsdsl.interface.imports.sbml.formulas import FACTORIAL, Facts, Writer, argument, literal
 
 NOTHING = "a value that nothing gives"
@@ -52,7 +61,7 @@ class Converter(Facts):
     def called(self, name: str) -> str:
         """The name of a function."""
         if name not in self.functions:
-            raise NotExpressible(f"a function that is nowhere: {name}", self.model.element)
+            raise Undefined(f"no function in this file is called '{name}'", self.model.element)
         return self.spelled(name)
 
     def named(self, name: str, node: Node | None = None) -> str:
@@ -61,7 +70,7 @@ class Converter(Facts):
         if name in self.unset or name in self.endless:
             raise NotExpressible(NOTHING if name in self.unset else ENDLESS, element)
         if name not in self.quantities and name not in self.reactions:
-            raise NotExpressible(f"a name that is nowhere: {name}", element)
+            raise Undefined(f"nothing in this file is called '{name}'", element)
         if name in self.references and self.is_number(name):
             return self.start(name)
         return self.spelled(name)

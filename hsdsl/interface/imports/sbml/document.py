@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from hsdsl.base import limits
 from hsdsl.base.errors import ModelError
+from hsdsl.base.names import shown
 from hsdsl.language.source.xml import Element
 
 _SYMBOLS = {"time": "time", "delay": "delay", "avogadro": "avogadro", "rateOf": "rateOf"}  # ends of definition URLs
@@ -20,6 +21,20 @@ class NotExpressible(Exception):
     def __init__(self, feature: str, element: Element | None = None) -> None:
         super().__init__(feature)
         self.element = element
+
+    @property
+    def message(self) -> str:
+        """The sentence of the refusal."""
+        return f"a model cannot have {self}"
+
+
+class Undefined(NotExpressible):
+    """A name that the file uses and nothing in it has: what is called so."""
+
+    @property
+    def message(self) -> str:
+        """The sentence of the refusal."""
+        return str(self)
 
 
 @dataclass(frozen=True)
@@ -314,7 +329,11 @@ class _Reader:
 
     def flag(self, element: Element, key: str, default: bool = False) -> bool:
         text = element.attributes.get(key)
-        return default if text is None else text.strip() in ("true", "1")
+        if text is None:
+            return default
+        if text.strip() not in ("true", "1", "false", "0"):
+            raise ModelError([element.fault("HS331", f"'{key}': expected true or false, got '{shown(text)}'")])
+        return text.strip() in ("true", "1")
 
     def quantities(self, element: Element) -> None:
         """Compartments, parameters and species, in the order in which others may use them."""

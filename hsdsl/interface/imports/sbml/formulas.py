@@ -19,6 +19,7 @@ from hsdsl.interface.imports.sbml.document import (
     Reference,
     SbmlModel,
     Species,
+    Undefined,
     written_out,
 )
 from hsdsl.language.expression.scope import RESERVED
@@ -349,7 +350,7 @@ class Facts:
     def spelled(self, name: str) -> str:
         """What a name is called."""
         if name not in self.spelling:
-            raise NotExpressible(f"a name that is nowhere: {name}", self.model.element)
+            raise Undefined(f"nothing in this file is called '{name}'", self.model.element)
         return self.spelling[name]
 
     def fresh(self, name: str) -> str:
@@ -409,7 +410,7 @@ class Facts:
                 for reference in references:
                     of = self.species.get(reference.species)
                     if of is None:
-                        raise NotExpressible(f"a species that is nowhere: {reference.species}", reference.element)
+                        raise Undefined(f"no species in this file is called '{reference.species}'", reference.element)
                     if not of.boundary and not of.constant:
                         changes.setdefault(reference.species, []).append((sign, reference, name))
         return changes
@@ -463,7 +464,7 @@ class Facts:
         if species is None or species.in_amounts:
             return None
         if species.compartment not in self.quantities:
-            raise NotExpressible(f"a compartment that is nowhere: {species.compartment}", species.element)
+            raise Undefined(f"no compartment in this file is called '{species.compartment}'", species.element)
         return None if self.model.dimensions.get(species.compartment) == 0 else species.compartment
 
     def held_amount(self, name: str) -> bool:

@@ -132,7 +132,7 @@ def _units(converter: Converter) -> dict[str, str]:
             found[converter.spelled(name)] = unit
     known = {name: unit for name, unit in found.items() if unit}
     time = meant(attributes.get("timeUnits", "time"))
-    return {**({"t": time} if time else {}), **known} if known else {}
+    return {**({"t": time} if time else {}), **known} if known or "timeUnits" in attributes else {}
 
 
 def _size(converter: Converter, compartment: str) -> str:
