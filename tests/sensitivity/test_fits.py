@@ -281,8 +281,10 @@ def test_progress(model: Any, samples: dict[str, Any]) -> None:
     ("text", "sentence"),
     [
         ("t,y\n1,2\n", "no state or output 'y'"),
-        ("x,v\n1,2\n", "expected a column t"),
-        ("t,time,x\n1,2,3\n", "expected a column t with the times, got both t and time"),
+        ("x,v\n1,2\n", "expected a column t or time"),
+        ("t;x\n1;2\n", "separate columns by commas"),
+        ("t,x\n1,BLQ\n", "leave the cell empty if nothing was measured"),
+        ("t,time,x\n1,2,3\n", "expected a column t or time with the times, got both t and time"),
         ("t,x\n1,a\n", "column x, row 2, got 'a'"),
         ("t,x\n1\n", "row 2 has 1 cells"),
         ("t,x\n-1,2\n", "not negative"),
@@ -378,3 +380,83 @@ def test_measurements_of_a_state_where_the_run_lacks_it_are_refused() -> None:
     )
     assert np.isnan(found.residuals["T"][0]) and np.isfinite(found.residuals["T"][1:]).all()
     assert "1 measurement," in model.fit({"t": [0.4], "x": [1]}, "rate").summary
+
+
+SKIPPED = """hsdsl: 1
+parameters: {k: {value: 0.9, min: 0.01, max: 1}}
+modes:
+  early:
+    flow: {A: -k*A}
+    transitions:
+      - {name: take, event: t >= 1 and A <= 1.2, to: late, reset: {A: A + 3}}
+      - {name: skip, event: t >= 1 and A > 1.2, to: late}
+  late: {flow: {A: -k*A}}
+initial: {mode: early, A: 2}
+experiment: {until: 4}
+"""
+DOSES = np.array([0.25, 0.5, 1.5, 2.0, 3.0, 4.0])
+
+
+def dosed(k: float) -> Any:
+    """The dose is taken at t = 1 if 2 exp(-k) <= 1.2, from k = log(2/1.2) on."""
+    return 2 * np.exp(-k * DOSES) + (DOSES > 1) * (3 * np.exp(-k * (DOSES - 1)) if k >= np.log(2 / 1.2) else 0)
+
+
+def test_an_interval_ends_where_a_dose_is_skipped() -> None:
+    noise = 0.8 * np.array([1, -1, 1, -1, 1, -1])
+    found = hsdsl.loads(SKIPPED).fit({"t": DOSES, "A": dosed(0.7) + noise}, "k", intervals=0.95, sigma=0.8)
+    assert found.intervals["k"][0] == pytest.approx(np.log(2 / 1.2), rel=1e-3)
+    assert sum("interval of k ends at a jump of the sum: 0.51" in reason for reason in found.nonsmooth) == 1
+    assert "`--starts`" in found.nonsmooth[0]
+
+
+def test_starts_find_the_order_of_transitions() -> None:
+    model, late = hsdsl.loads(SKIPPED), DOSES > 1
+    data = {"t": DOSES[late], "A": dosed(0.3)[late]}
+    wrong, right = (model.fit(data, "k", starts=starts) for starts in (1, 6))
+    assert wrong.deviation > 0.1 and right.values["k"] == pytest.approx(0.3, abs=1e-9)
+    with pytest.raises(UsageError, match="starts: expected at least 1, got 0"):
+        model.fit(data, "k", starts=0)
+
+
+@pytest.mark.parametrize("level", [None, 0.95])
+def test_runs_that_overflow_end_no_fit(level: float | None) -> None:
+    """A negative volume makes a growth that no number holds."""
+    text = """hsdsl: 1
+parameters: {V: 0.002}
+modes: {m: {flow: {A: -A/V}}}
+outputs: {c: A/V}
+initial: {mode: m, A: 1}
+experiment: {until: 4}
+"""
+    with warnings.catch_warnings(action="error"):
+        found = hsdsl.loads(text).fit({"t": [1, 2, 4], "c": [0.2, 0.09, 0.05]}, "V", intervals=level, starts=3)
+    assert np.isfinite(found.values["V"])
+
+
+def test_values_without_a_run_end_no_fit() -> None:
+    """The first state has no root for k < 0.5, where the sum of squares is still below its level."""
+    model = hsdsl.loads(DECAY.replace("x: 1}", "x: sqrt(k - 0.5)}") + "experiment: {until: 1}\n")
+    data = {"t": [0.1, 0.2, 0.3], "x": [0.2, -0.2, 0.3]}
+    found = model.fit(data, "k", intervals=0.95, starts=4)
+    assert found.intervals["k"][0] == pytest.approx(0.5, rel=1e-3)
+    assert any("interval of k ends at a jump" in reason for reason in found.nonsmooth)
+    with pytest.raises(UsageError, match="no finite value"):
+        model.fit(data, "k", parameters={"k": 0.1})
+
+
+def test_a_summary_has_the_digits_that_the_deviation_leaves() -> None:
+    t, x = np.array([1.0, 2.0, 3.0, 4.0]), np.array([2.1, 3.9, 6.2, 7.9])
+    found = hsdsl.loads(LINE + "experiment: {until: 4}\n").fit({"t": t, "x": x}, "a")
+    slope, off = float(t @ x / (t @ t)), x - t * float(t @ x / (t @ t))
+    deviation = float(off @ off / 3 / (t @ t)) ** 0.5
+    assert f"  a  {slope:.3f} +- {deviation:.3f}" in found.summary and 0.01 < deviation < 0.1
+    assert "\nconverged: the " in found.summary
+    assert found.residuals["x"] == pytest.approx(off, abs=1e-6)  # measured minus run
+    for given, line in (
+        (123.4, "a  45680 +- 120"),
+        (0.0996, "a  45678.00 +- 0.10"),
+        (3e-9, "a  45678.0000000 +- 3.0e-09"),
+    ):
+        shown = replace(found, values={"a": 45678.0}, covariance=np.array([[given**2]]), at_bound=())
+        assert line in shown.summary

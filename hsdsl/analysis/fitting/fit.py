@@ -32,7 +32,7 @@ class Fit:
         The covariance of the values in their order. It follows from the standard deviations of the measurements, if
         these were given, or else from the residuals. It is infinite if the measurements do not determine a value.
     residuals : dict of array
-        The run minus each measurement, by column; NaN if nothing was measured, or the run has ended.
+        Each measurement minus the run, by column; NaN if nothing was measured, or the run has ended.
     deviation : float
         The root of the weighted sum of squared residuals per degree of freedom.
     success : bool
@@ -107,9 +107,9 @@ class Fit:
         for name, value in self.values.items():
             deviation = self.deviations[name]
             determined = bool(np.isfinite(deviation))
-            known = f"+- {number(deviation, 3)}" if determined else "not determined by the measurements"
+            known = f"+- {_digits(deviation, 2)}" if determined else "not determined by the measurements"
             bound = ", at its bound" if name in self.at_bound else ""
-            yield f"  {name:{width}}  {number(value, 12 if determined else 3)} {known}{self._interval(name)}{bound}"
+            yield f"  {name:{width}}  {self._rounded(name, value)} {known}{self._interval(name)}{bound}"
         for name in self.at_bound:
             which = "min" if self.values[name] == self.bounds[name][0] else "max"
             yield f"{name} is at its {which}: a fit without this bound would be closer to the measurements"
@@ -117,20 +117,30 @@ class Fit:
         yield f"{'converged' if self.success else 'did not converge'}: {self.message}"
         yield from (f"not smooth: {reason}" for reason in condensed(self.nonsmooth))
 
+    def _rounded(self, name: str, x: float) -> str:
+        """Write a value, or an end of its interval, as precisely as its deviation to two digits."""
+        deviation = self.deviations[name]
+        if not np.isfinite(deviation) or x == 0:
+            return number(x, 3)
+        if deviation == 0:
+            return number(x, MOST_DIGITS)
+        place = [int(f"{each:.1e}".partition("e")[2]) for each in (x, deviation)]
+        return _digits(x, min(max(1, place[0] - place[1] + 2), MOST_DIGITS))
+
     def _interval(self, name: str) -> str:
         if name not in self.intervals:
             return ""
         ends = [
-            "unbounded" if isinf(end) else number(end, 6) + " (its bound)" * (end in self.bounds[name])
+            "unbounded" if isinf(end) else self._rounded(name, end) + " (its bound)" * (end in self.bounds[name])
             for end in self.intervals[name]
         ]
         return f"; {100 * (self.level or 0):.4g} %: {ends[0]} to {ends[1]}"
 
     def plot_residuals(self, path: str | os.PathLike[str]) -> None:
-        """Draw the residuals to a .png or .svg file: the run minus the measurements over time, and how often."""
+        """Draw the residuals to a .png or .svg file: the measurements minus the run over time, and how often."""
         from hsdsl.analysis.plot.fits import plot_residuals
 
-        heading = f"the run minus {counted(self.measured.count, 'measurement')}; dotted: transitions"
+        heading = f"{counted(self.measured.count, 'measurement')} minus the run; dotted: transitions"
         plot_residuals(path, self.execution, self.measured.times, self.residuals, self.units, heading)
 
     def plot(self, path: str | os.PathLike[str]) -> None:
@@ -144,6 +154,16 @@ class Fit:
         plot_measured(path, self.execution, self.measured.times, self.measured.columns, self.units, heading)
 
 
+def _digits(x: float, digits: int) -> str:
+    """Write a number to so many significant digits, zeros at its end among them."""
+    place = int(f"{x:.{digits - 1}e}".partition("e")[2])
+    if digits <= place + 1 <= FIXED_DIGITS:
+        return f"{round(x, digits - 1 - place):.0f}"
+    return f"{x:#.{digits}g}".replace(".e", "e")
+
+
+MOST_DIGITS = 12
+FIXED_DIGITS = 6  # before the point; longer numbers have an exponent
 TIMES = ("t", "time")
 LEAST_ROWS = 1
 
@@ -178,7 +198,8 @@ def measurements(given: Any, known: Sequence[str]) -> Measurements:
     timed = [c for c in columns if c.lower() in TIMES and c not in known]
     if len(timed) != 1:
         got = "both " + " and ".join(timed) if timed else ", ".join(columns) or "none"
-        raise UsageError(f"{name}: expected a column t with the times, got {got}")
+        hint = "separate columns by commas" if any(";" in c for c in columns) else None
+        raise UsageError(f"{name}: expected a column t or time with the times, got {got}", hint)
     (time,) = timed
     measured = [c for c in columns if c != time and c not in HYBRID_TIME]
     for column in measured:
@@ -247,4 +268,7 @@ def _numbers(name: str, column: str, cells: Sequence[Any]) -> Array:
 
 
 def _no_number(name: str, column: str, k: int, cell: Any) -> UsageError:
-    return UsageError(f"{name}: expected a finite number in column {column}, row {k + 2}, got '{shown(str(cell))}'")
+    hint = "leave the cell empty if nothing was measured"
+    return UsageError(
+        f"{name}: expected a finite number in column {column}, row {k + 2}, got '{shown(str(cell))}'", hint
+    )

@@ -27,6 +27,19 @@ LARGEST = 1e100  # the weighted size of a column: its residuals have squares
 MOST_NAMED = 3
 AT_BOUND = 1e-12  # of a value: how near it comes to the bound that keeps it
 MOST_CROSSED = 32  # measurements that transitions pass
+FACTOR = 4.0  # by which first guesses of values without bounds differ at most from the given one
+SEED = 20260101  # of first guesses
+ENDS = (  # by SciPy's status
+    "the number of runs is at its limit",
+    "the sum of squares is level",
+    "the sum of squares no longer changes",
+    "the values no longer change",
+    "neither the values nor the sum of squares change any more",
+)
+OTHERS = (
+    "runs with other values make other transitions: this fit is the best for this order of transitions; "
+    "try other first guesses (`--starts`)"
+)
 
 
 def fitted(
@@ -35,8 +48,11 @@ def fitted(
     sigma: bool,
     scales: Mapping[str, float],
     level: float | None = None,
+    starts: int = 1,
 ) -> Fit:
     """Fit; ``sigma`` says that weights are inverse standard deviations, ``level`` is that of profile intervals.
+
+    ``starts`` counts the first guesses, the given one among them.
 
     A scale of zero is replaced by the size of the state in the first run.
 
@@ -55,17 +71,41 @@ def fitted(
         begun = _beginning(objective, share, begun, bounds, scales)
     if not np.array_equal(begun, first):
         results.append(_solved(objective, begun, bounds, scales))
+    guesses = _guesses(first, bounds, scales, starts - 1)
+    results += [_solved(objective, guess, bounds, scales) for guess in guesses]
     best = min(results, key=lambda result: result.cost)
     found = _fit(objective, best, bounds, sigma)
     if level is None:
-        return found
+        return replace(found, nonsmooth=(*_other_order(objective, found), *found.nonsmooth))
     from hsdsl.analysis.fitting.profile import Profile, rise_of
 
     sizes = np.array([scales[name] for name in found.values])
     profile = Profile(objective, _minimum, best.x, np.array([*bounds.values()], float), sizes, 2 * float(best.cost))
     rise = rise_of(level, found.deviation**2, objective.measured.count - len(sizes), sigma)
     known = profile.intervals([*found.values], found.covariance, rise)
-    return replace(found, level=level, intervals=known, evaluations=objective.evaluations)
+    ends = {name: [f"{end:.4g}" for k, end in profile.jumps if k == i] for i, name in enumerate(known)}
+    jumps = (f"the interval of {name} ends at a jump of the sum: {', '.join(at)}" for name, at in ends.items() if at)
+    reasons = (*_other_order(objective, found), *jumps, *found.nonsmooth)
+    return replace(found, level=level, intervals=known, evaluations=objective.evaluations, nonsmooth=reasons)
+
+
+def _guesses(first: Array, bounds: Mapping[str, tuple[float, float]], scales: Mapping[str, float], n: int) -> Array:
+    """Draw n first guesses: within finite bounds, by their logarithms if these are positive, else by a factor."""
+    draw, found = np.random.default_rng(SEED).random((n, len(first))), np.empty((n, len(first)))
+    for k, (value, (low, high), scale) in enumerate(zip(first, bounds.values(), scales.values(), strict=True)):
+        share = draw[:, k]
+        if np.isfinite(high - low):
+            found[:, k] = low * (high / low) ** share if low > 0 else low + (high - low) * share
+        else:
+            drawn = value * FACTOR ** (2 * share - 1) if value else scale * (2 * share - 1)
+            found[:, k] = np.clip(drawn, low, high)
+    return found
+
+
+def _other_order(objective: Objective, found: Fit) -> Sequence[str]:
+    """What to say if runs of the search made other transitions; one more or less at the end makes no other order."""
+    best = tuple(made.edge for made in found.execution.transitions)
+    return [OTHERS] if any(a[: len(best)] != best[: len(a)] for a in objective.orders) else []
 
 
 def _solved(
@@ -100,7 +140,8 @@ def _minimum(objective: Any, first: Array, limits: Array, sizes: Array) -> Any:
 
     solve: Any = least_squares  # pyright: ignore[reportUnknownVariableType]
     start, within = np.clip(first, lower, upper) / sizes, (lower / sizes, upper / sizes)
-    result: Any = solve(residuals, start, jac=slopes, bounds=within, ftol=PRECISE, xtol=PRECISE, gtol=PRECISE)
+    with np.errstate(all="ignore"):  # squares of runs far off
+        result: Any = solve(residuals, start, jac=slopes, bounds=within, ftol=PRECISE, xtol=PRECISE, gtol=PRECISE)
     shares: Array = np.asarray(result.x, float)
     pushed: Array = np.where(np.asarray(result.grad, float) < 0, upper, lower)  # the sum falls towards it
     at = np.abs(pushed / sizes - shares) <= AT_BOUND * np.maximum(1.0, np.abs(shares))  # SciPy stays inside
@@ -160,7 +201,7 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
     measured = objective.measured.columns
     left_over = {name: np.full(len(times), np.nan) for name in measured}
     for name, column in measured.items():
-        left_over[name][reached] = _column(table, name) - column[reached]
+        left_over[name][reached] = column[reached] - _column(table, name)
     ends = f"the run ends at t = {show(run.times[-1])} ({run.stop.reason}), before the last measurement"
     return Fit(
         values,
@@ -168,7 +209,7 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
         left_over,
         variance**0.5,
         bool(result.success) and bool(reached.all()),
-        str(result.message) if reached.all() else ends,
+        ENDS[int(result.status)] if reached.all() else ends,
         objective.evaluations,
         at,
         (
@@ -225,9 +266,10 @@ TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends bef
 
 @dataclass
 class Objective:
-    """Weighted residuals of runs and their derivatives; the last run is kept.
+    """Weighted differences of runs from measurements, and their derivatives; the last run is kept.
 
-    ``start`` has the values of the names by which runs are changed, ``weights`` a factor for each column.
+    ``start`` has the values of the names by which runs are changed, ``weights`` a factor for each column. ``orders``
+    has the sequences of transitions that runs made.
     """
 
     evaluate: Evaluate
@@ -237,10 +279,11 @@ class Objective:
     progress: Progress | None = None
     evaluations: int = 0
     bumps: list[str] = field(default_factory=list[str])
-    _last: tuple[bytes, Array, Array, Sensitivity] | None = None
+    orders: set[tuple[str, ...]] = field(default_factory=set[tuple[str, ...]])
+    _last: tuple[bytes, Array, Array, Sensitivity | None] | None = None
 
     def residuals(self, x: Array) -> Array:
-        """The residuals of a run with these values, weighted, one behind the other."""
+        """The run with these values minus the measurements, weighted, one behind the other."""
         return self._at(x)[1]
 
     def slopes(self, x: Array) -> Array:
@@ -248,9 +291,18 @@ class Objective:
         return self._at(x)[2]
 
     def run(self, x: Array) -> Sensitivity:
-        return self._at(x)[3]
+        return self._at(x)[3] or self.evaluate(self.named(x), float(self.measured.times.max()))
 
-    def _at(self, x: Array) -> tuple[bytes, Array, Array, Sensitivity]:
+    def tried(self, x: Array, until: float) -> Sensitivity | None:
+        """A run, or None if the model has none with these values; there is one with the first values."""
+        try:
+            return self.evaluate(self.named(x), until)
+        except UsageError:
+            if not self.evaluations:
+                raise
+            return None
+
+    def _at(self, x: Array) -> tuple[bytes, Array, Array, Sensitivity | None]:
         key = np.asarray(x, float).tobytes()
         if self._last is None or self._last[0] != key:
             self._last = (key, *self._computed(x))
@@ -269,13 +321,15 @@ class Objective:
         """Values by name."""
         return dict(zip(self.start, np.asarray(x, float).tolist(), strict=True))
 
-    def _computed(self, x: Array) -> tuple[Array, Array, Sensitivity]:
+    def _computed(self, x: Array) -> tuple[Array, Array, Sensitivity | None]:
         times = self.measured.times
-        found = self.evaluate(self.named(x), float(times.max()))
-        if found.breaks:
+        found, reached, table = self.tried(x, float(times.max())), np.zeros(len(times), bool), None
+        if found:
             self.bumps += [reason for _, reason in found.breaks if reason not in self.bumps]
-        reached = times <= float(found.execution.times[-1])
-        table = found.as_made().sample(times[reached]) if reached.any() else None
+            reached = times <= float(found.execution.times[-1])
+            if reached.all():
+                self.orders.add(tuple(made.edge for made in found.execution.transitions))
+            table = found.as_made().sample(times[reached]) if reached.any() else None
         residuals: list[Array] = []
         slopes: list[Array] = []
         for name, column in self.measured.columns.items():
@@ -284,8 +338,10 @@ class Objective:
             off, moves = np.full(len(times), far), np.zeros((len(times), len(self.start)))
             if table is not None and name in table.values:
                 there = np.asarray(table.values[name], float)
-                off[reached] = np.where(np.isfinite(there), weight * (there - column[reached]), far)
-                moves[reached] = np.nan_to_num(weight * np.asarray(table.slopes[name], float), posinf=0, neginf=0)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    apart, by = weight * (there - column[reached]), weight * np.asarray(table.slopes[name], float)
+                off[reached] = np.where(np.isfinite(there), np.clip(apart, -LARGEST, LARGEST), far)
+                moves[reached] = np.where(np.abs(by) < LARGEST, by, 0)
             residuals.append(off[known])
             slopes.append(moves[known])
         return np.concatenate(residuals), np.concatenate(slopes), found
@@ -317,7 +373,9 @@ def wrong_sides(objective: Objective, x: Array) -> list[WrongSide]:
     The run goes on for a while, since its next transition may be one that was measured.
     """
     measured, there = objective.measured, list[WrongSide]()
-    found = objective.evaluate(objective.named(x), LONGER * float(measured.times.max()))
+    found = objective.tried(x, LONGER * float(measured.times.max()))
+    if found is None:
+        return there
     end = float(found.execution.times[-1])
     for made, moves in zip(found.execution.transitions, found.as_made().transitions, strict=True):
         slope, time = np.array([moves.time[by] for by in found.wrt], float), float(made.time)

@@ -7,7 +7,7 @@ Nonlinear Regression Analysis, 1988, section 6.1).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from hsdsl.engine.execution import Array
 
 Minimum = Callable[[Any, Array, Array, Array], Any]
 PRECISE = 1e-4  # of the distance from the value to an end: how well ends are located
+STEEP = 0.1  # of the root of the rise: the least change across an end, as far as it is located, that is a jump
 FURTHEST = 12  # doublings of the first step in which an end is sought
 
 
@@ -60,6 +61,7 @@ class Profile:
     limits: Array
     sizes: Array
     total: float
+    jumps: list[tuple[int, float]] = field(default_factory=list[tuple[int, float]])  # ends at which the sum jumps
 
     def interval(self, k: int, step: float, rise: float) -> tuple[float, float]:
         """Where the sum of squares has risen by so much; a bound, or infinite, where it does not rise as far."""
@@ -68,16 +70,32 @@ class Profile:
     def _end(self, k: int, step: float, rise: float) -> float:
         near, others = float(self.best[k]), np.delete(self.best, k)
         bound = float(self.limits[k, int(step > 0)])
+        known = {near: -(rise**0.5)}  # a fit from other values may find another minimum, and change a sign
 
         def excess(value: float) -> float:
             """Signed roots of the sums are near to a line, where these themselves are near to a parabola."""
             nonlocal others
-            pinned = Pinned(self.objective, k, value)
-            if len(others):
-                keep = np.delete(np.arange(len(self.best)), k)
-                others = self.minimum(pinned, others, self.limits[keep], self.sizes[keep]).x
-            found = float(np.sum(pinned.residuals(others) ** 2))
-            return max(found - self.total, 0.0) ** 0.5 - rise**0.5
+            if value not in known:
+                pinned, best = Pinned(self.objective, k, value), others
+                if len(others):
+                    keep = np.delete(np.arange(len(self.best)), k)
+                    best = self.minimum(pinned, others, self.limits[keep], self.sizes[keep]).x
+                found = float(np.sum(pinned.residuals(best) ** 2))
+                known[value] = max(found - self.total, 0.0) ** 0.5 - rise**0.5
+                others = best if known[value] <= 0 else others  # a run that failed leads nowhere
+            return known[value]
+
+        def located(inside: float, outside: float) -> float:
+            """The end between two values, at which the sum may jump over its level."""
+            solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
+            end = float(solve(excess, inside, outside, xtol=PRECISE * abs(outside - near), rtol=1e-12))
+            below, above = (
+                known[min((v for v in known if (known[v] > 0) == over), key=lambda v: abs(v - end))]
+                for over in (False, True)
+            )
+            if above - below > STEEP * rise**0.5 > 0 and excess(end) != 0:
+                self.jumps.append((k, end))
+            return end
 
         inside = near
         for doubled in range(FURTHEST):
@@ -85,8 +103,7 @@ class Profile:
             beyond = abs(bound - near) <= abs(value - near)
             value = bound if beyond else value
             if value != inside and excess(value) > 0:
-                solve: Any = brentq  # pyright: ignore[reportUnknownVariableType]
-                return float(solve(excess, inside, value, xtol=PRECISE * abs(value - near), rtol=1e-12))
+                return located(inside, value)
             if beyond:
                 return bound
             inside = value

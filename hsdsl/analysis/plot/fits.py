@@ -60,7 +60,7 @@ def plot_residuals(
             axis.axvline(time, color=FAINT, linewidth=0.9, linestyle="dotted")
         often.hist(known, bins="auto", orientation="horizontal", color=PALETTE[1])
         often.tick_params(labelleft=False)
-        axis.set_ylabel(label(name, units), parse_math=False)
+        axis.set_ylabel("residual of " + label(name, units), parse_math=False)
     axes[-1, 0].set_xlabel(time_label(units), parse_math=False)
     axes[-1, 1].set_xlabel("measurements")
     figure.suptitle(words.heading(run), x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)

@@ -121,6 +121,7 @@ SET_OF_FITS = (
 )
 SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
 WEIGHT = "The weight of a column. Default: one over its largest size. May be repeated."
+STARTS = "Begin from N first guesses, and keep the best: the given one, and others within the bounds."
 INTERVALS = "Find intervals of this level, such as 0.95, by profile likelihood: many further runs."
 Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file with columns t or time, states and outputs.")]
 
@@ -135,6 +136,7 @@ def fit(
     overrides: Annotated[list[str] | None, overriding(SET_OF_FITS)] = None,
     located: Located,
     intervals: Annotated[float | None, option("LEVEL", INTERVALS)] = None,
+    starts: Annotated[int, option("N", STARTS)] = 1,
     plot: Annotated[Path | None, option("FILE", "Draw measurements and run: .png or .svg.")] = None,
     residuals: Annotated[Path | None, option("FILE", "Draw the residuals: .png or .svg.")] = None,
     answer: Answer,
@@ -146,7 +148,7 @@ def fit(
         with progress(answer.hidden) as show:
             watch = show and partial(_show_fit, show)
             columns = {"sigma": _by_column("--sigma", sigma), "weights": _by_column("--weight", weight)}
-            call = located.settings(overrides, intervals=intervals, **columns)
+            call = located.settings(overrides, intervals=intervals, starts=starts, **columns)
             found = hsdsl.load(model).fit(data, wrt, progress=watch, **call)
         draw(found, plot)
         if residuals is not None:

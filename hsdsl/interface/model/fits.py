@@ -33,6 +33,7 @@ def fit(
     sigma: Mapping[str, float] | float | None,
     weights: Mapping[str, float] | float | None,
     level: float | None,
+    starts: int,
     progress: Progress | None,
     arguments: Mapping[str, Any],
 ) -> Fit:
@@ -42,6 +43,8 @@ def fit(
         raise UsageError(f"intervals: expected a level between 0 and 1, got {level:g}", "for example 0.95")
     if sigma and weights:
         raise UsageError("expected sigma or weights, got both", "a weight is one over a standard deviation")
+    if starts < 1:
+        raise UsageError(f"starts: expected at least 1, got {starts}")
     measured = measurements(data, model.columns)
     values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(arguments, "parameters", model.program))
     by, start = start_by(wrt, arguments, values)
@@ -59,7 +62,7 @@ def fit(
         progress,
     )
     scales = {label: abs(value) or _span(bounds[label]) for label, value in start.items()}
-    return replace(fitted(objective, bounds, bool(sigma), scales, level), units=model.program.units)
+    return replace(fitted(objective, bounds, bool(sigma), scales, level, starts), units=model.program.units)
 
 
 def _evaluate(model: Runs, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:

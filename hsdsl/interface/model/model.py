@@ -203,6 +203,7 @@ class Model(Runs):
         sigma: Mapping[str, float] | float | None = None,
         weights: Mapping[str, float] | float | None = None,
         intervals: float | None = None,
+        starts: int = 1,
         progress: Callable[[int, Mapping[str, float], float], None] | None = None,
         **arguments: Any,
     ) -> Fit:
@@ -221,6 +222,9 @@ class Model(Runs):
             Weights of columns instead; by default one over the largest size of each.
         intervals : float, optional
             The level, such as 0.95, of intervals by profile likelihood: many further runs.
+        starts : int, optional
+            How many first guesses: the given one, and others drawn within the bounds of the file, or by a factor of up
+            to 4 where there are none. The best fit is kept.
         progress : callable, optional
             Called after every run with the number of runs, the values, and the weighted sum of squares.
         **arguments
@@ -232,7 +236,7 @@ class Model(Runs):
 
         with in_notebook() as show:
             progress = progress or (show and (lambda runs, _, squares: show(lambda: f"{runs} runs, {squares:.6g}")))
-            return fit(self._sliding_for(arguments), data, wrt, sigma, weights, intervals, progress, arguments)
+            return fit(self._sliding_for(arguments), data, wrt, sigma, weights, intervals, starts, progress, arguments)
 
     def stream(
         self,
