@@ -18,7 +18,7 @@
 #include "span.h"
 
 #include "taylor.c"
-#if defined(__GNUC__) && !defined(__clang__)
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE_SIZE__)
 #pragma GCC push_options
 #pragma GCC optimize("O2")
 #endif
@@ -29,7 +29,7 @@
 #include "radau.c"
 /* by hand again */
 #include "implicit.c"
-#if defined(__GNUC__) && !defined(__clang__)
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__OPTIMIZE_SIZE__)
 #pragma GCC pop_options
 #endif
 #include "stepper.c"
@@ -174,55 +174,54 @@ static void lay_out_located(hs_run *run, hs_store *store) {
   run->curves.certain = take(store, (int64_t)MOST_PARTS * m, sizeof(int));
 }
 
-static hs_run make_run(const hs_model *model, const hs_method *method, hs_scheme scheme, hs_store *store) {
+static void make_run(hs_run *run, const hs_model *model, const hs_method *method, hs_scheme scheme, hs_store *store) {
   static const hs_run empty;
-  hs_run run = empty;
-  run.model = model;
-  run.method = method;
-  run.width = model->width;
-  lay_out(&run, store);
-  if (scheme == HS_LOCATED) lay_out_located(&run, store);
-  return run;
+  *run = empty;
+  run->model = model;
+  run->method = method;
+  run->width = model->width;
+  lay_out(run, store);
+  if (scheme == HS_LOCATED) lay_out_located(run, store);
 }
 
 /* How many numbers a run's workspace needs. */
 int64_t hs_workspace(const hs_model *model, const hs_method *method, hs_scheme scheme) {
   hs_store store = {0, 0};
-  make_run(model, method, scheme, &store);
+  hs_run run;
+  make_run(&run, model, method, scheme, &store);
   return store.used;
 }
 
 /* A run of a task in its workspace, before it enters its first mode. */
-static hs_run open_run(hs_task *task) {
+static void open_run(hs_run *run, hs_task *task) {
   hs_store store = {task->workspace, 0};
-  hs_run run = make_run(task->model, task->method, (hs_scheme)task->settings.scheme, &store);
+  make_run(run, task->model, task->method, (hs_scheme)task->settings.scheme, &store);
   hs_chunk *const chunk = &task->chunk;
   chunk->rows = chunk->arcs = chunk->transitions = chunk->alternatives_used = chunk->notes = 0;
   task->now = 0.0;
   task->made = task->entries = 0;
-  run.task = task;
-  run.pause = INFINITY;
-  run.epsilon = task->settings.relaxation;
-  run.until = task->settings.until;
-  run.control.h = task->settings.step;
-  run.control.tolerance = task->settings.tolerance;
-  run.control.largest = task->settings.largest;
-  run.control.least = hs_max(task->settings.tolerance, sqrt((hs_real)HS_UNIT)) * task->settings.largest;
-  run.control.order = task->method->order;
-  run.control.failed_at = NAN;
-  run.control.implicit = is_implicit(task->method);
-  begin_implicit(&run);
-  run.steps_to_poll = run.poll_steps = 32;
-  run.full_queue = -1;
-  copy(run.x, task->x, task->dimension);
-  for (int s = 0; s < run.width; s++) run.scale[s] = 0.0;
-  for (int i = 0; i < run.model->states; i++) run.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
-  return run;
+  run->task = task;
+  run->pause = INFINITY;
+  run->epsilon = task->settings.relaxation;
+  run->until = task->settings.until;
+  run->control.h = task->settings.step;
+  run->control.tolerance = task->settings.tolerance;
+  run->control.largest = task->settings.largest;
+  run->control.least = hs_max(task->settings.tolerance, sqrt((hs_real)HS_UNIT)) * task->settings.largest;
+  run->control.order = task->method->order;
+  run->control.failed_at = NAN;
+  run->control.implicit = is_implicit(task->method);
+  begin_implicit(run);
+  run->steps_to_poll = run->poll_steps = 32;
+  run->full_queue = -1;
+  copy(run->x, task->x, task->dimension);
+  for (int s = 0; s < run->width; s++) run->scale[s] = 0.0;
+  for (int i = 0; i < run->model->states; i++) run->known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
 }
 
 /* Enter the task's mode. */
 static int begin_run(hs_run *run, hs_task *task) {
-  *run = open_run(task);
+  open_run(run, task);
   start_sizes(run, task->mode, 0.0);
   return enter(run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
 }
@@ -307,14 +306,16 @@ static void restore(hs_run *run, hs_pause *pause) {
 }
 
 void hs_begin(hs_task *task, hs_pause *pause, hs_time start) {
-  hs_run run = open_run(task);
+  hs_run run;
+  open_run(&run, task);
   start_sizes(&run, task->mode, start);
   const int outcome = enter(&run, task->mode, task->dimension, start, 0, 0.0, 0, start);
   save(&run, pause, outcome == GOES_ON ? PAUSED : outcome);
 }
 
 void hs_go_on(hs_task *task, hs_pause *pause, hs_time until, int changed, int after_jump) {
-  hs_run run = open_run(task);
+  hs_run run;
+  open_run(&run, task);
   restore(&run, pause);
   run.pause = until;
   if (run.until < until + 2 * run.epsilon) run.until = until + 2 * run.epsilon; /* strips end behind it */

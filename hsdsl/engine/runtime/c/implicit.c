@@ -38,6 +38,7 @@ HS_INLINE int implicit_step_in(hs_run *run, hs_blocks of, hs_time t, hs_real h) 
 static int implicit_step(hs_run *run, hs_time t, hs_real h) {
   const hs_mode *const mode = run->here.table;
   const hs_blocks of = blocks_of(mode);
+#if !defined(__OPTIMIZE_SIZE__)
   if (!columns_of(mode) && of.n == 2) return implicit_step_in(run, of_size(of, 2, 0), t, h);
   if (!columns_of(mode) && of.n == 3) return implicit_step_in(run, of_size(of, 3, 0), t, h);
   if (columns_of(mode) && of.whole && !of.pattern) {
@@ -45,6 +46,7 @@ static int implicit_step(hs_run *run, hs_time t, hs_real h) {
     if (of.own == 2) return implicit_step_in(run, of_size(of, 2, of.varied->count), t, h);
     if (of.own == 3) return implicit_step_in(run, of_size(of, 3, of.varied->count), t, h);
   }
+#endif
   return implicit_step_in(run, of, t, h);
 }
 
