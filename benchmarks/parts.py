@@ -83,7 +83,7 @@ def measured(path: str, initial: dict[str, float]) -> list[float]:
 
 
 def main() -> None:
-    """Print the rows of rooms that are asked for, or those of the runner."""
+    """Print the requested rows of rooms, or those of the runner."""
     if len(sys.argv) == 1:
         return legs()
     print(f"{'rooms':>6} {'load':>10} {'first run':>11} {'transition':>13} {'memory':>11} {'transitions':>12}")

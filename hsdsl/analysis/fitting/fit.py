@@ -46,7 +46,7 @@ class Fit:
     units : mapping
         The units that the model gives.
     level, intervals : float or None, dict of (float, float)
-        Intervals of this level by profile likelihood, if they were asked for: the values up to which the others can
+        Intervals of this level by profile likelihood, if requested: the values up to which the other values can
         make up for a change. An end is the bound of the file, or infinite, where the measurements do not end it.
     bounds : mapping
         The least and the largest value that the file allows.

@@ -1,7 +1,7 @@
 """Profile likelihood: how far a value can move until the best fit of the others is worse than chance allows.
 
-A covariance takes the sum of squares for a parabola; a profile follows it, and need not be symmetric (Bates and Watts,
-Nonlinear Regression Analysis, 1988, section 6.1).
+A covariance treats the sum of squares as a parabola. A profile follows the sum itself, and may be asymmetric (Bates and
+Watts, Nonlinear Regression Analysis, 1988, section 6.1).
 """
 
 from __future__ import annotations

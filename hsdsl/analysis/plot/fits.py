@@ -1,5 +1,5 @@
 # pyright: reportUnknownMemberType=false
-"""Pictures of fits: measurements with the run fitted to them, and what is left over."""
+"""Pictures of fits: measurements with the run fitted to them, and residuals."""
 
 from __future__ import annotations
 

@@ -267,10 +267,10 @@ def compiled_lanes(program: Program, compiles: bool) -> ctypes.CDLL | None:
 def vectors() -> tuple[str, ...] | None:
     """The flags for the vectors of this processor; None where it has none, or does not say."""
     try:
-        told = Path("/proc/cpuinfo").read_text().split("flags", 1)[-1].split("\n", 1)[0].split()
+        flags = Path("/proc/cpuinfo").read_text().split("flags", 1)[-1].split("\n", 1)[0].split()
     except OSError:
         return None
-    return (f"-m{VECTORS}",) if VECTORS in told else None
+    return (f"-m{VECTORS}",) if VECTORS in flags else None
 
 
 def _content(program: Program) -> str:

@@ -97,8 +97,8 @@ def sweep(
         rows = {how: getattr(found, how)(column) for how, column in ranked.items() if column}
         summary = [] if answer.quiet else [found.summary]
         listed = "\n".join([*summary, *_listed(found, rows, ranked)])
-        asked = answer._replace(quiet=answer.quiet and not rows)  # a list that was asked for is no summary
-        asked.give(lambda: found.as_json() | rows, lambda: listed.lstrip("\n"))
+        shown = answer._replace(quiet=answer.quiet and not rows)  # a requested list is no summary
+        shown.give(lambda: found.as_json() | rows, lambda: listed.lstrip("\n"))
 
 
 def given(**options: Any) -> dict[str, Any]:

@@ -75,7 +75,7 @@ class RunView:
     def __post_init__(self) -> None:
         self._tails = 0, Tails(self.problem.waits)
         self._bound: dict[tuple[int, Number], ModeKernel] = {}
-        self._before: dict[int, tuple[Place, int]] = {}  # of the last few transitions that were asked for
+        self._before: dict[int, tuple[Place, int]] = {}  # of the last few transitions that were requested
         self._nearby: tuple[Any, list[Place]] = None, []  # the last answer of `landed_nearby`
 
     # What was recorded
