@@ -93,14 +93,15 @@ def factored(n: int, a: Room, order: IndexRoom, scales: Vector, of: Variation | 
 def solve(n: int, a: Vector, order: Indices, right: Vector, found: Room) -> None:
     """Solve for a right-hand side: below the diagonal is L (its diagonal is 1), above it U."""
     for i in range(n):
-        found[i] = right[order[i]]
-    for i in range(n):
+        left = right[order[i]]
         for j in range(i):
-            found[i] = found[i] - a[i * n + j] * found[j]
+            left = left - a[i * n + j] * found[j]
+        found[i] = left
     for i in range(n - 1, -1, -1):
+        left = found[i]
         for j in range(i + 1, n):
-            found[i] = found[i] - a[i * n + j] * found[j]
-        found[i] = found[i] * a[i * n + i]
+            left = left - a[i * n + j] * found[j]
+        found[i] = left * a[i * n + i]
 
 
 @inline
@@ -142,29 +143,27 @@ def factored_complex(n: int, re: Room, im: Room, order: IndexRoom, scales: Vecto
 
 
 @inline
-def take_off(n: int, re: Vector, im: Vector, a: Room, b: Room, i: int, first: int, end: int) -> None:
-    """Subtract the products of row i with what is known from its right-hand side a + i b."""
-    for j in range(first, end):
-        c, d = re[i * n + j], im[i * n + j]
-        a[i] = a[i] - (c * a[j] - d * b[j])
-        b[i] = b[i] - (c * b[j] + d * a[j])
-
-
-@inline
 def solve_complex(
     n: int, re: Vector, im: Vector, order: Indices, real: Vector, imaginary: Vector, a: Room, b: Room
 ) -> None:
     """Solve for a complex right-hand side: the solution is a + i b."""
     for i in range(n):
-        a[i] = real[order[i]]
-        b[i] = imaginary[order[i]]
-    for i in range(n):
-        take_off(n, re, im, a, b, i, 0, i)
+        u, v = real[order[i]], imaginary[order[i]]
+        for j in range(i):
+            c, d, p, q = re[i * n + j], im[i * n + j], a[j], b[j]
+            u = u - (c * p - d * q)
+            v = v - (c * q + d * p)
+        a[i] = u
+        b[i] = v
     for i in range(n - 1, -1, -1):
-        take_off(n, re, im, a, b, i, i + 1, n)
-        c, d, p, q = re[i * n + i], im[i * n + i], a[i], b[i]
-        a[i] = c * p - d * q
-        b[i] = c * q + d * p
+        u, v = a[i], b[i]
+        for j in range(i + 1, n):
+            c, d, p, q = re[i * n + j], im[i * n + j], a[j], b[j]
+            u = u - (c * p - d * q)
+            v = v - (c * q + d * p)
+        c, d = re[i * n + i], im[i * n + i]
+        a[i] = c * u - d * v
+        b[i] = c * v + d * u
 
 
 def sparse_factored(n: int, of: Elimination, a: Room, row: Room) -> bool:

@@ -127,14 +127,16 @@ def iterate(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h
     solve_all_complex(of, steps.factors, q, r, b, c)
     z0, z1, z2, largest = steps.z[0], steps.z[1], steps.z[2], steps.largest
     for s in each(n):
-        u[s] = u[s] + a[s]
-        v[s] = v[s] + b[s]
-        w[s] = w[s] + c[s]
-        z0[s] = weighted(known.mix[0], u[s], v[s], w[s])
-        z1[s] = weighted(known.mix[1], u[s], v[s], w[s])
-        z2[s] = weighted(known.mix[2], u[s], v[s], w[s])
-        largest[s] = max(abs(a[s]), abs(b[s]), abs(c[s]))
-        p[s] = abs(a[s]) + abs(b[s]) + abs(c[s])
+        x0, x1, x2 = u[s] + a[s], v[s] + b[s], w[s] + c[s]
+        size0, size1, size2 = abs(a[s]), abs(b[s]), abs(c[s])
+        largest[s] = max(size0, size1, size2)
+        p[s] = size0 + size1 + size2
+        u[s] = x0
+        v[s] = x1
+        w[s] = x2
+        z0[s] = weighted(known.mix[0], x0, x1, x2)
+        z1[s] = weighted(known.mix[1], x0, x1, x2)
+        z2[s] = weighted(known.mix[2], x0, x1, x2)
     return is_finite(sum_of(p, n))
 
 

@@ -153,12 +153,15 @@ def guess(of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number) -> N
             b = weighted(known.power[1], e[s], f[s], g[s])
             c = weighted(known.power[2], e[s], f[s], g[s])
             end = g[s] if behind else 0
-            x[s] = first * (a + first * (b + first * c)) - end
-            y[s] = second * (a + second * (b + second * c)) - end
-            z[s] = third * (a + third * (b + third * c)) - end
-            u[s] = weighted(known.unmix[0], x[s], y[s], z[s])
-            v[s] = weighted(known.unmix[1], x[s], y[s], z[s])
-            w[s] = weighted(known.unmix[2], x[s], y[s], z[s])
+            i = first * (a + first * (b + first * c)) - end
+            j = second * (a + second * (b + second * c)) - end
+            k = third * (a + third * (b + third * c)) - end
+            x[s] = i
+            y[s] = j
+            z[s] = k
+            u[s] = weighted(known.unmix[0], i, j, k)
+            v[s] = weighted(known.unmix[1], i, j, k)
+            w[s] = weighted(known.unmix[2], i, j, k)
     else:
         for s in range(of.n):
             x[s] = 0
