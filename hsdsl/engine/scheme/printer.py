@@ -40,6 +40,7 @@ FOLDED = {"min": "hs_min", "max": "hs_max"}
 SIGNS: Mapping[type[ast.AST], str] = {**C_OPERATORS, ast.Div: "/", ast.Is: "==", ast.IsNot: "!=", ast.BitOr: "|"}
 WHOLE: Mapping[type[ast.AST], str] = {ast.FloorDiv: "/", ast.Mod: "%"}  # of what is not negative
 MAY_BE_NONE = " | None"
+NO_ARGUMENTS = ("posonlyargs", "vararg", "kwonlyargs", "kwarg", "defaults")
 
 
 class Refused(ValueError):
@@ -129,6 +130,8 @@ class Scheme:
             case ast.FunctionDef(name=name, args=arguments, returns=returns):
                 if name in self.functions:
                     raise text.refused(part, "a second function of this name")
+                if any(vars(arguments)[each] for each in NO_ARGUMENTS) or {*_decorators(part)} - {"inline", "may_fail"}:
+                    raise text.refused(part, "a function with other arguments or decorators")
                 result = "None" if returns is None else ast.unparse(returns)
                 given = {one.arg: _kind(one.annotation) for one in arguments.args if one.annotation is not None}
                 optional, result = result.endswith(MAY_BE_NONE), result.removesuffix(MAY_BE_NONE)
@@ -215,7 +218,9 @@ class _Function:
         self._place(definition.body, ())
         body = [part for part in definition.body if not _is_docstring(part)]
         lines = self.block(body, ())
-        if self.known.fails and not self.known.results:
+        if (self.known.fails and not self.known.results) or (
+            self.known.optional and not isinstance(body[-1], ast.Return)
+        ):
             lines.append("return 0;")
         declared = [f"{self.scheme.c_type(kind)}{name};" for name, kind in self.late.items()]
         about = _comment(ast.get_docstring(definition) or "", f"{self.text.name}.py:{definition.lineno}")
@@ -262,6 +267,7 @@ class _Function:
             case ast.AnnAssign(target=target, annotation=annotation, value=ast.expr() as value):
                 return self.assignment(part, target, value, ast.unparse(annotation), path)
             case ast.AugAssign(target=target, op=operator, value=value) if type(operator) in SIGNS:
+                self.fits(part, self.value(target)[1], self.operation(part, target, operator, value)[1])
                 return [f"{self.value(target)[0]} {SIGNS[type(operator)]}= {self.value(value, outer=True)[0]};"]
             case ast.If(test=test, body=body, orelse=other):
                 lines = [f"if ({self.truth(test)}) {{", *self.inner(body, path)]
@@ -270,15 +276,24 @@ class _Function:
                 return [*lines, "}"]
             case ast.While(test=test, body=body, orelse=[]):
                 return [f"while ({self.truth(test)}) {{", *self.inner(body, path), "}"]
-            case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=bounds), body=body):
+            case ast.For(
+                target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=bounds), body=body, orelse=[]
+            ):
                 return [self.loop(part, name, bounds, body), *self.inner(body, path), "}"]
-            case ast.For(target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="each"), args=bounds), body=body):
+            case ast.For(
+                target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="each"), args=bounds), body=body, orelse=[]
+            ):
                 return ["HS_SIMD", self.loop(part, name, bounds, body), *self.inner(body, path), "}"]
             case ast.Return(value=value):
                 return self.returned(part, value)
             case ast.Break() | ast.Continue():
                 return [f"{ast.unparse(part)};"]
-            case ast.Try(body=body, handlers=[ast.ExceptHandler(type=ast.Name(id="DOMAIN_ERRORS"), body=[last])]):
+            case ast.Try(
+                body=body,
+                handlers=[ast.ExceptHandler(type=ast.Name(id="DOMAIN_ERRORS"), body=[last])],
+                orelse=[],
+                finalbody=[],
+            ):
                 (handled,) = self.statement(last, path)
                 before, self.failed = self.failed, handled
                 lines = self.block(body, path)
@@ -298,14 +313,8 @@ class _Function:
         start, stop, step = (
             [ast.Constant(0), *bounds, ast.Constant(1)] if len(bounds) == 1 else [*bounds, ast.Constant(1)][:3]
         )
-        set_inside = {
-            node.id
-            for one in body
-            for node in ast.walk(one)
-            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
-        }
-        fixed = {node.id for bound in bounds for node in ast.walk(bound) if isinstance(node, ast.Name)}
-        if set_inside & {name, *fixed}:
+        set_inside = {place for one in body for place in _places(one, ast.Store)}
+        if set_inside & {name, *(place for bound in bounds for place in _places(bound, ast.Load))}:
             raise self.text.refused(part, "a loop whose variable or bounds change")
         self.kinds[name] = "int"
         by = int(ast.literal_eval(step))
@@ -337,8 +346,8 @@ class _Function:
         """Print an assignment: of one value, of each to each, or of what a call gives."""
         targets = target.elts if isinstance(target, ast.Tuple) else [target]
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-            read = {node.id for one in value.elts[1:] for node in ast.walk(one) if isinstance(node, ast.Name)}
-            if read & {one.id for one in targets if isinstance(one, ast.Name)}:
+            read = {place for one in value.elts[1:] for place in _places(one, ast.Load)}
+            if read & _places(target, ast.Store):
                 raise self.text.refused(part, "values that are set before they are read")
             pairs = zip(targets, value.elts, strict=True)
             return [line for one, given in pairs for line in self.assignment(part, one, given, None, path)]
@@ -353,11 +362,18 @@ class _Function:
         if isinstance(value, ast.Constant) and value.value is None and isinstance(target, ast.Name):
             return [f"has_{target.id} = 0;"]
         text, found = self.value(value, outer=True)
+        declared = isinstance(target, ast.Name) and self.new(target.id, kind or found, path)
+        place, known = self.value(target)
+        self.fits(part, known, found)
         if not isinstance(target, ast.Name):
-            return [f"{self.value(target)[0]} = {text};"]
-        declared = self.new(target.id, kind or found, path)
+            return [f"{place} = {text};"]
         lines = [f"has_{target.id} = 1;"] if target.id in self.optional else []
         return [f"{self.scheme.c_type(self.kinds[target.id]) if declared else ''}{target.id} = {text};", *lines]
+
+    def fits(self, part: ast.stmt, kind: str, found: str) -> None:
+        """Refuse a value that a name or a place of another kind cannot have: Python would change what it is."""
+        if kind in ("int", "Count", "bool") and _wider(kind, found) != kind:
+            raise self.text.refused(part, f"{kind} that is set to {found}")
 
     def taken(self, call: ast.Call, known: Signature, targets: Sequence[ast.expr], path: tuple[int, ...]) -> list[str]:
         """Print a call whose results go to targets."""
@@ -409,9 +425,9 @@ class _Function:
             raise self.text.refused(call, "a call that may fail, outside of try")
         return f"if ({self.call(call, out)}) {self.failed}"
 
-    def truth(self, node: ast.expr) -> str:
+    def truth(self, node: ast.expr, outer: bool = True) -> str:
         """Print a condition."""
-        text, kind = self.value(node, outer=True)
+        text, kind = self.value(node, outer)
         if kind != "bool":
             raise self.text.refused(node, f"a condition that is {kind}")
         return text
@@ -432,7 +448,9 @@ class _Function:
                 return self.name(node, name)
             case ast.UnaryOp(op=ast.Not() | ast.USub() as operator, operand=operand):
                 text, kind = self.value(operand)
-                return (f"!{text}", "bool") if isinstance(operator, ast.Not) else (f"-{text}", kind)
+                if isinstance(operator, ast.Not):
+                    return f"!{self.truth(operand, outer=False)}", "bool"
+                return f"-{text}", kind
             case ast.Attribute() | ast.Subscript():
                 return self.part(node)
             case _:
@@ -462,14 +480,13 @@ class _Function:
             case ast.BinOp(left=left, op=operator, right=right):
                 return self.operation(node, left, operator, right)
             case ast.BoolOp(op=operator, values=values):
-                return (" && " if isinstance(operator, ast.And) else " || ").join(
-                    self.value(one)[0] for one in values
-                ), "bool"
+                sign = " && " if isinstance(operator, ast.And) else " || "
+                return sign.join(self.truth(one, outer=False) for one in values), "bool"
             case ast.Compare(left=left, ops=operators, comparators=others):
                 return self.comparison(node, left, operators, others), "bool"
             case ast.IfExp(test=test, body=body, orelse=other):
                 (one, kind), (two, another) = self.value(body), self.value(other)
-                return f"{self.value(test)[0]} ? {one} : {two}", _wider(kind, another)
+                return f"{self.truth(test, outer=False)} ? {one} : {two}", _wider(kind, another)
             case ast.Call(func=ast.Name(id=name), args=arguments) if name in FOLDED or name in CALLS:
                 return self.folded(name, arguments)
             case ast.Call():
@@ -490,10 +507,12 @@ class _Function:
             return name, self.scheme.constants[name]
         raise self.text.refused(node, "a name that nothing sets before it")
 
-    def operation(self, node: ast.expr, left: ast.expr, operator: ast.operator, right: ast.expr) -> tuple[str, str]:
+    def operation(self, node: ast.AST, left: ast.expr, operator: ast.operator, right: ast.expr) -> tuple[str, str]:
         """Print arithmetic; whole numbers are not divided by each other."""
         (one, kind), (two, another) = self.value(left), self.value(right)
         wider = _wider(kind, another)
+        if wider == "bool" and not isinstance(operator, ast.BitOr):
+            wider = "int"
         if isinstance(operator, ast.Pow):
             return f"pow({one}, {two})", wider
         if type(operator) in WHOLE and wider in ("int", "Count"):
@@ -523,13 +542,18 @@ class _Function:
                 pass
         if len(others) > 1 and not all(isinstance(one, (ast.Name, ast.Constant, ast.Attribute)) for one in others[:-1]):
             raise self.text.refused(node, "a number between others that is computed twice")
-        texts = [self.value(one)[0] for one in (left, *others)]
+        texts, kinds = zip(*(self.value(one) for one in (left, *others)), strict=True)
+        same = all(isinstance(one, (ast.Is, ast.IsNot)) for one in operators)
+        if any(kind not in PLAIN for kind in kinds) != same:
+            raise self.text.refused(node, f"a comparison of {' and '.join(kinds)}")
         pairs = [f"{texts[k]} {SIGNS[type(one)]} {texts[k + 1]}" for k, one in enumerate(operators)]
         return pairs[0] if len(pairs) == 1 else " && ".join(f"({pair})" for pair in pairs)
 
     def folded(self, name: str, arguments: Sequence[ast.expr]) -> tuple[str, str]:
         """Print a function of numbers; that of several is one of two at a time."""
         texts, kinds = zip(*(self.value(one, outer=True) for one in arguments), strict=True)
+        if (name in CALLS) != (len(arguments) == 1) or any(kind not in PLAIN for kind in kinds):
+            raise self.text.refused(arguments[0], f"arguments of {name}")
         if name in CALLS:
             return f"{CALLS[name]}({texts[0]})", kinds[0]
         text, kind = texts[0], "Number"
@@ -540,10 +564,7 @@ class _Function:
 
 def _wider(kind: str, another: str) -> str:
     """What an operation of two kinds gives."""
-    for one in ("Time", "Number", "Count"):
-        if one in (kind, another):
-            return one
-    return "int" if {kind, another} == {"bool"} else kind if another in ("int", "bool") else another
+    return next((one for one in ("Time", "Number", "Count", "int") if one in (kind, another)), kind)
 
 
 def _kind(annotation: ast.expr) -> str:
@@ -552,6 +573,12 @@ def _kind(annotation: ast.expr) -> str:
 
 def _of_list(kind: str) -> str:
     return kind.removeprefix("list[").removesuffix("]")
+
+
+def _places(part: ast.AST, how: type[ast.expr_context]) -> set[str]:
+    """The names, fields and vectors that are set there, or read."""
+    found = (node for node in ast.walk(part) if isinstance(getattr(node, "ctx", None), how))
+    return {ast.unparse(node.value if isinstance(node, ast.Subscript) else node) for node in found}
 
 
 def _decorators(part: ast.FunctionDef) -> list[str]:

@@ -28,7 +28,8 @@ class Roots:
 
     ``of`` is compared by address, so a caller that overwrites its coefficients clears it. ``binomials`` are those of
     all degrees, row by row. ``cuts`` is a stack of the parts that a search still has to examine: ``open`` of them, at
-    most MOST_CUTS of run.h. Of a part that is cut, the half nearer to where the search begins is on top.
+    most MORE_CUTS more than numbers have bits. Of a part that is cut, the half nearer to where the search begins is on
+    top.
     """
 
     unit: Number

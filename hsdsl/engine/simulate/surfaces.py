@@ -294,11 +294,14 @@ def total(terms: Iterable[Number], zero: Number) -> Number:
     return zero
 
 
+MORE_CUTS = 13  # of an interval than numbers have bits: so many are open at once, at most
+
+
 def make_roots(degree: int, arithmetic: Arithmetic) -> Roots:
     """Room to look for roots of polynomials up to a degree."""
     zero, size = arithmetic.zero, degree + 1
     binomials = [comb(n, k) for n in range(size) for k in range(n + 1)]
-    cuts = [Cut(zero, zero, [zero] * size) for _ in range(arithmetic.bits + 13)]
+    cuts = [Cut(zero, zero, [zero] * size) for _ in range(arithmetic.bits + MORE_CUTS)]
     return Roots(arithmetic.unit, binomials, (), [zero] * size, [zero] * size, cuts)
 
 

@@ -37,7 +37,8 @@
 #endif
 #define HS_TIME_UNIT 0x1p-53
 #define FREE 16 /* transitions within the relaxation that cost no time; so many are remembered */
-#define MOST_CUTS 66 /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
+#define MORE_CUTS 13
+#define MOST_CUTS (HS_BITS + MORE_CUTS) /* open at once: widths of 1, 1/2, ... down to a unit of round-off */
 #define MOST_SPLITS 30
 #ifndef MOST_PIECES
 #define MOST_PIECES 1000 /* of a push over time; who lacks memory takes fewer */
