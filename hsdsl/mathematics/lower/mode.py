@@ -108,8 +108,12 @@ class LoweredMode:
         return replace(program, terms=print_routines((definition,), self.names.data))
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
-        """Whether a surface is affine in time and the states, in every choice that modes of parts make."""
-        if residual.has(below):
+        """Whether a surface is affine in time and the states, in every choice that numbers of modes make."""
+        choices = residual.atoms(below)
+        if choices:
+            moving = {TIME, *(state for state, f in zip(self.states, self.flow, strict=True) if f != 0)}
+            if any(choice.args[0].free_symbols & moving for choice in choices):
+                return False  # a `select` by what flows
             residual = _every_choice(residual)
             slopes = Gradient((residual,), self._places)
         own = residual.free_symbols & self._places.keys()
