@@ -69,8 +69,9 @@ def recovered(root: Node, findings: Findings, kind: type[ModelDocument]) -> Mode
         faults = [fault for fault in faults if fault.code != "HS121" or fault.plain not in wrong]  # as of `{v = 1}`
         targets = {fault.target for fault in faults}
         for fault in faults:
-            if fault.code != "missing" or not (
-                fault.path in targets or fault.plain[:-1] in faulty or fault.is_of_part or fault.is_of_event
+            if fault.plain not in faulty and (
+                fault.code != "missing"
+                or not (fault.path in targets or fault.plain[:-1] in faulty or fault.is_of_part or fault.is_of_event)
             ):
                 findings.add(fault.diagnostic())
         faulty |= {fault.plain for fault in faults if fault.code == "HS203"}
@@ -209,7 +210,7 @@ class _Fault:
                     or _moved(self.root, parent, str(last), target)
                     or _dropped(parent, str(last))
                 )
-            case "missing" if last in _OF_AN_INPUT:
+            case "missing" | "HS203" if last in _OF_AN_INPUT:
                 return _replaced(descend(self.root, path[:-2]), path[-2], None)
             case "missing":
                 return _filled(parent, str(last))
