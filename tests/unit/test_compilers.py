@@ -220,4 +220,4 @@ def test_time_of_other_programs_does_not_count(tmp_path: Path) -> None:
     with subprocess.Popen([odd, b"1e6"]) as other:
         ends = process.run([works, works, works, works, waits, endless], tmp_path, 0.5, lambda: True)
         other.kill()
-    assert [done.code for done in ends] == [0, 0, 0, 0, None, None]
+    assert [code for code, _ in ends] == [0, 0, 0, 0, None, None]

@@ -114,9 +114,10 @@ def _solved(
     """A minimum near values, from which no transition is better off beyond the measurement next to it."""
     sizes: Array = np.array([scales[name] for name in objective.start])
     limits: Array = np.array([*bounds.values()], float)
-    best = _minimum(objective, first, limits, sizes)
+    functions = objective.residuals, objective.slopes
+    best = _minimum(*functions, first, limits, sizes)
     for _ in range(MOST_CROSSED):
-        tried = (_minimum(objective, best.x + step, limits, sizes) for step in steps_across(objective, best.x, sizes))
+        tried = (_minimum(*functions, best.x + step, limits, sizes) for step in steps_across(objective, best.x, sizes))
         better = next((each for each in tried if each.cost < (1 - PRECISE) * best.cost), None)
         if better is None:
             break
@@ -124,7 +125,7 @@ def _solved(
     return best
 
 
-def _minimum(objective: Any, first: Array, limits: Array, sizes: Array) -> Any:
+def _minimum(residuals: Numbers, slopes: Numbers, first: Array, limits: Array, sizes: Array) -> Any:
     """SciPy's result of a fit to values as shares of their sizes, with the values themselves."""
     lower: Array = limits[:, 0]
     upper: Array = limits[:, 1]
@@ -132,16 +133,16 @@ def _minimum(objective: Any, first: Array, limits: Array, sizes: Array) -> Any:
     def values(x: Array) -> Array:
         return np.clip(x * sizes, lower, upper)
 
-    def residuals(x: Array) -> Array:
-        return objective.residuals(values(x))
+    def there(x: Array) -> Array:
+        return residuals(values(x))
 
-    def slopes(x: Array) -> Array:
-        return objective.slopes(values(x)) * sizes
+    def scaled(x: Array) -> Array:
+        return slopes(values(x)) * sizes
 
     solve: Any = least_squares  # pyright: ignore[reportUnknownVariableType]
     start, within = np.clip(first, lower, upper) / sizes, (lower / sizes, upper / sizes)
     with np.errstate(all="ignore"):  # squares of runs far off
-        result: Any = solve(residuals, start, jac=slopes, bounds=within, ftol=PRECISE, xtol=PRECISE, gtol=PRECISE)
+        result: Any = solve(there, start, jac=scaled, bounds=within, ftol=PRECISE, xtol=PRECISE, gtol=PRECISE)
     shares: Array = np.asarray(result.x, float)
     pushed: Array = np.where(np.asarray(result.grad, float) < 0, upper, lower)  # the sum falls towards it
     at = np.abs(pushed / sizes - shares) <= AT_BOUND * np.maximum(1.0, np.abs(shares))  # SciPy stays inside
@@ -259,6 +260,7 @@ def _close_transitions(found: Sensitivity, measured: Measurements, covariance: A
     return [*close[:MOST_NAMED], *more]
 
 
+Numbers = Callable[[Array], Array]
 Evaluate = Callable[[Mapping[str, float], float], Sensitivity]
 Progress = Callable[[int, Mapping[str, float], float], None]
 TOO_FAR = 1e3  # times the size of a column: the residual of a run that ends before a measurement

@@ -16,30 +16,11 @@ from scipy.special import chdtri, stdtrit  # pyright: ignore[reportMissingTypeSt
 
 from hsdsl.engine.execution import Array
 
-Minimum = Callable[[Any, Array, Array, Array], Any]
+Numbers = Callable[[Array], Array]
+Minimum = Callable[[Numbers, Numbers, Array, Array, Array], Any]  # of residuals and slopes, as `_minimum` there
 PRECISE = 1e-4  # of the distance from the value to an end: how well ends are located
 STEEP = 0.1  # of the root of the rise: the least change across an end, as far as it is located, that is a jump
 FURTHEST = 12  # doublings of the first step in which an end is sought
-
-
-@dataclass(frozen=True)
-class Pinned:
-    """An objective with one value held; the functions of the others."""
-
-    objective: Any
-    index: int
-    value: float
-
-    def _whole(self, x: Array) -> Array:
-        return np.insert(x, self.index, self.value)
-
-    def residuals(self, x: Array) -> Array:
-        """The residuals at the other values."""
-        return self.objective.residuals(self._whole(x))
-
-    def slopes(self, x: Array) -> Array:
-        """Their derivatives by the other values."""
-        return np.delete(self.objective.slopes(self._whole(x)), self.index, axis=1)
 
 
 def rise_of(level: float, variance: float, free: int, sigma: bool) -> float:
@@ -76,11 +57,18 @@ class Profile:
             """Signed roots of the sums are near to a line, where these themselves are near to a parabola."""
             nonlocal others
             if value not in known:
-                pinned, best = Pinned(self.objective, k, value), others
+                best = others
+
+                def residuals(x: Array) -> Array:
+                    return self.objective.residuals(np.insert(x, k, value))
+
+                def slopes(x: Array) -> Array:
+                    return np.delete(self.objective.slopes(np.insert(x, k, value)), k, axis=1)
+
                 if len(others):
                     keep = np.delete(np.arange(len(self.best)), k)
-                    best = self.minimum(pinned, others, self.limits[keep], self.sizes[keep]).x
-                found = float(np.sum(pinned.residuals(best) ** 2))
+                    best = self.minimum(residuals, slopes, others, self.limits[keep], self.sizes[keep]).x
+                found = float(np.sum(residuals(best) ** 2))
                 known[value] = max(found - self.total, 0.0) ** 0.5 - rise**0.5
                 others = best if known[value] <= 0 else others  # a run that failed leads nowhere
             return known[value]

@@ -13,8 +13,7 @@ coefficients wait for each other, and a division takes long.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.engine.backends.python import compile_routines
@@ -133,8 +132,7 @@ SHORT = {
 SHORT_COEFFICIENT = "{call}few(k, {V}, {G}, {last}) * {call}inverse[k]"
 
 
-@dataclass(frozen=True)
-class TapeLanguage:
+class TapeLanguage(NamedTuple):
     """How one language names things.
 
     Attributes

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -191,8 +191,7 @@ _LATER: dict[str, Callable[[Samples], Array]] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class _Places:
+class _Places(NamedTuple):
     """The places of n times: arc, row, the next row, and the fraction between both (0 at the row itself)."""
 
     time: Array

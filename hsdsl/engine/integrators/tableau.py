@@ -16,7 +16,7 @@ from fractions import Fraction
 from functools import cache
 from itertools import combinations_with_replacement
 from math import prod
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 from hsdsl.base.numbers.arithmetic import FLOAT64, Arithmetic, Number
 
@@ -238,8 +238,7 @@ def density(tree: Tree) -> int:
 Row = tuple[tuple[int, float], ...]  # stages and their weights
 
 
-@dataclass(frozen=True)
-class TableNumbers:
+class TableNumbers(NamedTuple):
     """A method with ``stages`` stages to evaluate in a step.
 
     Stage number ``stages`` is the flow at the step's end; those behind it are evaluated for the dense output alone.

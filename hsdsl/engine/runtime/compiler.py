@@ -8,13 +8,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from hsdsl.base import limits
 from hsdsl.base.names import shown
-
-if TYPE_CHECKING:
-    from hsdsl.engine.runtime.process import Done
 
 NAMES = ("cc", "gcc", "clang")
 TRIAL = 5.0  # seconds for an empty function, which takes a hundredth of them
@@ -84,12 +81,12 @@ class Compiler:
             ends = process.run(commands, folder, seconds, lambda: _responds(self))
         except OSError as error:
             raise NoCompiler(f"{self} cannot be run: {error.strerror}") from None
-        for done in ends:
-            if done.code is None:
+        for code, printed in ends:
+            if code is None:
                 slow = f"{self} takes more than {seconds:g} s; --limit compile={10 * seconds:g} allows more"
                 raise TooSlow(slow) if _responding.get(self, True) else NoCompiler(self._endless())
-            if done.code:
-                raise NoCompiler(f"{self} failed: {_complaint(done, folder)}")
+            if code:
+                raise NoCompiler(f"{self} failed: {_complaint(code, printed, folder)}")
 
     def _endless(self) -> str:
         return f"{self} does not end: it takes longer than a few seconds for an empty function"
@@ -110,15 +107,15 @@ def _responds(compiler: Compiler) -> bool:
             source = folder / "empty.c"
             source.write_text("void hs_empty(void) {}\n")
             command = [*compiler.command, "-c", "-o", str(folder / "empty.o"), str(source)]
-            (done,) = process.run([command], folder, TRIAL, lambda: True)
-            _responding[compiler] = done.code is not None
+            ((code, _),) = process.run([command], folder, TRIAL, lambda: True)
+            _responding[compiler] = code is not None
     return _responding[compiler]
 
 
-def _complaint(done: Done, folder: Path) -> str:
+def _complaint(code: int, printed: str, folder: Path) -> str:
     """The first line of a compiler's output that names an error."""
-    lines = [line.strip() for line in done.printed.replace(f"{folder}{os.sep}", "").splitlines() if line.strip()]
-    ended = f"exit code {done.code}" if (done.code or 0) >= 0 else f"ended by signal {-(done.code or 0)}"
+    lines = [line.strip() for line in printed.replace(f"{folder}{os.sep}", "").splitlines() if line.strip()]
+    ended = f"exit code {code}" if code >= 0 else f"ended by signal {-code}"
     return shown(next((line for line in lines if "error" in line), (lines or [ended])[0]), 200)
 
 

@@ -10,7 +10,6 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from threading import Thread
 from time import monotonic
@@ -26,12 +25,7 @@ MOST_PRINTED = 1 << 16  # bytes that are kept of what a command prints
 _running: dict[subprocess.Popen[bytes], Path] = {}
 
 
-@dataclass(frozen=True)
-class Done:
-    """The end of a command: its exit code, None where it was ended after its time, and what it printed on stderr."""
-
-    code: int | None
-    printed: str
+Done = tuple[int | None, str]  # a command's exit code, None where it was ended after its time, and its stderr
 
 
 @contextmanager
@@ -64,7 +58,7 @@ def run(commands: Sequence[Sequence[str]], folder: Path, seconds: float, respond
     for _, listener, _ in begun:
         listener.join(1.0)  # what it left running may hold the stream open
     printed = [b"".join(said).decode(errors="replace") for _, _, said in begun]
-    return list(map(Done, codes, printed))
+    return list(zip(codes, printed, strict=True))
 
 
 def _begin(command: Sequence[str], folder: Path) -> tuple[subprocess.Popen[bytes], Thread, list[bytes]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf, nan
 from typing import NamedTuple
 
@@ -30,8 +29,7 @@ class Tolerance(NamedTuple):
 WITHIN = Tolerance(state=0.05, time=0.005)  # of a right result
 
 
-@dataclass(frozen=True)
-class Outcome:
+class Outcome(NamedTuple):
     """What came of a run, in a ``word``.
 
     ``right``: the exact execution within the tolerance. ``warns``: another one, with the verdict ``left`` or

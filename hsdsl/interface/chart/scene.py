@@ -190,8 +190,7 @@ class Result:
         return self.count()
 
 
-@dataclass(frozen=True)
-class Tool:
+class Tool(NamedTuple):
     """A tool by its name; ours have a scheme and a method."""
 
     name: str

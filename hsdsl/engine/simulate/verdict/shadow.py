@@ -42,7 +42,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from math import comb, factorial, isfinite, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -68,8 +68,7 @@ POLE = 1 / 5
 INSIDE = (6 - sqrt(6)) / 10  # where a polynomial by Radau IIA is compared with the flow: `collocation`
 
 
-@dataclass(frozen=True)
-class ShadowErrors:
+class ShadowErrors(NamedTuple):
     """How far a run is from its shadow run.
 
     Attributes
