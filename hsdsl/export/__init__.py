@@ -46,9 +46,10 @@ ABOUT = {
     "web": "one HTML page that runs the model in a browser",
 }
 Files = Callable[..., dict[str, bytes]]
-TARGETS = Table[Files](
-    "targets", {name: f"hsdsl.export.{name}:files" for name in ABOUT}, function_expected("a function files(source)")
-)
+_OWN = {name: f"hsdsl.export.{name}:files" for name in ABOUT} | {
+    f"fmi{version}": f"hsdsl.export.fmi:files{version}" for version in (2, 3)
+}
+TARGETS = Table[Files]("targets", _OWN, function_expected("a function files(source)"))
 
 Modes = Literal["local", "output", "none"]  # what the number of the mode is in a functional mock-up unit
 DOCUMENTS = ("latex", "mermaid", "sbml")  # targets that do not run

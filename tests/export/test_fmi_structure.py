@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hsdsl
-from hsdsl.export import Modes, files_of, source_of
+from hsdsl.export import Modes, files_of, fmi, source_of
 from hsdsl.export.fmi import archive
 from hsdsl.export.fmi.variables import unit_of
 from hsdsl.interface.cli.verbs import obey
@@ -52,9 +52,9 @@ INITIAL = {
 def described(text: str, version: int, folder: Path, modes: Modes = "local") -> Any:
     """FMPy's description, which has no findings."""
     unit = unit_of(source_of(hsdsl.loads(text), {}), modes)
-    module = __import__(f"hsdsl.export.fmi{version}", fromlist=["description"])
+    description = getattr(fmi, f"description{version}")
     path = folder / "unit.fmu"
-    path.write_bytes(archive.archived({"modelDescription.xml": module.description(unit).encode()}))
+    path.write_bytes(archive.archived({"modelDescription.xml": description(unit).encode()}))
     assert validate_fmu(str(path)) == []
     return fmpy.read_model_description(str(path))
 
