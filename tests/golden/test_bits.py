@@ -100,9 +100,13 @@ def digest(text: list[str]) -> str:
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:8]
 
 
+@lru_cache(1)
 def platform() -> str:
-    """A digest of what the platform's functions give."""
-    arguments = [0.1 + k / 7 for k in range(6)]
+    """A digest of what the platform's functions give.
+
+    glibc gives other bits on processors without FMA, in one of a thousand arguments: findings/bits-of-functions.sh.
+    """
+    arguments = [0.1 + k / 7000 for k in range(6000)]
     ones, twos = (math.sin, math.cos, math.tan, math.exp, math.log, math.tanh), (math.pow, math.atan2)
     values = [function(a) for function in ones for a in arguments]
     values += [function(a, 1.3) for function in twos for a in arguments]
