@@ -317,6 +317,18 @@ def test_every_name_of_a_file_is_kept_or_renamed(name: str) -> None:
     assert hsdsl.loads(of(text)).simulate(engine="python").final.state["x"] == pytest.approx(6)
 
 
+def test_arguments_of_functions_may_have_the_names_of_parameters_and_functions() -> None:
+    body = "<lambda><bvar><ci>k</ci></bvar><bvar><ci>k_</ci></bvar><bvar><ci>f</ci></bvar>{}</lambda>"
+    body = body.format("<apply><minus/><apply><times/><ci>k</ci><ci>k_</ci></apply><ci>f</ci></apply>")
+    law = "<apply><ci>f</ci><ci>k_</ci><ci>x</ci><ci>k</ci></apply>"  # k_*x - k
+    text = model(
+        FunctionDefinitions=f'<functionDefinition id="f">{MATH.format(body)}</functionDefinition>',
+        Parameters=parameter("k", 3, True) + parameter("k_", 1, True) + parameter("x", 5),
+        Rules=f'<rateRule variable="x">{MATH.format(law)}</rateRule>',
+    )
+    assert hsdsl.loads(of(text)).simulate(engine="python").final.state["x"] == pytest.approx(3 + 2 * exp(2))
+
+
 FORMULAS = {
     "((1)*R3 + (-1)*R4)": "R3 - R4",
     "((-1)*r)/c": "-r/c",

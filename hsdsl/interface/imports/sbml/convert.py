@@ -14,6 +14,7 @@ from typing import Any
 
 from hsdsl.interface.imports.sbml.document import (
     Event,
+    Lambda,
     Node,
     NotExpressible,
     Quantity,
@@ -22,7 +23,7 @@ from hsdsl.interface.imports.sbml.document import (
     Species,
     Undefined,
 )
-from hsdsl.interface.imports.sbml.formulas import FACTORIAL, Facts, Writer, argument, literal
+from hsdsl.interface.imports.sbml.formulas import FACTORIAL, TAKEN, Facts, Writer, literal
 
 NOTHING = "a value that nothing gives"
 ENDLESS = "infinity or not-a-number as a value"
@@ -213,10 +214,7 @@ class Converter(Facts):
         initial = {self.own(name): self.own_start(name) for name in states}
         switches, chosen = self.switches()
         parameters = {self.own(name): self.own_start(name) for name in self.ordered(fixed)}
-        functions = {
-            self.spelled(name): {"of": list(map(argument, known.arguments)), "is": self.function_text(known)}
-            for name, known in self.functions.items()
-        }
+        functions = {self.spelled(name): self.function(known) for name, known in self.functions.items()}
         solve = {"solve": {"unknowns": list(map(self.spelled, self.unknowns)), "equations": equations}}
         mode = {"flow": flow | dict.fromkeys(chosen, "0"), "transitions": [*switches, *transitions]}
         assumptions = list(self.assumptions())
@@ -234,6 +232,21 @@ class Converter(Facts):
             "initial": {"mode": "model", **initial, **chosen},
             "experiment": {"until": until},
         }
+
+    def function(self, known: Lambda) -> Document:
+        """A function, whose arguments hide no other names."""
+        spelling: dict[str, str] = {}
+        for name in known.arguments:
+            new = name
+            while new in self.visible or new in spelling.values() or (new != name and new in known.arguments):
+                new += "_"
+            spelling[name] = new
+        return {"of": list(spelling.values()), "is": self.function_text(known, spelling)}
+
+    @cached_property
+    def visible(self) -> set[str]:
+        """The names that a function may use besides its arguments."""
+        return {*TAKEN, *map(self.own, filter(self.is_parameter, self.quantities)), *map(self.spelled, self.functions)}
 
     def ordered(self, names: list[str]) -> list[str]:
         """Parameters behind those that they use."""

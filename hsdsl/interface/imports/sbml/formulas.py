@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -366,13 +366,13 @@ class Facts:
         except NotExpressible:
             return False
 
-    def function_text(self, known: Lambda) -> str:
-        """The body of a function."""
+    def function_text(self, known: Lambda, spelling: Mapping[str, str] | None = None) -> str:
+        """The body of a function, whose arguments may have other names."""
 
         def name(node: Node) -> str:
             if node.name not in known.arguments:
                 raise NotExpressible("a function of more than its arguments", node.element)
-            return argument(node.name)
+            return node.name if spelling is None else spelling[node.name]
 
         def refused(*given: object) -> str:
             raise NotExpressible("a function that chooses", known.body.element)
@@ -380,7 +380,7 @@ class Facts:
         for node in known.body.walk():
             if node.kind == "call" and (node.name not in self.model.functions or not self._calls_plain(node.name)):
                 raise NotExpressible("a function of others", node.element)
-        return Writer(name, refused, refused, function=argument).number(known.body)
+        return Writer(name, refused, refused, function=self.spelled).number(known.body)
 
     def _calls_plain(self, name: str) -> bool:
         known = self.model.functions[name]
@@ -507,8 +507,3 @@ class Facts:
         given = (self.model.starts, self.model.assigned, self.unknowns, self.references)
         known = {name for of in given for name in of}
         return {name for name, one in self.quantities.items() if name not in known and math.isnan(one.value)}
-
-
-def argument(name: str) -> str:
-    """What an argument of a function is called, or a function in one."""
-    return f"{name}_" if name in TAKEN else name
