@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
+from hsdsl.base.names import memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
@@ -18,7 +19,7 @@ from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.surfaces import Arrival
 from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
-from hsdsl.mathematics.program import ModeProgram, Queue
+from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Queue
 
 SAME = 2.0**-44  # round-off, relative to the largest size that a state has in the run: one point
 LONGEST = 64  # transitions at one instant
@@ -69,10 +70,48 @@ def _choice(run: RunView, made: Transition, error: State) -> tuple[bool, str]:
     place, k = run.before(made)
     rivals = {name: run.edge_at(place, name) for name in made.alternatives}
     rivals = {name: other for name, other in rivals.items() if not place.outranks(k, other, error)}
+    rivals = {name: other for name, other in rivals.items() if not _set_off_together(run, made, k, other)}
     if not rivals or commute(run, place, [k, *rivals.values()], run.tails_before(made)):
         return bool(rivals), ""
     choice = f"at t = {show(made.time)} the choice of {made.edge} rather than {' or '.join(rivals)} matters"
     return True, f"{choice}: they lead to different points"
+
+
+def _set_off_together(run: RunView, made: Transition, k: int, other: int) -> bool:
+    """Whether edge k has the higher priority, and crossings of one surface set off both, after the same delay."""
+    edges = run.before(made)[0].mode.edges
+    if not edges[k].priority > edges[other].priority:
+        return False
+    one, rival = (_origin(run, made, edges[j]) for j in (k, other))
+    if one is None or rival is None or one[1] != rival[1] or one[0].time != rival[0].time:
+        return False
+    place, first = run.before(one[0])
+    second = other if rival[0] is made else run.before(rival[0])[1]
+    try:
+        return place.coincide(first, second, run.error_before(one[0]) if run.errors else (0.0,) * len(place.x))
+    except DOMAIN_ERRORS:
+        return False
+
+
+_NO_DELAY = "delay 0"
+
+
+def _origin(run: RunView, made: Transition, edge: EdgeProgram) -> tuple[Transition, str] | None:
+    """The crossing that sets off an edge at a transition, and the delay from it on; None where it is not known.
+
+    Of an execution that waits it is where the execution began, of other edges the transition itself.
+    """
+    at, begins = memory(edge.name, "at"), f"{edge.name} triggers"
+    if edge.name not in edge.of_event or at not in made.before:
+        return None if made.entry else (made, _NO_DELAY)
+    for i in reversed(range(made.index)):
+        earlier = run.transitions[i]
+        if earlier.source != made.source or earlier.target != made.source or earlier.after is None:
+            break
+        if earlier.edge == begins and earlier.after[at] == made.before[at]:
+            delay = next((word for word in edge.of_event if word.startswith("delay ")), "")
+            return None if earlier.entry else (earlier, delay)
+    return None
 
 
 def together(commuting: Sequence[Number]) -> list[str]:

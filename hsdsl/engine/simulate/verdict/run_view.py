@@ -494,7 +494,7 @@ class Place:
         """
         edges = self.mode.edges
         try:
-            if k >= len(edges) or not self._coincide(j, k, error):
+            if k >= len(edges) or not self.coincide(j, k, error):
                 return False
             times = (self.t - late, self.t, self.t + late)
             return edges[j].priority > edges[k].priority or not any(
@@ -503,7 +503,7 @@ class Place:
         except DOMAIN_ERRORS:
             return False
 
-    def _coincide(self, j: int, k: int, error: State) -> bool:
+    def coincide(self, j: int, k: int, error: State) -> bool:
         """Whether surface k is a multiple of surface j around the state, as p >= 1 and 2*p >= 2 are."""
         slopes, others = (self.kernel.gradients[i](self.t, *self.x) for i in (j, k))
         size, product = sum(g * g for g in slopes), sum(g * h for g, h in zip(slopes, others, strict=True))

@@ -18,6 +18,7 @@ from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.events.event import Event, chosen
 from hsdsl.language.elaborate.events.firing import edges_of
 from hsdsl.language.elaborate.events.remembering import Memory, Order, all_states, entered, new_values, remembered
+from hsdsl.language.expression.algebra import whole
 from hsdsl.language.expression.conditions import comparisons
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import ONE, TIME, ZERO, Edge, HybridSystem, Initial, Mode, started
@@ -43,7 +44,7 @@ def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
     constants = frozenset(system.parameter_symbols)
     flow = {TIME: ONE} | ({symbol(SINCE): ONE} if timed else {})
     flow |= mode.vector_field
-    edges = [_at_once(edge, mode, timed) for edge in mode.edges if edge.event is not None]
+    edges = _ranked(mode, [_at_once(edge, mode, timed) for edge in mode.edges if edge.event is not None])
     drafts = [Event(edge, mode, timed, flow, constants) for edge in edges]
     index, jumps = Memory(drafts), set[str]()
     changes = [(edge.name, new_values(edge, timed)) for edge in mode.edges if edge.target == mode.name and drafts]
@@ -54,6 +55,21 @@ def _events(system: HybridSystem, mode: Mode, timed: bool) -> tuple[Event, ...]:
             other = event.edge.name != name or event.delay is not None
             jumps |= {event.edge.name} if event.touched(meaning) or (other and event.leaves(meaning)) else set()
     return tuple(replace(e, jumps=not e.event.initially or e.edge.name in jumps) for e in drafts)
+
+
+def _ranked(mode: Mode, edges: list[Edge]) -> list[Edge]:
+    """Events of a mode that has no other transitions: if the values of priorities rank them, numbers are such values.
+
+    So the file orders equal values, whether they are written as numbers or not.
+    """
+    given = [event.priority for edge in edges if (event := edge.event) is not None]
+    if len(edges) != len(mode.edges) or all(priority is None for priority in given):
+        return edges
+    values = (whole(edge.priority) if rank is None else rank for edge, rank in zip(edges, given, strict=True))
+    return [
+        replace(edge, priority=0, event=edge.event and replace(edge.event, priority=value))
+        for edge, value in zip(edges, values, strict=True)
+    ]
 
 
 def _at_once(edge: Edge, mode: Mode, timed: bool) -> Edge:
