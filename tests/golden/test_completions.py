@@ -142,8 +142,9 @@ RELAY = """
   b: {flow: {x: -3*x + y + 1, y: -3*x + z - 1.2, z: -2*x + 1}, transitions: [{when: x >= 0, to: a}]}"""
 
 
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("method", "engine"), [("radau", ENGINES[-1]), *((method, engine) for method in METHODS[:2] for engine in ENGINES)]
+)
 def test_friction_oscillator_sticks(method: str, engine: str) -> None:
     run = sliding(FRICTION, "x: 12, v: 6", 30, method=method, engine=engine, tolerance=1e-13)
     assert run.transitions[-1].time == pytest.approx(22.423556350709, abs=1e-10)

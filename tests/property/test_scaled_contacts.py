@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 
 import pytest
 from engines import ENGINES
 
 import hsdsl
+from hsdsl.engine.execution import Execution
 
 # a ball that bounces and rolls, one on it, and a puck in a bowl: states, guards and resets in units of their own
 SCENES = {  # flow, guards with resets, start, until
@@ -51,6 +53,11 @@ def scaled(scene: str, guard: float, time: float, *units: float) -> hsdsl.Model:
     )
 
 
+@cache
+def plain_run(scene: str, engine: str) -> Execution:
+    return scaled(scene, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0).simulate(engine=engine)
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize(
@@ -66,7 +73,7 @@ def scaled(scene: str, guard: float, time: float, *units: float) -> hsdsl.Model:
     ],
 )
 def test_motion_along_guards_in_any_units(scene, guard, time, units, engine) -> None:
-    plain = scaled(scene, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0).simulate(engine=engine)
+    plain = plain_run(scene, engine)
     run = scaled(scene, guard, time, *units).simulate(engine=engine)
     assert plain.stop.reason == run.stop.reason == "until"
     assert len(run.transitions) < 100
