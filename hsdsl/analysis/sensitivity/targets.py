@@ -74,26 +74,8 @@ def own(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in names if " " not in name)
 
 
-def derivative_name(state: str, by: str) -> str:
-    """The derivative of a state or output."""
-    return f"d {state} / d {by}"
-
-
-def rate_name(output: str) -> str:
-    """The derivative of an output along the flow."""
-    return f"d {output} / d t"
-
-
-def still_rate_name(output: str) -> str:
-    """The derivative of an output by time where states rest."""
-    return f"d {output} / d t at rest"
-
-
-def slope_name(state: str) -> str:
-    """The slope of a state as the end of a step tells it."""
-    return f"slope of {state}"
-
-
-def shift_name(by: str) -> str:
-    """The derivative of the time of the last transition."""
-    return f"d time / d {by}"
+derivative_name = "d {} / d {}".format  # of a state or output, by a target
+rate_name = "d {} / d t".format  # of an output along the flow
+still_rate_name = "d {} / d t at rest".format  # of an output by time, where states rest
+slope_name = "slope of {}".format  # of a state, as the end of a step tells it
+shift_name = "d time / d {}".format  # of the last transition, by a target

@@ -7,9 +7,9 @@
 ``sweeps``        many instances into a dataset, chunk by chunk
 ``stream``        a run whose rows go to a file while it goes on
 ``estimate``      a run's error, by a finer run
-``distances``     distances of runs and of points
+``distances``     distances of runs and of points, and orbital stability by runs from nearby
 ``differentiate`` sensitivities; ``fits`` to measurements
-``orbits``        periodic orbits, and orbital stability by runs from nearby
+``orbits``        periodic orbits
 ``guards``        levels for pictures
 ================= ==========================================================================================
 """

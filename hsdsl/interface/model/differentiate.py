@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 FINEST = 1e-13  # the tolerance of methods of high order, to which it costs little
 SERIES, FINE = "taylor", "dop853"  # these methods; the latter where `auto` is the method of kinked flows
 REFUSED = ("step", "scheme")
+LOCATED_ALONE = (*REFUSED, "samples", "precision")  # refused by what takes derivatives of many runs
 
 
 class Differentiator:

@@ -1,6 +1,6 @@
 """Distances between two runs, or between two points of a model, written as ``free x=13 v=5``.
 
-A run names its model; that is read again where its space is needed.
+A run names its model; that is read again where its space is needed. Runs from nearby test orbital stability.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from itertools import pairwise
+from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -21,20 +23,18 @@ from hsdsl.analysis.metrics.points import PointDistance, SpaceMetric, SpacePoint
 from hsdsl.analysis.metrics.points import distance as shortest
 from hsdsl.analysis.metrics.space import make_space
 from hsdsl.analysis.metrics.table import CURVE_METRICS, POINT_METRICS, CurvePair, between, check_same_model
+from hsdsl.analysis.orbits.sampling import OrbitalStability, directions, sampled
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, checks_arguments, did_you_mean
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution import Execution
-from hsdsl.engine.preparation.options import parameters_of
+from hsdsl.engine.preparation.options import check_arguments, overrides_of, parameters_of
 from hsdsl.engine.preparation.pipeline import pipeline_of
-from hsdsl.engine.preparation.values import Values
+from hsdsl.engine.preparation.values import Values, whole, with_parameters
 from hsdsl.engine.simulate.stops import show
+from hsdsl.interface.model.differentiate import LOCATED_ALONE, located_arguments, start_by, varied
 from hsdsl.interface.model.runs import Runs
-
-if TYPE_CHECKING:
-    from hsdsl.engine.preparation.values import Values
-
 
 SECONDS = 60.0  # that a search may take, by default
 
@@ -285,3 +285,42 @@ def _check_inside(space: Space, *places: SpacePoint) -> None:
             at = ", ".join(f"{n} = {show(v)}" for n, v in zip(domain.coordinates, x.tolist(), strict=True))
             beyond = f"where `{text}` has no value" if np.isnan(excess) else f"beyond `{text}`"
             raise UsageError(f"{at} is not in the domain of mode {place.mode}: it is {beyond}")
+
+
+def orbital_stability(
+    model: Runs,
+    wrt: str | Sequence[str] | None,
+    radii: Sequence[float],
+    samples: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None,
+    arguments: Mapping[str, Any],
+) -> OrbitalStability:
+    """Test an execution; see `Model.orbital_stability`."""
+    check_arguments(arguments, "a stability test", LOCATED_ALONE)
+    if len(radii) < 2 or not all(0 < b < a for a, b in pairwise(radii)):
+        raise UsageError(f"expected at least two radii that fall, got {', '.join(map(str, radii))}")
+    call = located_arguments(model.pipeline, arguments)
+    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters", model.program))
+    by, known = start_by(wrt, call, values)
+    run = model.simulate(**call)
+    sizes = run.sizes()
+    scales = np.array([abs(known[t.label]) or sizes.get(t.name, 0.0) or 1.0 for t in by])
+    ways = directions(len(by), whole(samples, "samples", 1), seed)
+    total, done = len(radii) * len(ways), 0
+
+    def moved_run(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
+        nonlocal done
+        moved = {label: number + shift[label] for label, number in known.items()}
+        other = model.simulate(**varied(call, by, moved, model.program))
+        found = inf, inf  # of a run that stops for another reason
+        if run.stop.reason == other.stop.reason:
+            apart = distance_of_runs(run, other, model=model).interval
+            found = float(apart.lower), float(apart.upper)
+        done += 1
+        if progress is not None:
+            progress(done, total)
+        return (*found, tuple(made.edge for made in other.transitions))
+
+    title = called(run.title, run.model)
+    return sampled([t.label for t in by], scales, list(radii), ways, moved_run, title)

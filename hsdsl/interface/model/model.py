@@ -188,7 +188,7 @@ class Model(Runs):
 
         Raises UsageError: an unknown name, or radii that do not decrease.
         """
-        from hsdsl.interface.model.orbits import orbital_stability
+        from hsdsl.interface.model.distances import orbital_stability
 
         self._flat("orbital stability from runs nearby")
         with in_notebook() as show:

@@ -1,21 +1,15 @@
-"""Periodic orbits of a model, and orbital stability of its execution.
-
-Orbits are found from sections and guesses of a run; stability is tested by runs from nearby and their distances.
-"""
+"""Periodic orbits of a model, from sections and guesses of a run."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
-from math import inf
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hsdsl.analysis.orbits.continuation import CIRCLE, Branch, Follower, branch
 from hsdsl.analysis.orbits.orbit import Orbit, judged, multipliers_of, returning
-from hsdsl.analysis.orbits.sampling import OrbitalStability, directions, sampled
 from hsdsl.analysis.orbits.section import (
     COARSER,
     LONGER,
@@ -29,15 +23,14 @@ from hsdsl.analysis.orbits.section import (
 )
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import called, counted, did_you_mean, without_memory
+from hsdsl.base.names import counted, did_you_mean, without_memory
 from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
 from hsdsl.base.parts import meant_alone, numbers_of, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.preparation.values import whole, with_parameters
-from hsdsl.interface.model.differentiate import FINEST, located_arguments, start_by, varied
-from hsdsl.interface.model.distances import distance_of_runs
+from hsdsl.interface.model.differentiate import FINEST, LOCATED_ALONE, located_arguments
 
 if TYPE_CHECKING:
     from hsdsl.analysis.orbits.level import Level
@@ -45,7 +38,6 @@ if TYPE_CHECKING:
     from hsdsl.interface.model.runs import Runs
 
 
-REFUSED = ("step", "scheme", "samples", "precision")
 MOST_GUESSES = 6
 MOST_NAMED = 4  # transitions in a hint
 MOST_OFFERED = 8  # states of a start in a hint
@@ -95,7 +87,7 @@ class Orbits:
     ) -> None:
         from hsdsl.analysis.orbits.forcing import PHASE, forced, shifted
 
-        check_arguments(arguments, "an orbit", REFUSED)
+        check_arguments(arguments, "an orbit", LOCATED_ALONE)
         self.model, self.laps, self.arguments = model, whole(laps, "laps", 1), dict(arguments)
         self.edge = _edge(model, section)
         self._parameters = _numbers(model, arguments)
@@ -430,47 +422,3 @@ def _edge(model: Runs, section: str) -> str:
             hint = "a section is a transition, by its name; " + (hint or "")
         raise UsageError(f"the model has no transition '{section}'", hint)
     return section
-
-
-def orbital_stability(
-    model: Runs,
-    wrt: str | Sequence[str] | None,
-    radii: Sequence[float],
-    samples: int,
-    seed: int,
-    progress: Callable[[int, int], None] | None,
-    arguments: Mapping[str, Any],
-) -> OrbitalStability:
-    """Test an execution; see `Model.orbital_stability`."""
-    check_arguments(arguments, "a stability test", REFUSED)
-    if len(radii) < 2 or not all(0 < b < a for a, b in pairwise(radii)):
-        raise UsageError(f"expected at least two radii that fall, got {', '.join(map(str, radii))}")
-    call = located_arguments(model.pipeline, arguments)
-    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters", model.program))
-    by, known = start_by(wrt, call, values)
-    run = model.simulate(**call)
-    sizes = run.sizes()
-    scales = np.array([abs(known[t.label]) or sizes.get(t.name, 0.0) or 1.0 for t in by])
-    ways = directions(len(by), whole(samples, "samples", 1), seed)
-    total, done = len(radii) * len(ways), 0
-
-    def moved_run(shift: Mapping[str, float]) -> tuple[float, float, tuple[str, ...]]:
-        nonlocal done
-        moved = {label: number + shift[label] for label, number in known.items()}
-        other = model.simulate(**varied(call, by, moved, model.program))
-        found = _distance(run, other, model)
-        done += 1
-        if progress is not None:
-            progress(done, total)
-        return (*found, tuple(made.edge for made in other.transitions))
-
-    title = called(run.title, run.model)
-    return sampled([t.label for t in by], scales, list(radii), ways, moved_run, title)
-
-
-def _distance(run: Execution, other: Execution, model: Runs) -> tuple[float, float]:
-    """How far apart two runs are; one that stops for another reason is nowhere near."""
-    if run.stop.reason != other.stop.reason:
-        return inf, inf
-    found = distance_of_runs(run, other, model=model).interval
-    return float(found.lower), float(found.upper)
