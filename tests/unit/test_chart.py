@@ -92,7 +92,7 @@ def test_another_execution_is_wrong_however_small_its_error(ball, changed, verdi
 
 
 def test_an_error_of_the_size_of_the_states_is_wrong(ball):
-    span = ball.exact_values.max() - ball.exact_values.min()
+    span = np.ptp(ball.exact_values, axis=0)  # of each state
     assert judge(ball, exactly(ball, values=ball.exact_values + 0.2 * span)).verdict == "wrong"
     assert judge(ball, exactly(ball, values=ball.exact_values + 0.05 * span)).verdict == "right"
 

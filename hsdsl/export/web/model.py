@@ -9,9 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
+from math import isfinite
 from typing import Any
-
-import numpy as np
 
 from hsdsl.analysis.plot.style import colours
 from hsdsl.analysis.report import words
@@ -144,10 +143,10 @@ def _bounds(source: Source, values: Mapping[str, Any]) -> dict[str, tuple[float 
 
 def _starts(source: Source, run: Execution) -> Iterator[Data]:
     problem = source.problem
-    shown = frozenset(without_memory(run.arcs[0].states))
+    shown, sizes = frozenset(without_memory(run.arcs[0].states)), run.sizes()
     for name, value in zip(problem.states, problem.x, strict=True):
         hidden = name not in shown
-        reach = _largest(run, name) or 1.0
+        reach = size if isfinite(size := sizes.get(name, 0.0)) and size else 1.0
         yield {
             "name": f"initial.{name}",
             "group": "initial",
@@ -166,15 +165,6 @@ def _range(value: float) -> tuple[float, float]:
     """A range without a scale of its own: from zero to twice the value."""
     low, high = sorted((0.0, 2 * value))
     return (low, high) if low < high else (-1.0, 1.0)
-
-
-def _largest(run: Execution, name: str) -> float:
-    """The largest size that a state has in a run."""
-    columns = [
-        np.abs(run.values[arc.first : arc.last + 1, arc.states.index(name)]) for arc in run.arcs if name in arc.states
-    ]
-    sizes = np.concatenate(columns) if columns else np.zeros(1)
-    return float(max(sizes[np.isfinite(sizes)], default=0.0))
 
 
 def _layout(kind: Any) -> Data:

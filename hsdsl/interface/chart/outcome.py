@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import inf, nan
+from math import nan
 from typing import NamedTuple
 
 import numpy as np
@@ -128,7 +128,7 @@ def _difference(
     return ("values", f"an error of {error:.2g} of the span") if error > within.state else ("", "")
 
 
-OUT_OF_SCALE = 0.1  # of the span of the states: a larger error is a wrong result
+OF_CHARTS = Tolerance(state=0.1, time=0.005)  # beyond it a result of a chart is wrong, whatever its error is
 
 
 class Judgement(NamedTuple):
@@ -147,27 +147,10 @@ class Judgement(NamedTuple):
 
 def judge(scene: Scene, result: Result) -> Judgement:
     """Compare a result with the exact execution."""
-    clear = scene.clear
-    apart = np.abs(scene.exact_values[clear] - result.values[clear])
-    error = float(np.nanmax(np.where(np.isfinite(apart), apart, nan), initial=-inf))
-    error = nan if error == -inf else error
-    if result.problem:
-        return Judgement("failed", error, result.transitions, result.problem)
-    others = int(np.count_nonzero(scene.exact_modes[clear] != result.modes[clear]))
-    why = _wrong(scene, result, error, others)
-    return Judgement("wrong" if why else "right", error, result.transitions, why)
-
-
-def _wrong(scene: Scene, result: Result, error: float, others: int) -> str:
-    fewest, most = scene.countable
-    if result.transitions is not None and not fewest <= result.transitions <= most:
-        return f"{result.transitions} transitions instead of {most:g}"
-    if others:
-        return f"another mode at {others} of {len(scene.grid)} samples"
-    span = float(np.nanmax(scene.exact_values) - np.nanmin(scene.exact_values)) or 1.0
-    if not error <= OUT_OF_SCALE * span:
-        return f"an error of {error:.2g} where the states span {span:.2g}"
-    return ""
+    apart = np.abs(scene.exact_values[scene.clear] - result.values[scene.clear])
+    error = float(np.fmax.reduce(np.where(np.isfinite(apart), apart, nan), axis=None, initial=nan))
+    found = outcome(scene, result, OF_CHARTS)
+    return Judgement("failed" if result.problem else found.word, error, found.transitions, found.why)
 
 
 def rho(scene: Scene, execution: Execution, seconds: float) -> Interval | None:
