@@ -243,7 +243,7 @@ def compiled(program: Program) -> ctypes.CDLL:
 
 
 LANES = "hs_the_lanes"
-VECTORS = "avx2"  # what a processor must have, and a flag
+VECTORS = (("avx512f", "avx512dq", "avx512vl"), ("avx2",))  # what a processor must have, and flags
 
 
 def compiled_lanes(program: Program, compiles: bool) -> ctypes.CDLL | None:
@@ -270,7 +270,8 @@ def vectors() -> tuple[str, ...] | None:
         flags = Path("/proc/cpuinfo").read_text().split("flags", 1)[-1].split("\n", 1)[0].split()
     except OSError:
         return None
-    return (f"-m{VECTORS}",) if VECTORS in flags else None
+    found = next((names for names in VECTORS if {*names} <= {*flags}), None)
+    return found and tuple(f"-m{name}" for name in found)
 
 
 def _content(program: Program) -> str:

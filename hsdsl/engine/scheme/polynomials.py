@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.scheme.words import Vector, inline
+from hsdsl.engine.scheme.words import Room, Vector, inline
+
+ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
 
 
 @inline
@@ -41,3 +43,13 @@ def slope_of(c: Vector, n: int, s: Number) -> Number:
     for k in range(n, 0, -1):
         slope = k * c[k] + s * slope
     return slope
+
+
+def split(b: Room, n: int, s: Number, left: Room) -> None:
+    """Cut an interval at the share s: left gets the coefficients before it, b those behind it (de Casteljau)."""
+    rest = 1 - s
+    left[0] = b[0]
+    for j in range(1, n + 1):
+        for i in range(n - j + 1):
+            b[i] = rest * b[i] + s * b[i + 1]
+        left[j] = b[0]

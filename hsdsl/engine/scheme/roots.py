@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.scheme.polynomials import value_and_slope, value_at_end, value_of
+from hsdsl.engine.scheme.polynomials import ROUNDING, split, value_and_slope, value_at_end, value_of
 from hsdsl.engine.scheme.primitives import fill_bernstein, largest_of, least_of
 from hsdsl.engine.scheme.words import Room, Vector, inline
 
-ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
 MOST_REFINEMENTS = 300
 
 
@@ -74,16 +73,6 @@ def stays_below(roots: Roots, c: Vector, n: int, level: Number) -> bool:
         if not total <= bound:
             bound = total
     return bound <= level or largest_of(bernstein_of(roots, c, n), n) <= level
-
-
-def split(b: Room, n: int, s: Number, left: Room) -> None:
-    """Cut an interval at the share s: left gets the coefficients before it, b those behind it (de Casteljau)."""
-    rest = 1 - s
-    left[0] = b[0]
-    for j in range(1, n + 1):
-        for i in range(n - j + 1):
-            b[i] = rest * b[i] + s * b[i + 1]
-        left[j] = b[0]
 
 
 def changes(b: Vector, n: int) -> int:

@@ -25,7 +25,8 @@ NOTICED = {"in contact": "held", "replaced": "replaced", "unsettled": "rough", "
 SLID = 16  # the bit of `HS_SLID`
 KINDS_OF_NOTICES = [(SLID, "sliding"), *((structures.NOTICES.index(word), kind) for word, kind in NOTICED.items())]
 FEWEST_IN_LANES = 64  # instances: fewer leave most lanes empty
-IN_MODES = 3  # runs under way for each lane, where they are in several modes
+UNDER_WAY = 2  # runs for each lane: others wait for their crossings
+IN_MODES = 3  # the same where they are in several modes
 LOG_ROOM = 4096  # transitions that a thread keeps before it hands them over
 Logged = tuple[Array, Array, Array]  # transitions as `hs_transition`, and the states before and after each
 
@@ -151,7 +152,7 @@ class CompiledEnsemble:
     def _together(self) -> int:
         """How many runs are under way: more than lanes where they are in several modes."""
         modes = structures.array_at(ctypes.c_int32, self._lanes.is_for, self._plan.compiled.table.modes)
-        return self._lanes.lanes * (IN_MODES if sum(modes) > 1 else 1)
+        return self._lanes.lanes * (IN_MODES if sum(modes) > 1 else UNDER_WAY)
 
     def look_for_lanes(self, compiles: bool) -> None:
         """Let runs that follow step many at once, by what is kept or what one ``compiles``."""

@@ -13,7 +13,7 @@ from hsdsl.mathematics.program import ModeProgram, Program
 _NUMBER = re.compile(r"\(\(hs_real\)([^()]*)\)")
 _PLAIN = re.compile(r"(?<== )\d\.\d(?=;)|(?<=\(p, )0\.0(?=, 0, c)")
 _CHOICE = re.compile(r"(?<!k % 2 )\?|\bhs_below\b")  # by numbers
-_NONE = "{0, 0, 0, 0, 0, 0, 0}"
+_NONE = "{0}"
 _TEXT = """\
 /* Generated from a model; see hs_lanes.h. */
 
@@ -49,13 +49,18 @@ def _mode(writer: Writer, mode: ModeProgram) -> str | None:
         return None
     kept = dict(writer.functions)
     texts = dict[str, str](DEFINITION.findall(mode.routines.source))
-    names = [writer.function(texts[name]) for name in ("flow", "surfaces")]
+    flow, surfaces, magnitudes = (writer.function(texts[name]) for name in ("flow", "surfaces", "magnitudes"))
+    gradients = [writer.sparse(writer.function(texts[f"gradient_{k}"]), mode.slopes[k]) for k in mode.surfaces]
+    rates = [writer.function(texts[f"rate_{k}"]) for k in mode.surfaces]
     series, surface_series, lines = writer.series(tape, n, False)
     new = (text for name, text in writer.functions.items() if name not in kept)
     if any(map(_CHOICE.search, new)):
         writer.functions = kept
         return None
-    return f"{{{n}, {len(mode.surfaces)}, {', '.join(names)}, {series}, {surface_series}, {lines}}}"
+    return (
+        f"{{{n}, {len(mode.surfaces)}, {flow}, {surfaces}, {series}, {surface_series}, {lines}, {len(mode.edges)}, "
+        f"{magnitudes}, {writer.table('hs_sparse', 'gradients', gradients)}, {writer.pointers(rates)}}}"
+    )
 
 
 def _wide(function: str) -> str:

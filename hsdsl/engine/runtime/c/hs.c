@@ -124,7 +124,7 @@ static int most_degree(const hs_method *method) {
 }
 
 static hs_span lay_out_span(const hs_run *run, hs_store *store) {
-  hs_span span = {0, 0, 0, 0, 0, {0, 0}};
+  hs_span span = {0, 0, 0, 0, 0, 0, {0, 0}};
   span.x = numbers(store, run->width);
   span.largest = numbers(store, run->width);
   span.piece = polynomial(store, run);
@@ -220,15 +220,15 @@ static void open_run(hs_run *run, hs_task *task) {
 }
 
 /* Enter the task's mode. */
-static int begin_run(hs_run *run, hs_task *task) {
-  open_run(run, task);
-  start_sizes(run, task->mode, 0.0);
-  return enter(run, task->mode, task->dimension, 0.0, 0, 0.0, 0, 0.0);
+static int begin_run(hs_run *run, const hs_task *task, hs_time start) {
+  start_sizes(run, task->mode, start);
+  return enter(run, task->mode, task->dimension, start, 0, 0.0, 0, start);
 }
 
 void hs_simulate(hs_task *task) {
   hs_run run;
-  const int entered = begin_run(&run, task);
+  open_run(&run, task);
+  const int entered = begin_run(&run, task, 0.0);
   if (task->settings.scheme == HS_LOCATED)
     located(&run, entered);
   else
@@ -308,8 +308,7 @@ static void restore(hs_run *run, hs_pause *pause) {
 void hs_begin(hs_task *task, hs_pause *pause, hs_time start) {
   hs_run run;
   open_run(&run, task);
-  start_sizes(&run, task->mode, start);
-  const int outcome = enter(&run, task->mode, task->dimension, start, 0, 0.0, 0, start);
+  const int outcome = begin_run(&run, task, start);
   save(&run, pause, outcome == GOES_ON ? PAUSED : outcome);
 }
 

@@ -6,32 +6,46 @@
 
 #include "hs_simulate.h"
 
-#define HS_MOST_LANES 4
+#define HS_MOST_LANES 8
 
 typedef struct {
   int32_t mode;  /* that all runs are in */
   int32_t order; /* of Taylor's method */
   double tolerance; /* 0 for fixed steps */
+  double most; /* steps within `brief` */
   const double *binomials; /* see hs_roots */
+  /* what a run brings along, its columns: */
   double *t, *limit, *longest; /* where the step begins, what it does not pass, how long it may be, or is where it is fixed */
-  double *p;        /* what routines are bound to */
-  double *x, *scales;
-  double *standing; /* for each surface: 1 where the state stands on it, else 0 */
-  double *lines;    /* scratch: coefficients, as hs_series writes them */
-  double *h, *t1, *z, *end, *error; /* the step, its end, the state and the flow there, and the error */
-  double *piece, *before;   /* (power, state): the step's polynomial, and that of the step before it */
+  double *made, *since, *brief; /* see hs_pace */
+  double *p;                /* what routines are bound to */
+  double *x, *scales, *scale;
+  double *before;           /* for each state: see span_size(), at the end of the step before */
+  double *standing;         /* for each surface: 1 where the state stands on it, else 0 */
+  /* and its step: */
+  double *h, *t1, *z;       /* its length, its end, the state there */
+  double *piece;            /* (power, state): its polynomial */
   double *starts, *ends;    /* values of surfaces */
   double *curves;           /* (surface, power): their polynomials over the step */
-  /* of lanes of none of these t, x and scales are those behind the step */
-  int32_t failed;  /* a bit for each lane: the step is not known to be what the loop for one run would make */
+  double *open;             /* for each surface: 1 where it is not passed by for certain */
+  /* scratch: */
+  double *lines;            /* coefficients, as hs_series writes them */
+  double *end, *error;      /* the flow at the end of the step, and the error there */
+  double *values, *weights, *gradient;
+  /* what is found on a step: the first crossing, of which surface, where, and the sizes that largest() makes there */
+  double *surface, *theta, *time, *q, *sizes;
+  /* a bit for each lane; of lanes of none of these all that a run brings along is that behind the step */
+  int32_t failed;   /* the step is not known to be what the loop for one run would make */
+  int32_t slow;     /* no step: there were too many */
   int32_t doubtful; /* of the others: its error is to be looked at */
-  int32_t crossed; /* of the others: a surface may be crossed on it, or reached */
+  int32_t crossed;  /* of the others: a surface may be crossed on it, or reached */
+  int32_t landed;   /* the first crossing is found */
 } hs_lanes;
 
 typedef struct {
   int32_t lanes; /* of a vector */
   const int32_t *is_for; /* (flows): whether it makes steps in this one */
-  int (*step)(hs_lanes *lanes); /* 0 */
+  int (*step)(hs_lanes *lanes);   /* these two give 0 */
+  int (*locate)(hs_lanes *lanes); /* crossings on steps that were made */
 } hs_lane_program;
 
 /* Instances that are run together: those of one ensemble, each place with a task of its own. */
@@ -42,8 +56,10 @@ typedef struct {
   double *memory; /* hs_lane_memory() numbers */
   void *seats; /* one for each place, in this memory */
   int64_t *lost; /* for each mode how many more steps lanes have left than one in LOST */
-  int64_t next, turn; /* the next instance, and the place that is the next to make a step */
-  int64_t steps, stepped, failed, doubtful, crossed; /* calls of the program, and steps of runs that it made, or left */
+  int32_t *ready; /* for each place the mode in which its run may make a step in a lane, or -1 */
+  int64_t next; /* the next instance */
+  /* calls of the program, steps of runs that it made, or left, crossings, and how many of them it found */
+  int64_t steps, stepped, failed, doubtful, crossed, located;
 } hs_team;
 
 HS_EXPORT int64_t hs_lane_memory(const hs_model *model, const hs_method *method, int64_t places, int32_t lanes);

@@ -9,7 +9,11 @@
 #include "hs_lanes.h"
 #include "root.h"
 
-#define HS_WIDTH 4 /* eight lanes are slower: most of a run's time goes into what is done for one lane at a time */
+#if defined(__AVX512DQ__)
+#define HS_WIDTH 8
+#else
+#define HS_WIDTH 4
+#endif
 #if defined(__AVX__)
 #include <immintrin.h>
 #endif
@@ -25,7 +29,9 @@ HS_INLINE hs_wide wide_all(double x) {
 
 /* A bit for each lane. */
 HS_INLINE uint32_t bits_of(hs_mask mask) {
-#if defined(__AVX__)
+#if defined(__AVX512DQ__)
+  return _mm512_movepi64_mask((__m512i)mask);
+#elif defined(__AVX__)
   return (uint32_t)_mm256_movemask_pd((__m256d)mask);
 #else
   uint32_t bits = 0;
@@ -36,21 +42,38 @@ HS_INLINE uint32_t bits_of(hs_mask mask) {
 
 HS_INLINE int hs_any(hs_mask mask) { return bits_of(mask) != 0; }
 
+/* By intrinsics what vectors of compilers say in three operations; of two numbers that are alike the first. */
+#if defined(__AVX512DQ__)
+HS_INLINE hs_wide hs_choose(hs_mask mask, hs_wide yes, hs_wide no) {
+  return (hs_wide)_mm512_mask_blend_pd(_mm512_movepi64_mask((__m512i)mask), (__m512d)no, (__m512d)yes);
+}
+HS_INLINE hs_wide wide_min(hs_wide a, hs_wide b) { return (hs_wide)_mm512_min_pd((__m512d)b, (__m512d)a); }
+HS_INLINE hs_wide wide_max(hs_wide a, hs_wide b) { return (hs_wide)_mm512_max_pd((__m512d)b, (__m512d)a); }
+#elif defined(__AVX__)
+HS_INLINE hs_wide hs_choose(hs_mask mask, hs_wide yes, hs_wide no) {
+  return (hs_wide)_mm256_blendv_pd((__m256d)no, (__m256d)yes, (__m256d)mask);
+}
+HS_INLINE hs_wide wide_min(hs_wide a, hs_wide b) { return (hs_wide)_mm256_min_pd((__m256d)b, (__m256d)a); }
+HS_INLINE hs_wide wide_max(hs_wide a, hs_wide b) { return (hs_wide)_mm256_max_pd((__m256d)b, (__m256d)a); }
+#else
 HS_INLINE hs_wide hs_choose(hs_mask mask, hs_wide yes, hs_wide no) {
   return (hs_wide)((mask & (hs_mask)yes) | (~mask & (hs_mask)no));
 }
-
-HS_INLINE hs_wide wide_fabs(hs_wide x) { return (hs_wide)((hs_mask)x & ~(hs_mask)wide_all(-0.0)); }
 HS_INLINE hs_wide wide_min(hs_wide a, hs_wide b) { return hs_choose(b < a, b, a); }
 HS_INLINE hs_wide wide_max(hs_wide a, hs_wide b) { return hs_choose(b > a, b, a); }
+#endif
+
+HS_INLINE hs_wide wide_fabs(hs_wide x) { return (hs_wide)((hs_mask)x & ~(hs_mask)wide_all(-0.0)); }
 
 HS_INLINE hs_wide wide_smaller(hs_wide least, hs_wide h) {
   return hs_choose(h != h, least, hs_choose(least != least, h, wide_min(h, least)));
 }
 
-HS_INLINE hs_wide wide_root(hs_wide x, int m) {
+/* root() in some lanes. */
+HS_INLINE hs_wide root_in(hs_mask lanes, hs_wide x, int m) {
   hs_wide found = x;
-  for (int i = 0; i < HS_WIDTH; i++) found[i] = root(x[i], m);
+  for (int i = 0; i < HS_WIDTH; i++)
+    if (lanes[i]) found[i] = root(x[i], m);
   return found;
 }
 
@@ -69,7 +92,33 @@ HS_INLINE hs_wide wide_div(hs_wide a, hs_wide b, int *bad) {
 
 HS_INLINE hs_wide wide_abs(hs_wide x, int *bad) { return (void)bad, wide_fabs(x); }
 
-#define OF_ONE(name)                                                        \
+/* The last few arguments of a function, and what it gave: a step begins where the one before ended. */
+#define KEPT 4
+typedef struct {
+  hs_wide x[KEPT], y[KEPT];
+  int count, next;
+} hs_known;
+
+#define OF_ONE(name)                                                                  \
+  static hs_wide wide_##name(hs_wide x, int *bad) {                                   \
+    static __thread hs_known known;                                                   \
+    hs_wide found = x;                                                                \
+    hs_mask left = ~((hs_mask)x & 0);                                                 \
+    int failed = 0;                                                                   \
+    for (int k = 0; k < known.count; k++) {                                           \
+      const hs_mask same = (hs_mask)known.x[k] == (hs_mask)x;                         \
+      found = hs_choose(same, known.y[k], found);                                     \
+      left &= ~same;                                                                  \
+    }                                                                                 \
+    if (!hs_any(left)) return found;                                                  \
+    for (int i = 0; i < HS_WIDTH; i++)                                                \
+      if (left[i]) found[i] = hs_##name(x[i], &failed);                     \
+    *bad |= failed;                                                                   \
+    if (!failed) known.x[known.next] = x, known.y[known.next] = found;                \
+    if (!failed) known.next = (known.next + 1) % KEPT, known.count += known.count < KEPT; \
+    return found;                                                                     \
+  }
+#define EACH(name)                                                          \
   static inline hs_wide wide_##name(hs_wide x, int *bad) {                  \
     hs_wide found = x;                                                      \
     for (int i = 0; i < HS_WIDTH; i++) found[i] = hs_##name(x[i], bad);     \
@@ -83,13 +132,17 @@ HS_INLINE hs_wide wide_abs(hs_wide x, int *bad) { return (void)bad, wide_fabs(x)
   }
 OF_ONE(sin) OF_ONE(cos) OF_ONE(tan) OF_ONE(asin) OF_ONE(acos) OF_ONE(atan)
 OF_ONE(sinh) OF_ONE(cosh) OF_ONE(tanh) OF_ONE(asinh) OF_ONE(acosh) OF_ONE(atanh)
-OF_ONE(exp) OF_ONE(log) OF_ONE(floor) OF_ONE(sign) OF_ONE(heaviside)
+OF_ONE(exp) OF_ONE(log) EACH(floor) EACH(sign) EACH(heaviside)
 OF_TWO(pow) OF_TWO(atan2)
 
 HS_INLINE hs_wide wide_sqrt(hs_wide x, int *bad) {
   hs_wide found = x;
   *bad |= hs_any(x < 0.0);
+#if defined(__AVX512DQ__)
+  found = (hs_wide)_mm512_sqrt_pd((__m512d)x);
+#else
   for (int i = 0; i < HS_WIDTH; i++) found[i] = sqrt(x[i]);
+#endif
   return found;
 }
 
@@ -98,7 +151,6 @@ HS_INLINE hs_wide wide_sqrt(hs_wide x, int *bad) {
 #undef HS_ALL
 #define HS_ALL(number) wide_all(number)
 #define fabs wide_fabs
-#define root wide_root
 #define smaller wide_smaller
 #define hs_min wide_min
 #define hs_max wide_max
@@ -130,14 +182,28 @@ HS_INLINE hs_wide wide_sqrt(hs_wide x, int *bad) {
 #include "primitives.h"
 #include "polynomials.c"
 
-/* The routines of a mode, for lanes. */
+/* The routines of a mode, for lanes: see hs_mode. */
+typedef int hs_lane_routine(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
+
+typedef struct {
+  hs_lane_routine *values;
+  int count;
+  const int *place;
+} hs_lane_sparse;
+
+#define hs_routine hs_lane_routine
+#define hs_sparse hs_lane_sparse
+
 typedef struct {
   int dimension, surfaces;
-  int (*flow)(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
-  int (*values)(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
+  hs_lane_routine *flow, *values;
   int (*series)(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines);
   int (*surface_series)(const hs_real *p, int order, hs_real *lines);
   const int *surface_line;
+  int edges;
+  hs_lane_routine *magnitudes;
+  const hs_lane_sparse *gradients;
+  hs_lane_routine *const *rates;
 } hs_lane_mode;
 
 #endif

@@ -1,8 +1,11 @@
-/* One step of Taylor's method in lanes: that of next_series() in located.c, and whether crossings_along() there would
-   find nothing on it. Nothing is decided here that is not plain: in a lane where it is not, the loop for one run decides.
-   The text of a model's routines stands before this file, with the table `lane_modes`. */
+/* One step of Taylor's method in lanes, that of next_series() in located.c, and the first crossing on such steps, that
+   of crossings_along() there. Nothing is decided here that is not plain: in a lane where it is not, the loop for one run
+   decides. The text of a model's routines stands before this file, with the table `lane_modes`. */
+
+#include "lane_roots.c"
 
 #define FAR 0x1p500 /* sums of some numbers below it are finite */
+#define MOST_SETTLINGS 8
 
 /* How far a polynomial goes, beyond which all lanes have zeros. */
 static int degree_of_lanes(const hs_real *c, int n) {
@@ -54,39 +57,100 @@ static hs_mask curves_of(const hs_lane_mode *mode, const hs_lanes *l, const hs_r
   return known;
 }
 
+/* See span_size(). */
+static hs_real size_at(const hs_lanes *l, int n, hs_real share, int s) {
+  const hs_real *const c = (hs_real *)l->piece;
+  const int last = l->order - 1;
+  hs_real v = fabs(c[last * n + s]) * share;
+  for (int m = last - 1; m >= 0; m--) v = (fabs(c[m * n + s]) + v) * share;
+  return fabs(((hs_real *)l->x)[s]) + v;
+}
+
+/* The bound of surface k from its magnitude at a point: see bound_from(). Not 0 where its gradient has no value. */
+static int bound_of(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real t, const hs_real *x, hs_real magnitude,
+                    hs_real *bound) {
+  const hs_lane_sparse *const row = &mode->gradients[k];
+  const hs_mask standing = ((hs_real *)l->standing)[k] != 0;
+  hs_real *const g = (hs_real *)l->gradient, total = magnitude, sum = t * 0;
+  if (row->values((hs_real *)l->p, t, x, g)) return 1;
+  for (int i = 0; i < row->count; i++) {
+    const int s = row->place[i] - 1;
+    const hs_real size = s < 0 ? fabs(t) : hs_choose(standing, fabs(((hs_real *)l->scale)[s]), t * 0);
+    total = total + fabs(g[i]) * (s < 0 ? size : hs_max(fabs(x[s]), size));
+    sum = sum + fabs(g[i]);
+  }
+  *bound = ROUNDOFF_UNITS * HS_UNIT * total;
+  return hs_any(~(sum < FAR));
+}
+
+/* Forget the surfaces that some lanes stood on and have left; not 0 where that is not known: see leave(). */
+static int leave_lanes(const hs_lane_mode *mode, const hs_lanes *l, hs_mask passed) {
+  hs_real *const standing = (hs_real *)l->standing, *const weights = (hs_real *)l->weights, noise;
+  const hs_real t = *(hs_real *)l->t1, *const z = (hs_real *)l->z;
+  hs_mask any = passed & ~passed;
+  for (int k = 0; k < mode->surfaces; k++) any |= passed & (standing[k] != 0);
+  if (!hs_any(any)) return 0;
+  if (mode->magnitudes((hs_real *)l->p, t, z, weights)) return 1;
+  for (int k = 0; k < mode->surfaces; k++) {
+    const hs_mask on = passed & (standing[k] != 0);
+    if (!hs_any(on)) continue;
+    if (bound_of(mode, l, k, t, z, weights[k], &noise)) return 1;
+    standing[k] = hs_choose(on & (fabs(((hs_real *)l->ends)[k]) > noise), standing[k] * 0, standing[k]);
+  }
+  return 0;
+}
+
 /* Go on at the end of the step in some lanes. */
 static void go_to_ends(const hs_lanes *l, int n, hs_mask passed) {
   hs_real *const x = (hs_real *)l->x, *const z = (hs_real *)l->z, *const scales = (hs_real *)l->scales;
+  hs_real *const before = (hs_real *)l->before;
   *(hs_real *)l->t = hs_choose(passed, *(hs_real *)l->t1, *(hs_real *)l->t);
   for (int s = 0; s < n; s++) {
+    before[s] = hs_choose(passed, size_at(l, n, HS_ALL(1.0), s), before[s]);
     x[s] = hs_choose(passed, z[s], x[s]);
     scales[s] = hs_choose(passed, hs_max(scales[s], fabs(z[s])), scales[s]);
   }
+}
+
+/* The lanes that may make one more step: see count_step(). */
+static hs_mask counted(const hs_lanes *l) {
+  const hs_real t = *(hs_real *)l->t;
+  hs_real *const made = (hs_real *)l->made, *const since = (hs_real *)l->since;
+  const hs_mask later = t - *since > *(hs_real *)l->brief;
+  *made = hs_choose(later, *made * 0, *made + 1);
+  *since = hs_choose(later, t, *since);
+  return *made <= l->most;
+}
+
+static hs_real proposed_step(const hs_lanes *l, int n) {
+  const hs_real *const lines = (hs_real *)l->lines, *const scales = (hs_real *)l->scales;
+  const hs_real longest = *(hs_real *)l->longest;
+  const double least = l->tolerance > HS_UNIT ? l->tolerance : HS_UNIT;
+  if (!(l->tolerance > 0)) return longest;
+  hs_real h = step_of_terms(lines, scales, n, l->order, least);
+  for (int s = 0; s < n; s++) {
+    const hs_mask small = ~(least * scales[s] > HS_NOTHING);
+    if (hs_any(small)) h = smaller(h, wide_from_zero(small, lines + (s + 1) * (l->order + 2), l->order, least));
+  }
+  return hs_choose(h != h, longest, hs_min(longest, h));
 }
 
 static int step_lanes(hs_lanes *l) {
   const hs_lane_mode *const mode = &lane_modes[l->mode];
   const int n = mode->dimension, order = l->order, adaptive = l->tolerance > 0;
   const hs_real *const p = (hs_real *)l->p, *const x = (hs_real *)l->x, *const scales = (hs_real *)l->scales;
-  const hs_real t = *(hs_real *)l->t, longest = *(hs_real *)l->longest;
+  const hs_real t = *(hs_real *)l->t, *const standing = (hs_real *)l->standing;
   hs_real *const lines = (hs_real *)l->lines, *const z = (hs_real *)l->z, *const end = (hs_real *)l->end;
-  hs_real *const starts = (hs_real *)l->starts, *const ends = (hs_real *)l->ends;
-  const hs_real *const standing = (hs_real *)l->standing;
+  hs_real *const starts = (hs_real *)l->starts, *const ends = (hs_real *)l->ends, *const open = (hs_real *)l->open;
   hs_real *const error = (hs_real *)l->error;
-  hs_real powers[HS_MOST_ORDER + 1], h = longest;
-  hs_mask good = t == t, exact = good;
+  hs_real powers[HS_MOST_ORDER + 1];
+  const hs_mask all = t == t, few = counted(l);
+  hs_mask good = few, exact = all;
   l->failed = -1;
   l->crossed = l->doubtful = 0;
+  l->slow = (int32_t)bits_of(~few);
   if (mode->series(p, order, t, x, lines)) return 0;
-  if (adaptive) {
-    const double least = l->tolerance > HS_UNIT ? l->tolerance : HS_UNIT;
-    h = step_of_terms(lines, scales, n, order, least);
-    for (int s = 0; s < n; s++) {
-      const hs_mask small = ~(least * scales[s] > HS_NOTHING);
-      if (hs_any(small)) h = smaller(h, wide_from_zero(small, lines + (s + 1) * (order + 2), order, least));
-    }
-    h = hs_choose(h != h, longest, hs_min(longest, h));
-  }
+  hs_real h = proposed_step(l, n);
   const hs_real t1 = end_of_step(t, &h, *(hs_real *)l->limit);
   good &= t1 > t;
   *(hs_real *)l->h = h;
@@ -100,7 +164,7 @@ static int step_lanes(hs_lanes *l) {
     if (adaptive) exact &= fabs(error[s]) <= l->tolerance * hs_max(scales[s], fabs(z[s]));
   }
   if (!hs_any(good) || mode->values(p, t, x, starts) || mode->values(p, t1, z, ends)) return 0;
-  hs_mask crossed = good & ~good;
+  hs_mask crossed = all & ~all;
   if (mode->surfaces) {
     const double tolerance = adaptive ? l->tolerance : UNKNOWN_TOLERANCE;
     if (mode->surface_series(p, order, lines)) return 0;
@@ -108,14 +172,127 @@ static int step_lanes(hs_lanes *l) {
   }
   for (int k = 0; k < mode->surfaces; k++) {
     const hs_real *const c = (hs_real *)l->curves + k * (order + 1);
-    crossed |= ~passed_by(l->binomials, c, order, standing[k] != 0, ends[k], adaptive);
+    const hs_mask passed = passed_by(l->binomials, c, order, standing[k] != 0, ends[k], adaptive);
+    open[k] = hs_choose(passed, t * 0, HS_ALL(1.0));
+    crossed |= ~passed;
   }
+  const hs_mask passed = good & exact & ~crossed;
+  if (leave_lanes(mode, l, passed)) return 0;
   l->failed = (int32_t)bits_of(~good);
   l->crossed = (int32_t)bits_of(crossed & good);
   l->doubtful = (int32_t)bits_of(good & ~exact);
-  go_to_ends(l, n, good & exact & ~crossed);
+  go_to_ends(l, n, passed);
+  return 0;
+}
+
+/* The first rise of any surface in each lane: its share of the step and the slope there, and how many there are. */
+typedef struct {
+  hs_real surface, share, slope, count;
+  hs_mask plain;
+} rises_of_lanes;
+
+static int first_rises(const hs_lane_mode *mode, const hs_lanes *l, hs_real *shares, rises_of_lanes *first) {
+  const hs_real *const p = (hs_real *)l->p, *const x = (hs_real *)l->x, *const z = (hs_real *)l->z;
+  const hs_real t = *(hs_real *)l->t, t1 = *(hs_real *)l->t1, *const open = (hs_real *)l->open;
+  hs_real *const begun = (hs_real *)l->values, *const ended = (hs_real *)l->weights, low, high;
+  if (mode->magnitudes(p, t, x, begun) || mode->magnitudes(p, t1, z, ended)) return 1;
+  first->surface = first->count = first->slope = t * 0;
+  first->share = HS_ALL(2.0);
+  first->plain = t == t;
+  for (int k = 0; k < mode->surfaces; k++) {
+    const hs_mask on = open[k] != 0;
+    shares[k] = HS_ALL(2.0);
+    if (!hs_any(on)) continue;
+    hs_real *const c = (hs_real *)l->curves + k * (l->order + 1), root = t * 0;
+    const int n = degree_of_lanes(c, l->order);
+    if (bound_of(mode, l, k, t, x, begun[k], &low) || bound_of(mode, l, k, t1, z, ended[k], &high)) return 1;
+    c[0] = hs_choose(((hs_real *)l->standing)[k] != 0, c[0] * 0, c[0]);
+    const hs_mask found = rise_in_lanes(l->binomials, c, n, on & (c[n] != 0) & ~(c[0] > low), hs_max(low, high), &root);
+    first->plain &= ~on | found;
+    shares[k] = hs_choose(on, root, shares[k]);
+    first->count = hs_choose(on, first->count + 1, first->count);
+    const hs_mask earlier = on & (root < first->share);
+    first->surface = hs_choose(earlier, t * 0 + k, first->surface);
+    first->slope = hs_choose(earlier, slope_of(c, n, root), first->slope);
+    first->share = hs_choose(earlier, root, first->share);
+  }
+  first->plain &= (first->slope != 0) & (first->count > 0);
+  return 0;
+}
+
+/* Surfaces and their magnitudes where each lane's crossing is, and the state there: see span_place(). */
+static int look_at(const hs_lane_mode *mode, const hs_lanes *l, hs_real share) {
+  const hs_real *const c = (hs_real *)l->piece, *const x = (hs_real *)l->x, *const z = (hs_real *)l->z;
+  const hs_real *const p = (hs_real *)l->p;
+  hs_real *const time = (hs_real *)l->time, *const q = (hs_real *)l->q;
+  const int n = mode->dimension, last = l->order - 1;
+  const hs_mask at_end = share == 1, at_start = ~(share > 0);
+  *time = hs_choose(at_end, *(hs_real *)l->t1, *(hs_real *)l->t + share * *(hs_real *)l->h);
+  for (int s = 0; s < n; s++) {
+    hs_real v = c[last * n + s] * share;
+    for (int m = last - 1; m >= 0; m--) v = (c[m * n + s] + v) * share;
+    q[s] = hs_choose(at_end, z[s], hs_choose(at_start, x[s], x[s] + v));
+  }
+  return mode->values(p, *time, q, (hs_real *)l->values) || mode->magnitudes(p, *time, q, (hs_real *)l->weights);
+}
+
+/* Correct each lane's crossing to round-off: see settled(). The lanes that were. */
+static hs_mask settle_lanes(const hs_lane_mode *mode, const hs_lanes *l, const rises_of_lanes *first) {
+  const hs_real *const values = (hs_real *)l->values, *const weights = (hs_real *)l->weights;
+  hs_real *const theta = (hs_real *)l->theta, least = HS_ALL(INFINITY), next = first->share;
+  hs_mask active = first->plain, done = active & ~active;
+  for (int i = 0; i < MOST_SETTLINGS && hs_any(active); i++) {
+    *theta = next;
+    if (look_at(mode, l, next)) return done & ~done;
+    hs_real r = next, noise = next, bound;
+    for (int k = 0; k < mode->surfaces; k++) {
+      const hs_mask here = first->surface == k;
+      if (!hs_any(here & active)) continue;
+      if (bound_of(mode, l, k, *(hs_real *)l->time, (hs_real *)l->q, weights[k], &bound)) return done & ~done;
+      r = hs_choose(here, values[k], r);
+      noise = hs_choose(here, bound, noise);
+    }
+    active &= fabs(r) < least;
+    least = fabs(r);
+    done |= active & (least <= noise);
+    active &= ~done;
+    next = hs_choose(active, hs_min(HS_ALL(1.0), hs_max(next * 0, next - r / first->slope)), next);
+  }
+  return done;
+}
+
+/* The lanes in which no other surface counts beside the first one: see mark_behind() and with_unseen(). */
+static hs_mask counts_alone(const hs_lane_mode *mode, const hs_lanes *l, const hs_real *shares, hs_real surface) {
+  const hs_real *const values = (hs_real *)l->values, *const weights = (hs_real *)l->weights, *const q = (hs_real *)l->q;
+  const hs_real time = *(hs_real *)l->time, theta = *(hs_real *)l->theta;
+  hs_mask alone = time == time;
+  for (int k = 0; k < mode->surfaces; k++) {
+    const hs_mask other = surface != k, rises = other & (shares[k] < 2);
+    hs_real noise, rate;
+    if (k < mode->edges) alone &= ~other | ~(values[k] > 0);
+    if (!hs_any(rises)) continue;
+    if (bound_of(mode, l, k, time, q, weights[k], &noise)) return alone & ~alone;
+    if (mode->rates[k]((hs_real *)l->p, time, q, &rate)) return alone & ~alone;
+    alone &= ~rises | ((shares[k] > theta) & (values[k] < -hs_max(noise, fabs(rate) * (HS_TIE * fabs(time)))));
+  }
+  return alone;
+}
+
+static int locate_lanes(hs_lanes *l) {
+  const hs_lane_mode *const mode = &lane_modes[l->mode];
+  hs_real *const sizes = (hs_real *)l->sizes, *const shares = (hs_real *)l->error;
+  rises_of_lanes first;
+  l->landed = 0;
+  if (first_rises(mode, l, shares, &first) || !hs_any(first.plain)) return 0;
+  hs_mask landed = settle_lanes(mode, l, &first);
+  if (!hs_any(landed)) return 0;
+  landed &= counts_alone(mode, l, shares, first.surface) & (*(hs_real *)l->theta > 0);
+  *(hs_real *)l->surface = first.surface;
+  for (int s = 0; s < mode->dimension; s++)
+    sizes[s] = hs_max(((hs_real *)l->before)[s], size_at(l, mode->dimension, *(hs_real *)l->theta, s));
+  l->landed = (int32_t)bits_of(landed);
   return 0;
 }
 
 extern const hs_lane_program hs_the_lanes;
-HS_EXPORT const hs_lane_program hs_the_lanes = {HS_WIDTH, lanes_are_for, step_lanes};
+HS_EXPORT const hs_lane_program hs_the_lanes = {HS_WIDTH, lanes_are_for, step_lanes, locate_lanes};

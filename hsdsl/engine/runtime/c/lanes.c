@@ -1,97 +1,155 @@
 /* Instances of an ensemble whose steps are made together, in lanes of vectors. Each place has one run under way, which
-   is that of located.c up to where a flow needs steps; there it parks. As many runs of one mode as there are lanes then
-   make a step at once, by code that is compiled for the model (lane_step.c). What that code does not decide is done by
-   the functions for one run, on the same step. So a run has the bits that it has alone. */
+   is that of located.c up to where a flow needs steps; there it parks. Runs of one mode then live in lanes, where code
+   that is compiled for the model (lane_step.c) makes their steps, until something happens. Runs on whose last step a
+   surface is crossed wait until so many do that their crossings are found together. What that code does not decide is
+   done by the functions for one run, on the same step. So a run has the bits that it has alone. */
 
 #include "hs_lanes.h"
 
 #define LOST 4 /* steps that lanes must make for one that they leave, */
 #define MOST_LOST 4096 /* but for so many */
-#define ROWS_OF_PLACE 64 /* that it keeps before it lets go of them: all places together fit into a cache */
+#define KEPT_OF_PLACE 64 /* rows, arcs and transitions that it keeps before it lets go: all places fit into a cache */
 
 typedef struct {
   hs_ensemble *instance;
   hs_run run;
   hs_time limit;
-  int mode;    /* of a run that is parked; -1 of none */
-  int lane;    /* that has this run as it is; -1 for none */
-  int pending; /* whether the last step's polynomial is in the lanes alone */
+  int32_t *mode; /* in which it may make a step in a lane; -1 where it may not, or is there */
+  int unwritten; /* whether a step was made whose end is no row yet */
 } hs_seat;
+
+/* Lanes, and who has them: 0 where a lane is free. */
+typedef struct {
+  hs_lanes l;
+  int64_t columns, carried; /* numbers of a run and its step, and of those what a run brings along */
+  int lanes, count;
+  hs_seat *seat[HS_MOST_LANES];
+} hs_row_of_lanes;
 
 static hs_seat *seat_of(const hs_team *team, int64_t i) { return (hs_seat *)team->seats + i; }
 
-static hs_lanes lay_out_lanes(const hs_model *model, const hs_method *method, int64_t lanes, hs_store *store) {
-  const int64_t n = model->width, m = model->surfaces, order = method->order;
-  const hs_lanes none = {0};
-  hs_lanes l = none;
-  double **const one[] = {&l.t, &l.limit, &l.longest, &l.h, &l.t1};
-  double **const states[] = {&l.x, &l.scales, &l.z, &l.end, &l.error};
-  double **const surfaces[] = {&l.standing, &l.starts, &l.ends};
-  for (int i = 0; i < 5; i++) *one[i] = numbers(store, lanes);
-  for (int i = 0; i < 5; i++) *states[i] = numbers(store, n * lanes);
-  for (int i = 0; i < 3; i++) *surfaces[i] = numbers(store, m * lanes);
-  l.p = numbers(store, (int64_t)model->data * lanes);
-  l.lines = numbers(store, (int64_t)model->lines * (order + 2) * lanes);
-  l.piece = numbers(store, n * order * lanes);
-  l.before = numbers(store, n * order * lanes);
-  l.curves = numbers(store, m * (order + 1) * lanes);
-  l.order = method->order;
-  return l;
+static void take_columns(hs_store *store, int64_t count, double **const *each) {
+  for (; *each; each++) **each = numbers(store, count);
+}
+
+static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_method *method, int64_t lanes,
+                          hs_store *store) {
+  const int64_t n = model->width, m = model->surfaces, order = method->order, begun = store->used;
+  const hs_row_of_lanes none = {0};
+  *row = none;
+  hs_lanes *const l = &row->l;
+  double **const one[] = {&l->t, &l->limit, &l->longest, &l->made, &l->since, &l->brief, 0};
+  double **const states[] = {&l->x, &l->scales, &l->scale, &l->before, 0};
+  double **const step[] = {&l->h, &l->t1, 0}, **const found[] = {&l->surface, &l->theta, &l->time, 0};
+  double **const surfaces[] = {&l->starts, &l->ends, &l->open, 0}, **const noises[] = {&l->values, &l->weights, 0};
+  double **const scratch[] = {&l->end, &l->q, &l->sizes, 0};
+  take_columns(store, lanes, one);
+  l->p = numbers(store, (int64_t)model->data * lanes);
+  take_columns(store, n * lanes, states);
+  l->standing = numbers(store, m * lanes);
+  row->carried = (store->used - begun) / lanes;
+  take_columns(store, lanes, step);
+  l->z = numbers(store, n * lanes);
+  take_columns(store, m * lanes, surfaces);
+  l->piece = numbers(store, n * order * lanes);
+  l->curves = numbers(store, m * (order + 1) * lanes);
+  row->columns = (store->used - begun) / lanes;
+  l->lines = numbers(store, (int64_t)model->lines * (order + 2) * lanes);
+  l->gradient = numbers(store, (n + 1) * lanes);
+  l->error = numbers(store, (n > m ? n : m) * lanes);
+  take_columns(store, n * lanes, scratch);
+  take_columns(store, m * lanes, noises);
+  take_columns(store, lanes, found);
+  l->order = method->order;
+  l->most = MOST_SHORT;
+  row->lanes = (int)lanes;
 }
 
 int64_t hs_lane_memory(const hs_model *model, const hs_method *method, int64_t places, int32_t lanes) {
   hs_store store = {0, HS_MOST_LANES};
+  hs_row_of_lanes row;
+  lay_out_lanes(&row, model, method, lanes, &store);
+  lay_out_lanes(&row, model, method, lanes, &store);
   take(&store, places, sizeof(hs_seat));
   take(&store, model->flows, sizeof(int64_t));
-  lay_out_lanes(model, method, lanes, &store);
+  take(&store, places, sizeof(int32_t));
   return store.used;
 }
 
-static void gather_standing(const hs_run *run, hs_lanes *l, int64_t lanes, int lane) {
-  for (int k = 0; k < run->here.table->surfaces; k++) l->standing[k * lanes + lane] = run->active_surfaces[k];
+/* Copy numbers of a lane. */
+static void copy_lane(const hs_row_of_lanes *from, int lane, const hs_row_of_lanes *to, int other, int64_t count) {
+  for (int64_t i = 0; i < count; i++) to->l.t[i * to->lanes + other] = from->l.t[i * from->lanes + lane];
 }
 
-/* Put the run of a seat where a lane reads it. */
-static void gather(const hs_seat *seat, hs_lanes *l, int64_t lanes, int lane) {
-  const hs_run *const run = &seat->run;
+static void gather(const double *column, hs_real *to, int n, int lanes, int lane) {
+  for (int i = 0; i < n; i++) to[i] = column[i * lanes + lane];
+}
+
+static void scatter(const hs_real *from, double *column, int n, int lanes, int lane) {
+  for (int i = 0; i < n; i++) column[i * lanes + lane] = from[i];
+}
+
+/* Put the run of a seat into a lane. */
+static void enter_lane(hs_row_of_lanes *row, int lane, hs_seat *seat) {
+  hs_run *const run = &seat->run;
+  const hs_lanes *const l = &row->l;
+  const int n = run->here.dimension, lanes = row->lanes;
   l->t[lane] = run->here.t;
   l->limit[lane] = seat->limit;
   l->longest[lane] = run->control.tolerance > 0 ? run->control.largest : run->control.h;
-  for (int i = 0; i < run->model->data; i++) l->p[i * lanes + lane] = run->here.p[i];
-  for (int s = 0; s < run->here.dimension; s++)
-    l->x[s * lanes + lane] = run->x[s], l->scales[s * lanes + lane] = run->scales[s];
-  gather_standing(run, l, lanes, lane);
+  l->made[lane] = run->pace.made, l->since[lane] = run->pace.since, l->brief[lane] = run->pace.brief;
+  scatter(run->here.p, l->p, run->model->data, lanes, lane);
+  scatter(run->x, l->x, n, lanes, lane);
+  scatter(run->scales, l->scales, n, lanes, lane);
+  scatter(run->scale, l->scale, n, lanes, lane);
+  for (int s = 0; s < n; s++) l->before[s * lanes + lane] = run->has_before ? span_size(run, &run->before, 1.0, s) : 0.0;
+  for (int k = 0; k < run->here.table->surfaces; k++) l->standing[k * lanes + lane] = run->active_surfaces[k];
+  row->seat[lane] = seat, row->count++;
+  *seat->mode = -1;
 }
 
-/* Take a step's polynomial out of a lane. */
-static void scatter_piece(const hs_run *run, const double *from, int order, int64_t lanes, int lane,
-                          hs_polynomial *piece) {
-  const int n = run->here.dimension, w = run->width;
-  piece->degree = order;
-  for (int m = 0; m < order; m++)
-    for (int s = 0; s < n; s++) piece->c[m * w + s] = from[(m * n + s) * lanes + lane];
+/* Have the run of a seat where a lane has taken it; `written`: its last row as well, if it has none. */
+static void leave_lane(hs_row_of_lanes *row, int lane, hs_seat *seat, int written) {
+  hs_run *const run = &seat->run;
+  const hs_lanes *const l = &row->l;
+  const int n = run->here.dimension, lanes = row->lanes;
+  run->here.t = l->t[lane];
+  run->pace.made = (int)l->made[lane], run->pace.since = l->since[lane];
+  gather(l->x, run->x, n, lanes, lane);
+  gather(l->scales, run->scales, n, lanes, lane);
+  gather(l->before, run->before.largest, n, lanes, lane);
+  run->has_before = run->before.sized = 1;
+  run->here.active = 0;
+  for (int k = 0; k < run->here.table->surfaces; k++)
+    run->here.active += run->active_surfaces[k] = l->standing[k * lanes + lane] != 0;
+  if (written && seat->unwritten) append(run, run->here.t, run->x, 0);
+  if (written) seat->unwritten = 0;
+  row->seat[lane] = 0, row->count--;
 }
 
-/* Put the step of a lane where next_series() writes its own. */
-static void scatter(hs_run *run, const hs_lanes *l, int64_t lanes, int lane, int doubtful) {
+/* Put the step of a lane where try_series() writes its own. */
+static void step_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
+  const hs_lanes *const l = &row->l;
+  const int n = run->here.dimension, w = run->width, lanes = row->lanes;
   begin_span(run, l->h[lane], l->t1[lane]);
-  for (int s = 0; s < run->here.dimension; s++) {
-    run->z[s] = l->z[s * lanes + lane];
-    run->end[s] = l->end[s * lanes + lane];
-    if (doubtful) run->error[s] = l->error[s * lanes + lane];
-  }
+  gather(l->z, run->z, n, lanes, lane);
+  run->span.piece.degree = l->order;
+  for (int m = 0; m < l->order; m++) gather(l->piece + m * n * lanes, run->span.piece.c + m * w, n, lanes, lane);
 }
 
 /* The same of surfaces along it: see series_curves(). */
-static void scatter_curves(hs_run *run, const hs_lanes *l, int64_t lanes, int lane) {
-  const int count = run->here.table->surfaces, order = l->order;
+static void curves_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
+  const hs_lanes *const l = &row->l;
+  const int count = run->here.table->surfaces, order = l->order, lanes = row->lanes;
   hs_curves *const curves = &run->curves;
   begin_curves(curves, count);
+  gather(l->starts, run->starts, count, lanes, lane);
+  gather(l->starts, run->values, count, lanes, lane);
+  gather(l->ends, run->ends, count, lanes, lane);
   for (int k = 0; k < count; k++) {
     hs_real *const c = coefficients_of(curves, 0, k);
-    run->starts[k] = run->values[k] = l->starts[k * lanes + lane];
-    run->ends[k] = l->ends[k * lanes + lane];
-    for (int m = 0; m <= order; m++) c[m] = l->curves[(k * (order + 1) + m) * lanes + lane];
+    gather(l->curves + k * (order + 1) * lanes, c, order + 1, lanes, lane);
+    c[0] = run->starts[k];
     *degree_of(curves, 0, k) = degree_without_zeros(c, order);
     *off_of(curves, 0, k) = 0;
     curves->certain[k] = 1;
@@ -101,129 +159,177 @@ static void scatter_curves(hs_run *run, const hs_lanes *l, int64_t lanes, int la
 /* Begin the next instance at a place: 0 where none is left. */
 static int begin_next(hs_team *team, hs_seat *seat, int *outcome) {
   hs_ensemble *const e = seat->instance;
-  seat->mode = -1;
   if (team->next >= e->instances || *e->stop) return 0;
   e->done = team->next++;
   begin_instance(e);
-  *outcome = begin_run(&seat->run, &e->task);
+  open_run(&seat->run, &e->task);
   seat->run.parks = 1;
-  seat->run.bare = !e->samples;
+  seat->run.bare = !e->samples && !e->slides;
+  *outcome = begin_run(&seat->run, &e->task, 0.0);
   return 1;
 }
 
-/* Follow the run of a place to the next steps; where it ends, the next instance. */
-static void go_ahead(hs_team *team, hs_seat *seat, int outcome) {
+/* Steps of a run in a mode that has no lanes, or whose surfaces bound its steps, or that emerges from them. */
+static int steps_alone(const hs_team *team, const hs_run *run) {
+  const int mode = run->here.mode;
+  return !team->program->is_for[mode] || run->reach[mode] > 0 || run->here.emerging || team->lost[mode] > MOST_LOST;
+}
+
+/* Follow the run of a place from what a flow has come to until it may make a step in a lane; where it ends, the next
+   instance. */
+static void go_ahead(hs_team *team, hs_seat *seat, int outcome, int flows) {
   hs_run *const run = &seat->run;
-  while ((outcome = located(run, outcome)) != PARKED)
-    if (!end_instance(seat->instance) || !begin_next(team, seat, &outcome)) {
-      seat->mode = -1;
+  for (;;) {
+    if (flows && outcome == GOES_ON && run->here.t < seat->limit && !steps_alone(team, run)) break;
+    if (flows && outcome == GOES_ON) outcome = before_step(run, seat->limit);
+    if (flows && outcome == GOES_ON) {
+      outcome = one_step(run, run->here.dimension, seat->limit);
+      continue;
+    }
+    if (flows) outcome = behind_flow(run, outcome);
+    outcome = located(run, outcome);
+    flows = outcome == PARKED;
+    if (flows) {
+      outcome = GOES_ON;
+      seat->limit = segment_end(run);
+      begin_following(run);
+    } else if (!end_instance(seat->instance) || !begin_next(team, seat, &outcome)) {
       return;
     }
-  seat->mode = run->here.mode;
-  seat->limit = segment_end(run);
-  begin_following(run);
+  }
+  *seat->mode = run->here.mode;
 }
 
-/* Make good what a lane has kept of the step before. */
-static void settle_piece(hs_seat *seat, const hs_lanes *l, const double *from, int64_t lanes) {
-  if (seat->pending) scatter_piece(&seat->run, from, l->order, lanes, seat->lane, &seat->run.before.piece);
-  seat->pending = 0;
-}
-
-/* What a step comes to that was made in a lane, or is made here. */
-static int made_step(hs_team *team, hs_lanes *l, hs_seat *seat, int lane) {
+/* What a crossing comes to that was found in a lane, or is found here. */
+static int behind_crossing(const hs_row_of_lanes *row, int lane, hs_seat *seat) {
   hs_run *const run = &seat->run;
-  const int64_t lanes = team->program->lanes;
-  const int n = run->here.dimension, stood = run->here.active;
+  const hs_lanes *const l = &row->l;
+  const hs_mode *const mode = run->here.table;
+  const int landed = l->landed >> lane & 1, k = landed ? (int)l->surface[lane] : 0, n = run->here.dimension;
+  hs_crossing *const crossing = &run->crossings[k];
+  if (landed) {
+    crossing->edge = k;
+    crossing->theta = l->theta[lane], crossing->time = l->time[lane], crossing->depth = 0.0;
+    gather(l->q, crossing->state, n, row->lanes, lane);
+  }
+  if (landed && (k >= mode->edges || (!mode->edge[k].strict && condition(run, k, crossing->time, crossing->state) == 1))) {
+    if (run->bare)
+      begin_span(run, l->h[lane], l->t1[lane]);
+    else
+      step_of_lane(row, lane, run);
+    gather(l->sizes, run->span.largest, n, row->lanes, lane);
+    run->span.sized = 1;
+    for (int i = 0; i < mode->surfaces; i++)
+      if (i != k) run->crossings[i].edge = -1;
+    seat->unwritten = 0;
+    return behind_event(run, first_event(run));
+  }
+  if (seat->unwritten) append(run, run->here.t, run->x, 0);
+  seat->unwritten = 0;
+  step_of_lane(row, lane, run);
+  curves_of_lane(row, lane, run);
+  return behind_step(run);
+}
+
+/* Find the crossings of the runs that wait for it, and follow these on. */
+static void locate_together(hs_team *team, hs_row_of_lanes *waiting) {
+  const int count = waiting->count;
+  for (int lane = count; count && lane < waiting->lanes; lane++) copy_lane(waiting, 0, waiting, lane, waiting->columns);
+  if (count) team->program->locate(&waiting->l);
+  for (int lane = 0; lane < count; lane++) {
+    hs_seat *const seat = waiting->seat[lane];
+    leave_lane(waiting, lane, seat, 0);
+    team->located += waiting->l.landed >> lane & 1;
+    go_ahead(team, seat, behind_crossing(waiting, lane, seat), 1);
+  }
+}
+
+/* Let the run of a lane wait for its crossing. */
+static void wait_for_crossing(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of_lanes *waiting) {
+  if (waiting->count && waiting->l.mode != row->l.mode) locate_together(team, waiting);
+  waiting->l.mode = row->l.mode, waiting->l.tolerance = row->l.tolerance, waiting->l.binomials = row->l.binomials;
+  copy_lane(row, lane, waiting, waiting->count, row->columns);
+  waiting->seat[waiting->count++] = row->seat[lane];
+  row->seat[lane] = 0, row->count--;
+  team->crossed++;
+  if (waiting->count == waiting->lanes) locate_together(team, waiting);
+}
+
+/* Go on behind the step of a lane. */
+static void behind_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of_lanes *waiting) {
+  const hs_lanes *const l = &row->l;
+  hs_seat *const seat = row->seat[lane];
+  hs_run *const run = &seat->run;
   const int failed = l->failed >> lane & 1, crossed = l->crossed >> lane & 1, doubtful = l->doubtful >> lane & 1;
-  if (failed || crossed || doubtful) settle_piece(seat, l, l->before, lanes), seat->lane = -1;
-  team->lost[run->here.mode] += failed ? LOST : -1;
-  team->failed += failed, team->crossed += crossed, team->doubtful += doubtful;
-  if (failed) return one_step(run, n, seat->limit);
-  scatter(run, l, lanes, lane, doubtful);
-  if (doubtful && is_too_wrong(run, run->span.h)) {
-    expands(run);
-    return behind(run, halved_series(run, n, seat->limit, run->span.h / 2, 1));
+  int outcome = GOES_ON;
+  team->lost[l->mode] += failed ? LOST : -1;
+  if (crossed && !doubtful) {
+    wait_for_crossing(team, row, lane, waiting);
+    return;
   }
-  seat->pending = run->bare && seat->lane >= 0;
-  if (!seat->pending) scatter_piece(run, l->piece, l->order, lanes, lane, &run->span.piece);
-  if (crossed) return scatter_curves(run, l, lanes, lane), behind_step(run);
-  pass(run);
-  if (stood && seat->lane >= 0) gather_standing(run, l, lanes, lane);
-  return GOES_ON;
+  if (!failed && !doubtful) {
+    seat->unwritten = run->bare;
+    if (!run->bare) step_of_lane(row, lane, run), pass(run);
+    if (l->t[lane] < seat->limit) return;
+  }
+  leave_lane(row, lane, seat, 1);
+  team->failed += failed, team->doubtful += doubtful;
+  if (failed)
+    outcome = l->slow >> lane & 1 ? located_stuck(run, HS_SLOW) : one_step(run, run->here.dimension, seat->limit);
+  if (doubtful) {
+    step_of_lane(row, lane, run);
+    gather(l->error, run->error, run->here.dimension, row->lanes, lane);
+    if (is_too_wrong(run, run->span.h))
+      expands(run), outcome = behind(run, halved_series(run, run->here.dimension, seat->limit, run->span.h / 2, 1));
+    else if (crossed)
+      curves_of_lane(row, lane, run), outcome = behind_step(run);
+    else
+      outcome = pass(run);
+  }
+  go_ahead(team, seat, outcome, 1);
 }
 
-/* Give each of the seats that are chosen a lane, that in which it is where it is in one. */
-static void take_lanes(hs_team *team, hs_lanes *l, hs_seat **chosen, int count, hs_seat **seats) {
-  const int lanes = team->program->lanes;
-  int next = 0;
-  for (int lane = 0; lane < lanes; lane++) seats[lane] = 0;
-  for (int i = 0; i < count; i++)
-    if (chosen[i]->lane >= 0) seats[chosen[i]->lane] = chosen[i];
-  for (int i = 0; i < count; i++) {
-    if (chosen[i]->lane >= 0) continue;
-    while (seats[next]) next++;
-    seats[next] = chosen[i];
-  }
-  for (int i = 0; i < team->count; i++) {
-    hs_seat *const seat = seat_of(team, i);
-    if (seat->lane < 0 || seats[seat->lane] == seat) continue;
-    settle_piece(seat, l, l->piece, lanes);
-    seat->lane = -1;
-  }
-  for (int lane = 0; lane < lanes; lane++)
-    if (!seats[lane] || seats[lane]->lane < 0) gather(seats[lane] ? seats[lane] : chosen[0], l, lanes, lane);
-}
-
-/* One step of all runs that are chosen, which are in one mode. */
-static void step_together(hs_team *team, hs_lanes *l, hs_seat **chosen, int count) {
-  const int lanes = team->program->lanes;
-  const hs_run *const run = &chosen[0]->run;
-  hs_seat *seats[HS_MOST_LANES];
-  take_lanes(team, l, chosen, count, seats);
-  swap(&l->piece, &l->before);
-  l->mode = run->here.mode;
-  l->tolerance = run->control.tolerance;
-  l->binomials = run->roots.binomials;
-  team->program->step(l);
-  team->steps++;
-  team->stepped += count;
-  for (int lane = 0; lane < lanes; lane++) {
-    hs_seat *const seat = seats[lane];
-    if (!seat) continue;
-    seat->lane = lane;
-    const int outcome = made_step(team, l, seat, lane);
-    if (outcome != GOES_ON) seat->lane = -1, go_ahead(team, seat, behind_flow(&seat->run, outcome));
-  }
-}
-
-/* Steps of a run in a mode that has no lanes, or whose surfaces bound its steps. */
-static int steps_alone(const hs_team *team, const hs_seat *seat) {
-  return !team->program->is_for[seat->mode] || seat->run.reach[seat->mode] > 0 || team->lost[seat->mode] > MOST_LOST;
-}
-
-/* Choose runs of one mode that may make a step, all places in turn; how many. */
-static int choose_lanes(hs_team *team, const hs_lanes *l, hs_seat **chosen) {
-  int count = 0;
-  for (int64_t i = 0, at = team->turn; i < team->count && count < team->program->lanes; i++) {
-    hs_seat *const seat = seat_of(team, at);
-    at = at + 1 < team->count ? at + 1 : 0;
-    while (seat->mode >= 0 && !(count && seat->mode != chosen[0]->mode)) {
-      hs_run *const run = &seat->run;
-      const int alone = steps_alone(team, seat);
-      if (alone) settle_piece(seat, l, l->piece, team->program->lanes);
-      const int outcome = alone ? follow_on(run, seat->limit) : before_step(run, seat->limit);
-      if (outcome == GOES_ON) {
-        chosen[count++] = seat;
-        team->turn = at;
-        break;
-      }
-      settle_piece(seat, l, l->piece, team->program->lanes);
-      seat->lane = -1;
-      go_ahead(team, seat, behind_flow(run, outcome));
-    }
-  }
+/* How many runs may make a step in a mode. */
+static int count_in(const hs_team *team, const hs_row_of_lanes *row, int mode) {
+  int count = row->l.mode == mode ? row->count : 0;
+  for (int64_t i = 0; i < team->count; i++) count += team->ready[i] == mode;
   return count;
+}
+
+/* Take the mode in which most runs may make a step; how many. */
+static int choose_mode(const hs_team *team, hs_row_of_lanes *row) {
+  int most = count_in(team, row, row->l.mode), mode = row->l.mode;
+  for (int64_t i = 0; i < team->count && most < row->lanes; i++) {
+    const int other = team->ready[i], count = other < 0 || other == mode ? 0 : count_in(team, row, other);
+    if (count > most) most = count, mode = other;
+  }
+  for (int lane = 0; mode != row->l.mode && lane < row->lanes; lane++) {
+    hs_seat *const seat = row->seat[lane];
+    if (!seat) continue;
+    leave_lane(row, lane, seat, 1);
+    *seat->mode = row->l.mode;
+  }
+  row->l.mode = mode;
+  return most;
+}
+
+/* Fill the lanes: how many runs are in them. */
+static int fill_lanes(hs_team *team, hs_row_of_lanes *row, hs_row_of_lanes *waiting) {
+  int first = 0;
+  if (row->count == row->lanes) return row->count;
+  const int most = choose_mode(team, row);
+  if (most < row->lanes && most <= waiting->count) locate_together(team, waiting), choose_mode(team, row);
+  for (int64_t i = 0, lane = 0; i < team->count && row->count < row->lanes; i++) {
+    if (team->ready[i] != row->l.mode) continue;
+    while (row->seat[lane]) lane++;
+    enter_lane(row, (int)lane, seat_of(team, i));
+    row->l.tolerance = row->seat[lane]->run.control.tolerance;
+    row->l.binomials = row->seat[lane]->run.roots.binomials;
+  }
+  while (row->count && !row->seat[first]) first++;
+  for (int lane = 0; row->count && lane < row->lanes; lane++)
+    if (!row->seat[lane]) copy_lane(row, first, row, lane, row->carried);
+  return row->count;
 }
 
 /* Give a place the instances of the first one, and where their results go. */
@@ -238,23 +344,33 @@ void hs_run_team(hs_team *team) {
   const hs_task *const task = &team->places[0]->task;
   const int32_t *const stop = team->places[0]->stop;
   hs_store store = {team->memory, 0};
+  hs_row_of_lanes row, waiting;
   while ((uintptr_t)(store.numbers + store.used) % (HS_MOST_LANES * sizeof(double))) store.used++;
-  hs_lanes lanes = lay_out_lanes(task->model, task->method, team->program->lanes, &store);
-  hs_seat *chosen[HS_MOST_LANES];
+  lay_out_lanes(&row, task->model, task->method, team->program->lanes, &store);
+  lay_out_lanes(&waiting, task->model, task->method, team->program->lanes, &store);
   team->seats = take(&store, team->count, sizeof(hs_seat));
   team->lost = take(&store, task->model->flows, sizeof(int64_t));
+  team->ready = take(&store, team->count, sizeof(int32_t));
   for (int i = 0; i < task->model->flows; i++) team->lost[i] = 0;
-  team->next = team->turn = 0;
+  team->next = 0;
   for (int64_t i = 0; i < team->count; i++) {
     int outcome;
     hs_seat *const seat = seat_of(team, i);
     hs_ensemble *const e = seat->instance = team->places[i];
-    seat->lane = -1, seat->pending = 0;
+    seat->unwritten = 0;
+    seat->mode = &team->ready[i];
+    *seat->mode = -1;
     share(e, team->places[0]);
     open_place(e);
-    if (e->task.chunk.row_room > ROWS_OF_PLACE) e->task.chunk.row_room = ROWS_OF_PLACE;
-    if (begin_next(team, seat, &outcome)) go_ahead(team, seat, outcome);
+    int64_t *const rooms[] = {&e->task.chunk.row_room, &e->task.chunk.arc_room, &e->task.chunk.transition_room};
+    for (int room = 0; room < 3; room++)
+      if (*rooms[room] > KEPT_OF_PLACE) *rooms[room] = KEPT_OF_PLACE;
+    if (begin_next(team, seat, &outcome)) go_ahead(team, seat, outcome, 0);
   }
-  for (int count; !*stop && (count = choose_lanes(team, &lanes, chosen)) > 0;)
-    step_together(team, &lanes, chosen, count);
+  for (int count; !*stop && (count = fill_lanes(team, &row, &waiting)) > 0;) {
+    team->program->step(&row.l);
+    team->steps++, team->stepped += count;
+    for (int lane = 0; lane < row.lanes; lane++)
+      if (row.seat[lane]) behind_lane(team, &row, lane, &waiting);
+  }
 }

@@ -57,6 +57,7 @@ static void span_cut(hs_run *run, hs_real s, hs_polynomial *piece) {
 
 /* The sums of the absolute terms that the state at the share s of a step is computed from. */
 HS_INLINE hs_real span_size(const hs_run *run, const hs_span *span, hs_real s, int state) {
+  if (span->sized) return span->largest[state];
   if (run->method->kind == HS_TABLE)
     return fabs(span->x[state]) + s * span->h * run->method->gain * span->largest[state];
   const int w = run->width, last = span->piece.degree - 1;
@@ -70,6 +71,7 @@ static void begin_span(hs_run *run, hs_real h, hs_time t1) {
   span->t = run->here.t;
   span->h = h;
   span->t1 = t1;
+  span->sized = 0;
   run->weighed = 0;
   copy(span->x, run->x, run->here.dimension);
 }
@@ -526,7 +528,7 @@ static int largest(hs_run *run) {
 /* Record the part of the step that leads to a crossing. */
 static void write_crossing(hs_run *run, const hs_crossing *crossing) {
   if (!(crossing->theta > 0)) return;
-  if (run->method->degree > 0) span_cut(run, crossing->theta, &run->cubic);
+  if (run->method->degree > 0 && !run->bare) span_cut(run, crossing->theta, &run->cubic);
   append(run, crossing->time, crossing->state, &run->cubic);
 }
 
@@ -591,12 +593,12 @@ static int with_unseen(hs_run *run, int count) {
   return count;
 }
 
-/* Say what happens first along the step: a guard, a wall with no guard on it, or nothing (GOES_ON). */
+/* Say what happens first along the step, of the crossings of its surfaces: a guard, a wall with no guard on it, or
+   nothing (GOES_ON). */
 static int first_event(hs_run *run) {
   const hs_mode *mode = run->here.table;
   int guards = 0, tied = 0;
   hs_crossing *wall = 0;
-  if (crossings_along(run)) return WITHOUT_VALUE;
   for (int k = 0; k < mode->surfaces; k++) {
     hs_crossing *const crossing = &run->crossings[k];
     if (crossing->edge < 0) continue;
@@ -673,15 +675,19 @@ HS_INLINE int pass(hs_run *run) {
   return GOES_ON;
 }
 
-/* Go on behind a step that was made: GOES_ON, or what happens on it. */
-static int behind_step(hs_run *run) {
-  const int event = first_event(run);
+/* Go on behind a step on which this happens first: GOES_ON, or what happens. */
+static int behind_event(hs_run *run, int event) {
   if (event == GOES_ON) return pass(run);
   if (event != WITHOUT_VALUE) return event;
   copy(run->task->stop.slope, run->z, run->here.dimension);
   stopped(run, HS_STEP_NOT_FINITE, run->here.t);
   run->task->stop.h = run->span.t1;
   return HS_STEP_NOT_FINITE;
+}
+
+/* Go on behind a step that was made. */
+static int behind_step(hs_run *run) {
+  return behind_event(run, crossings_along(run) ? WITHOUT_VALUE : first_event(run));
 }
 
 HS_INLINE int behind(hs_run *run, hs_step_failure failure) {

@@ -32,6 +32,7 @@ HS_INLINE void write_row(hs_run *run, hs_time t, const hs_real *x, const hs_poly
   hs_chunk *chunk = &run->task->chunk;
   const int n = run->here.dimension, w = run->width, m = run->model->outputs;
   if (!room(run)) return;
+  if (run->bare) chunk->rows = run->row = 0; /* the last one counts */
   const int64_t row = chunk->rows;
   hs_real *values = chunk->values + row * w;
   chunk->times[row] = t;
@@ -56,7 +57,7 @@ HS_INLINE void append(hs_run *run, hs_time t, const hs_real *x, const hs_polynom
 static void begin(hs_run *run, int kind) {
   if (!room(run)) return;
   hs_arc *arc = &run->task->chunk.arc[run->task->chunk.arcs++];
-  arc->first = run->row;
+  arc->first = run->bare ? 0 : run->row;
   arc->jump = run->jump;
   arc->mode = run->here.mode;
   arc->kind = kind;
@@ -99,6 +100,7 @@ static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, co
   transition->alternatives = run->alternatives_count;
   for (int a = 0; a < run->alternatives_count; a++)
     chunk->alternatives[chunk->alternatives_used++] = run->alternatives[a];
+  if (run->bare) return;
   copy(chunk->before + i * w, crossing->state, run->here.dimension);
   for (int s = 0; s < edge->target_dimension; s++) chunk->after[i * w + s] = after ? after[s] : (hs_real)NAN;
 }

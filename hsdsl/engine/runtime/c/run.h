@@ -133,6 +133,7 @@ typedef struct {
   hs_time t, t1;
   hs_real h;
   hs_real *x, *largest; /* where it began; of a table, the largest of its stages */
+  int sized;            /* whether `largest` has the sizes where it ends: see lanes.c */
   hs_polynomial piece;
 } hs_span;
 
@@ -209,7 +210,7 @@ typedef struct {
   hs_time pause; /* see hs.c: when to pause, and whether to do so behind a transition */
   int after_jump;
   int64_t jumps_before;
-  int parks, bare; /* whether steps are made in lanes, and rows have no pieces: see lanes.c */
+  int parks, bare; /* whether steps are made in lanes, and only the last row counts, without its piece: see lanes.c */
 } hs_run;
 
 /* All that a paused run needs to go on: plain data. `data` has the numbers that routines were bound to; there are

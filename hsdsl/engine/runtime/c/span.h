@@ -10,6 +10,7 @@
 typedef int hs_mask;
 #define hs_any(mask) (mask)
 #define hs_choose(mask, yes, no) ((mask) ? (yes) : (no))
+#define root_in(mask, x, m) root(x, m)
 #endif
 
 #define ALMOST (1 - 0x1p-30)
@@ -37,7 +38,7 @@ HS_INLINE hs_real step_of_terms(const hs_real *lines, const hs_real *scales, int
       largest = hs_choose(counts, hs_max(largest, fabs(lines[(s + 1) * (order + 2) + m]) / size), largest);
     }
     const hs_mask shorter = (largest > 0) & ((least != least) | (largest * least > before));
-    if (hs_any(shorter)) least = hs_choose(shorter, smaller(least, root(largest, m)), least);
+    if (hs_any(shorter)) least = hs_choose(shorter, smaller(least, root_in(shorter, largest, m)), least);
     before = largest;
   }
   return least;
