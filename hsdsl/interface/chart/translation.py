@@ -116,7 +116,7 @@ class _Printer(KernelPrinter):
         super().__init__()
         self.functions = functions
 
-    def constant(self, value: Fraction) -> str:
+    def written(self, value: Fraction) -> str:
         number = float(value)
         return f"{number:.0f}" if number.is_integer() and abs(number) < 2**53 else repr(number)
 

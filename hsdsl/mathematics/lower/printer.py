@@ -42,7 +42,7 @@ class KernelPrinter(PythonCodePrinter):
         """Print an expression; SymPy's own method loads what prints assignments."""
         return self._print(sp.sympify(expr))
 
-    def constant(self, value: Fraction) -> str:
+    def written(self, value: Fraction) -> str:
         """Print an exact constant."""
         return f"q_{'m' if value < 0 else ''}{abs(value.numerator)}_{value.denominator}"
 
@@ -51,7 +51,7 @@ class KernelPrinter(PythonCodePrinter):
         return f"{name}({', '.join(arguments)})"
 
     def _print_Rational(self, expr):
-        return self.constant(Fraction(int(expr.p), int(expr.q)))
+        return self.written(Fraction(int(expr.p), int(expr.q)))
 
     _print_Integer = _print_Rational
 
@@ -70,7 +70,7 @@ class KernelPrinter(PythonCodePrinter):
     def _print_Function(self, expr):
         if type(expr).__name__ in _RECIPROCALS:
             inverse = self.call(_RECIPROCALS[type(expr).__name__], [self._print(expr.args[0])])
-            return f"({self.constant(Fraction(1))}/{inverse})"
+            return f"({self.written(Fraction(1))}/{inverse})"
         return self.call(_NAMES[type(expr).__name__], [self._print(a) for a in expr.args])
 
     _print_Abs = _print_sign = _print_floor = _print_log = _print_Min = _print_Max = _print_Function
@@ -86,7 +86,7 @@ class KernelPrinter(PythonCodePrinter):
             factor = self.parenthesize(base, PRECEDENCE["Pow"])
             return "(" + "*".join([factor] * int(exponent)) + ")"
         if exponent.is_Number and exponent < 0:
-            return f"({self.constant(Fraction(1))}/{self.parenthesize(base**-exponent, PRECEDENCE['Pow'])})"
+            return f"({self.written(Fraction(1))}/{self.parenthesize(base**-exponent, PRECEDENCE['Pow'])})"
         return self.call("pow", [self._print(base), self._print(exponent)])
 
     def _print_Mul(self, expr):
@@ -105,7 +105,7 @@ class KernelPrinter(PythonCodePrinter):
     def _product(self, coefficients, factors, negative):
         terms = [self._print(c) for c in coefficients]
         terms += [self.parenthesize(f, PRECEDENCE["Mul"]) for f in factors]
-        return ("-" if negative else "") + ("*".join(terms) if terms else self.constant(Fraction(1)))
+        return ("-" if negative else "") + ("*".join(terms) if terms else self.written(Fraction(1)))
 
     def _print_Add(self, expr, order=None):
         text = ""
