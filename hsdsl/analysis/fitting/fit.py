@@ -12,7 +12,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import condensed, number
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, checks_methods, counted, did_you_mean, shown, visible
@@ -90,8 +90,7 @@ class Fit:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object of `fit --json`; values that are not determined are null."""
-        names = ("values", "deviations", "covariance", "deviation", "success", "message", "evaluations", "at_bound")
-        known = {name: getattr(self, name) for name in names}
+        known = named(self, "values deviations covariance deviation success message evaluations at_bound")
         known |= {"intervals": self.intervals, "level": self.level} if self.level else {}
         return plain(known | {"measurements": self.measured.count, "nonsmooth": self.nonsmooth})
 

@@ -16,6 +16,7 @@ import numpy as np
 from hsdsl.analysis.metrics.interval import CERTIFIED, ZERO, Budget, Interval
 from hsdsl.analysis.metrics.points import ModePoints, SpaceMetric
 from hsdsl.analysis.metrics.trace import Cells, Side, merge, names_of, trace
+from hsdsl.analysis.report.json_form import named
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.bernstein import UNIT, bernstein, largest_norm, length
 from hsdsl.engine.execution import Array, Execution
@@ -66,15 +67,7 @@ class CurveDistance:
 
     def as_json(self) -> dict[str, Any]:
         """Return what ``hsdsl distance --json`` prints."""
-        return {
-            "metric": self.metric,
-            "lower": self.lower,
-            "upper": self.upper,
-            "status": self.status,
-            "time": self.time,
-            "span": list(self.span),
-            "note": self.note,
-        }
+        return named(self, "metric lower upper status time") | {"span": list(self.span), "note": self.note}
 
 
 def rho(

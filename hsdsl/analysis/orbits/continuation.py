@@ -28,7 +28,7 @@ from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, rep
 
 from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, Orbit, multipliers_of
 from hsdsl.analysis.orbits.section import CLOSED, Closed, NoReturn, Return, gap
-from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import number
 from hsdsl.base.names import called, checks_methods
 from hsdsl.engine.execution import Array
@@ -336,30 +336,18 @@ class Branch:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object of `orbit --continue --json`."""
+
+        def placed(at: Point | Bifurcation, names: str) -> dict[str, Any]:
+            return named(at, names) | {"state": dict(zip(self.states, at.state.tolist(), strict=True))}
+
         points = [
-            {
-                "parameter": p.parameter,
-                "state": dict(zip(self.states, p.state.tolist(), strict=True)),
-                "period": p.period,
-                "multipliers": [{"real": m.real, "imaginary": m.imag} for m in map(complex, p.multipliers)],
-                "unstable": p.unstable,
-            }
+            placed(p, "parameter state period")
+            | {"multipliers": [{"real": m.real, "imaginary": m.imag} for m in map(complex, p.multipliers)]}
+            | {"unstable": p.unstable}
             for p in self.points
         ]
-        found = [
-            {"kind": b.kind, "parameter": b.parameter, "state": dict(zip(self.states, b.state.tolist(), strict=True))}
-            for b in self.bifurcations
-        ]
-        return plain(
-            {
-                "section": self.section,
-                "parameter": self.parameter,
-                "points": points,
-                "bifurcations": found,
-                "stable": self.stable,
-                "ends": self.ends,
-            }
-        )
+        found = {"points": points, "bifurcations": [placed(b, "kind parameter state") for b in self.bifurcations]}
+        return plain(named(self, "section parameter") | found | named(self, "stable ends"))
 
     @property
     def knots(self) -> list[tuple[float, Array, bool | None]]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hsdsl.analysis.orbits.level import within
 from hsdsl.analysis.orbits.section import Closed
-from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import condensed, number, values
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.base.names import called, checks_methods, seen
@@ -76,8 +76,7 @@ class Orbit:
 
     def as_json(self) -> dict[str, Any]:
         """The object of `orbit --json`; a complex number is its real and its imaginary part."""
-        names = ("section", "laps", "mode", "state", "phase", "period", "drift", "residual", "verdict", "reasons")
-        result = {name: getattr(self, name) for name in names}
+        result = named(self, "section laps mode state phase period drift residual verdict reasons")
         result |= {"state": seen(self.state), "multipliers": _pairs(self.multipliers)}
         result |= {"kept": self.kept} if self.kept else {}
         if self.sides:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import number
 from hsdsl.base.names import checks_methods
 from hsdsl.engine.execution import Array
@@ -58,16 +58,8 @@ class OrbitalStability:
 
     def as_json(self) -> dict[str, Any]:
         """Return the object of `sensitivity --stability --json`."""
-        return plain(
-            {
-                "wrt": self.wrt,
-                "verdict": self.verdict,
-                "sampled": True,
-                "sentence": self.sentence,
-                "exponent": self.exponent,
-                "runs": [run._asdict() for run in self.runs],
-            }
-        )
+        found = named(self, "wrt verdict") | {"sampled": True} | named(self, "sentence exponent")
+        return plain(found | {"runs": [run._asdict() for run in self.runs]})
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw distances over radii to a .png or .svg file, with a colour for each sequence of transitions."""

@@ -38,39 +38,31 @@ def record(execution: Execution) -> dict[str, Any]:
     """Return the object of `run --json` with the run's own values, to be printed by :func:`dumps`."""
     settings = dict(execution.settings)
     left_out = {"left_out": settings.pop("left_out")} if "left_out" in settings else {}
-    final = _named(execution.final, "time", "mode", "state", "outputs")
+    final = named(execution.final, "time mode state outputs")
     state = final["state"]
     if memory := state.keys() - seen(state):  # what a run needs to go on from here
         final |= {"state": seen(state), "memory": {name: state[name] for name in state if name in memory}}
-    run = _named(execution, "model", "engine", "scheme", "method") | {
+    run = named(execution, "model engine scheme method") | {
         "settings": settings,
         "overrides": execution.overrides,
-        "stop": _named(execution.stop, "reason", "time", "message"),
+        "stop": named(execution.stop, "reason time message"),
         "transitions": [_transition(transition) for transition in execution.transitions],
         "final": final,
-        "warnings": [_named(each, "code", "time", "edge", "message") for each in execution.warnings],
-        "verdict": _named(execution.verdict, "theorem", "reasons"),
+        "warnings": [named(each, "code time edge message") for each in execution.warnings],
+        "verdict": named(execution.verdict, "theorem reasons"),
         "seconds": {stage: execution.seconds.get(stage) for stage in STAGES},
     }
     return run | left_out
 
 
-def _named(value: object, *names: str) -> dict[str, Any]:
-    return {name: getattr(value, name) for name in names}
+def named(value: object, names: str) -> dict[str, Any]:
+    """Return some attributes of an object, whose names have blanks between them."""
+    return {name: getattr(value, name) for name in names.split()}
 
 
 def _transition(t: Transition) -> dict[str, Any]:
-    return {
-        "index": t.index,
-        "time": t.time,
-        "resumed": t.resumed,
-        "edge": t.edge,
-        "from": t.source,
-        "to": t.target,
-        "before": seen(t.before),
-        "after": t.after and seen(t.after),
-        "alternatives": t.alternatives,
-    }
+    ends = {"from": t.source, "to": t.target, "before": seen(t.before), "after": t.after and seen(t.after)}
+    return named(t, "index time resumed edge") | ends | {"alternatives": t.alternatives}
 
 
 _kind: Callable[[Any], Any] = type

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.report.json_form import plain
+from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import aligned, condensed, number
 from hsdsl.analysis.sensitivity.targets import (
     MEASURED,
@@ -415,7 +415,7 @@ def as_json(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> dict[str, Any]
         "model": run.model,
         "wrt": list(found.wrt),
         "settings": {"method": run.method, "tolerance": run.settings.get("tolerance"), "until": run.settings["until"]},
-        "stop": {"reason": found.run.stop.reason, "time": found.run.stop.time},
+        "stop": named(found.run.stop, "reason time"),
         "exists": found.exists,
         "reasons": list(found.reasons),
         "verdict": found.verdict.theorem,
@@ -433,10 +433,8 @@ def as_json(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> dict[str, Any]
         }
         result["samples"] = {"times": table.times, "values": values}
     if found.ties:
-        result["ties"] = [
-            {"time": tie.time, "reason": tie.reason, "orders": [order._asdict() for order in tie.orders]}
-            for tie in found.ties
-        ]
+        orders = ([order._asdict() for order in tie.orders] for tie in found.ties)
+        result["ties"] = [named(tie, "time reason") | {"orders": o} for tie, o in zip(found.ties, orders, strict=True)]
     if found.breaks:
         result["one_sided"] = {edge: _end(side.final) for edge, side in found.sides.items()}
     return plain(result)

@@ -185,23 +185,24 @@ def chosen_names(outputs: str | None, known: list[str], inputs: list[str]) -> li
 
 
 def _streamed(run: Streamed, model: Path) -> dict[str, Any]:
+    from hsdsl.analysis.report.json_form import named
+
     final = run.final
     states = [name for name, present in zip(final.states, final.present[0], strict=True) if present]
-    return {
-        "model": str(model),
-        "engine": run.engine,
-        "scheme": run.scheme,
-        "method": run.method,
-        "overrides": run.overrides,
-        "stop": {"reason": run.stop.reason, "time": run.stop.time, "message": run.stop.message},
-        "transition_count": run.transitions,
-        "warnings": [asdict(each) for each in run.warnings],
-        "out": {"file": str(run.path), "rows": run.rows, "steps": run.steps},
-        "final": {
-            "time": float(final.time[0]),
-            "mode": str(final.mode[0]),
-            "state": {name: float(final[name][0]) for name in states},
-            "outputs": {name: float(final[name][0]) for name in final.outputs},
-        },
-        "seconds": {"simulate": run.seconds},
-    }
+    return (
+        {"model": str(model)}
+        | named(run, "engine scheme method overrides")
+        | {
+            "stop": named(run.stop, "reason time message"),
+            "transition_count": run.transitions,
+            "warnings": [asdict(each) for each in run.warnings],
+            "out": {"file": str(run.path), "rows": run.rows, "steps": run.steps},
+            "final": {
+                "time": float(final.time[0]),
+                "mode": str(final.mode[0]),
+                "state": {name: float(final[name][0]) for name in states},
+                "outputs": {name: float(final[name][0]) for name in final.outputs},
+            },
+            "seconds": {"simulate": run.seconds},
+        }
+    )
