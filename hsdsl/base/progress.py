@@ -85,19 +85,20 @@ def _tick() -> None:
                     work.draw(work.text())
 
 
+def is_notebook() -> bool:
+    """Whether this is the process of a notebook."""
+    ipython: Any = sys.modules.get("IPython")
+    return ipython is not None and getattr(ipython.get_ipython(), "kernel", None) is not None
+
+
 def in_notebook() -> AbstractContextManager[Show | None]:
     """Show progress below the cell of a notebook; gives None elsewhere."""
-    ipython: Any = sys.modules.get("IPython")
-    if ipython is None or getattr(ipython.get_ipython(), "kernel", None) is None:
-        return _NOWHERE
-    return _below_cell(ipython)
-
-
-_NOWHERE: AbstractContextManager[Show | None] = nullcontext()  # made once: a short run takes no longer than to make one
+    return _below_cell() if is_notebook() else nullcontext()
 
 
 @contextmanager
-def _below_cell(ipython: Any) -> Generator[Show | None]:
+def _below_cell() -> Generator[Show | None]:
+    ipython: Any = sys.modules["IPython"]
     handles: list[Any] = []
 
     def draw(text: str | None) -> None:

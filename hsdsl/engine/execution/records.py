@@ -32,10 +32,15 @@ class Deferred:
     ) -> Self:
         """Make an object from the values of some fields, and from functions of the object for the other fields.
 
-        Fields in ``later`` must have no default; nothing is checked. ``known`` is what many have in common.
+        Nothing is checked. ``known`` is what many have in common.
         """
+        return cls.of_fields({**known, **now, "_later": later})
+
+    @classmethod
+    def of_fields(cls, fields: dict[str, Any]) -> Self:
+        """Make an object of what `deferred` makes one of, in one dictionary, which becomes its own."""
         made = object.__new__(cls)
-        object.__setattr__(made, "__dict__", {**known, **now, "_later": later})
+        object.__setattr__(made, "__dict__", fields)
         return made
 
     def _elsewhere(self, name: str) -> str:

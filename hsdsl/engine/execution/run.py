@@ -59,7 +59,7 @@ class Evaluated(Protocol):
     def outputs(self) -> Array: ...
 
 
-Sampler = Callable[[Array, bool, Sequence[str], int], Evaluated]
+Sampler = Callable[[Array, bool, tuple[str, ...], int], Evaluated]
 
 
 class ArcTable:

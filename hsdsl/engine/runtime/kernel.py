@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from functools import cache
 from typing import Any, Protocol
 
@@ -26,7 +26,7 @@ def runtime() -> ctypes.CDLL:
     library.hs_workspace.restype = ctypes.c_int64
     library.hs_run_whole.argtypes, library.hs_run_whole.restype = (ctypes.c_void_p,), ctypes.c_int64
     library.hs_pack.argtypes, library.hs_pack.restype = (ctypes.c_void_p, ctypes.c_void_p), ctypes.c_int64
-    sampling = *(ctypes.c_void_p,) * 5, ctypes.c_int64, *(ctypes.c_int32,) * 3, ctypes.c_void_p
+    sampling = *(ctypes.c_void_p,) * 3, ctypes.c_int64, ctypes.c_void_p
     library.hs_sample_record.argtypes, library.hs_sample_record.restype = sampling, ctypes.c_int64
     library.hs_screen_run.argtypes, library.hs_screen_run.restype = (ctypes.c_void_p,) * 3, ctypes.c_int64
     library.hs_run_ensemble.argtypes, library.hs_run_ensemble.restype = (ctypes.c_void_p,), None
@@ -93,21 +93,24 @@ class Sampled:
     """
 
     def __init__(self, library: ctypes.CDLL, compiled: CompiledModel, timeline: Any) -> None:
-        self.table = structures.Sampling(model=structures.address(ctypes.pointer(compiled.table)), timeline=timeline)
-        self.scratch = 2 * compiled.table.width
-        self.evaluate, self.address = library.hs_sample_record, ctypes.addressof(self.table)
-        self._kept = compiled, timeline
-        self._columns: dict[Any, tuple[Array, Array, int, int]] = {}
+        self.scratch, self.evaluate = 2 * compiled.table.width, library.hs_sample_record
+        self._of = compiled, timeline
+        self._tables: dict[Any, tuple[int, Any, Array, Array]] = {}
 
-    def columns(self, layouts: tuple[tuple[str, ...], ...], names: Sequence[str]) -> tuple[int, int]:
-        """Where it is written how many states each layout has, and which of them have these names."""
-        key = layouts, tuple(names)
-        if key not in self._columns:
+    def table(self, layouts: tuple[tuple[str, ...], ...], names: tuple[str, ...], outputs: int, left: bool) -> int:
+        """Where an ``hs_sampling`` is that asks for some states of each layout, outputs, and a side."""
+        key = layouts, names, outputs, left
+        if key not in self._tables:
+            compiled, timeline = self._of
             dimension = np.array([len(states) for states in layouts], np.int32)
             places = [[there.index(name) if name in there else -1 for name in names] for there in layouts]
             column = np.array(places, np.int32)
-            self._columns[key] = dimension, column, dimension.ctypes.data, column.ctypes.data
-        return self._columns[key][2:]
+            table = structures.Sampling(
+                model=structures.address(ctypes.pointer(compiled.table)), timeline=timeline, outputs=outputs, left=left,
+                columns=len(names), dimension=dimension.ctypes.data, column=column.ctypes.data,
+            )  # fmt: skip
+            self._tables[key] = ctypes.addressof(table), table, dimension, column
+        return self._tables[key][0]
 
 
 class Filled:
@@ -124,7 +127,8 @@ class Filled:
     @property
     def states(self) -> Array:
         """Shape (n, k)."""
-        return self._memory[self._n : (1 + self._k) * self._n].reshape(self._k, self._n).T
+        row = 8 * self._n
+        return np.ndarray((self._n, self._k), np.float64, self._memory, row, (8, row))
 
     @property
     def outputs(self) -> Array:
@@ -152,7 +156,7 @@ class Sampler:
     ) -> None:
         self._sampled, self._columns, self._kinds, self._layout = sampled, columns, kinds, layout
 
-    def __call__(self, times: Array, left: bool, states: Sequence[str], outputs: int) -> Evaluated:
+    def __call__(self, times: Array, left: bool, states: tuple[str, ...], outputs: int) -> Evaluated:
         """Evaluate the states named, and the outputs: all that the model has, or 0.
 
         Parameters
@@ -160,23 +164,18 @@ class Sampler:
         times : array of float, shape (n,)
         left : bool
             At a jump take the value before the first transition.
-        states : sequence of str
+        states : tuple of str
         outputs : int
             How many outputs.
         """
         n, k, shared, layout = len(times), len(states), self._sampled, self._layout
-        room = n * (1 + k + outputs)
-        memory = np.empty(room + shared.scratch)
+        memory = np.empty(n * (1 + k + outputs) + shared.scratch)
         memory[:n] = times
         outside = shared.evaluate(
-            shared.address,
+            shared.table(self._kinds, states, outputs, left),
             self._columns.record,
             None if layout is None else layout.ctypes.data,
-            *shared.columns(self._kinds, states),
             n,
-            k,
-            outputs,
-            left,
             structures.start_of(memory),
         )
         return Filled(memory, outside, n, k, outputs)

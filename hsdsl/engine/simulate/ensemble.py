@@ -175,10 +175,9 @@ class ThreadWorkspace:
         self._memory = np.zeros(room * (1 + len(names)) + 2 * model.width)
         self._arcs = np.zeros(chunk.arc_room, np.int32)
         sampling, start = self.table.sampling, self._memory.ctypes.data
-        ctypes.memmove(ctypes.byref(sampling), ctypes.byref(plan.sampled.table), ctypes.sizeof(sampling))
+        asked = plan.sampled.table(layouts.kinds, names, model.outputs, False)
+        ctypes.memmove(ctypes.byref(sampling), asked, ctypes.sizeof(sampling))
         sampling.width, sampling.degree = model.width, self.workspace.degree
-        sampling.columns, sampling.outputs = len(names), model.outputs
-        sampling.dimension, sampling.column = plan.sampled.columns(layouts.kinds, names)
         sampling.time, sampling.states = start, start + 8 * room
         sampling.scratch = start + 8 * room * (1 + len(names))
         self.table.layouts = self._arcs.ctypes.data

@@ -114,7 +114,7 @@ class Prepared(Problem):
 
     @cached_property
     def _about(self) -> dict[str, Any]:
-        return {**about(self, "python" if self.plan is None else "c"), "repetition": self.again, **self.links}
+        return {**about(self, self.plan is not None), "repetition": self.again, **self.links}
 
     def _run(self, review: Review | None, watch: Watch | None, spent: dict[str, float]) -> Execution:
         plan = self.plan

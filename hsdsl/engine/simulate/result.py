@@ -48,23 +48,14 @@ def written(known: dict[str, Any], run: CompiledRun, stop: Stop, seconds: dict[s
 
     Arrays and objects are made on first use: for a short run they would take longer than the run.
     """
-    plan, columns = run.plan, run.columns
+    plan, columns, fields = run.plan, run.columns, known.copy()
     assert columns is not None
-    layouts, found = plan.layouts, None
-    if layouts.one:
-        states = layouts.kinds[0]
-    else:
-        found, states = layouts.found(columns["arc"]["mode"])
-    return Execution.deferred(
-        _LATER,
-        known,
-        stop=stop,
-        seconds=seconds,
-        states=states,
-        assessment=partial(_assessment_of, run),
-        sampler=Sampler(plan.sampled, columns, layouts.kinds, found),
-        compiled=run,
-    )
+    layouts = plan.layouts
+    of_arcs, states = (None, layouts.kinds[0]) if layouts.one else layouts.found(columns["arc"]["mode"])
+    fields["stop"], fields["seconds"], fields["compiled"], fields["states"] = stop, seconds, run, states
+    fields["assessment"] = partial(_assessment_of, run)
+    fields["sampler"] = Sampler(plan.sampled, columns, layouts.kinds, of_arcs)
+    return Execution.of_fields(fields)
 
 
 def _assessment_of(
@@ -139,13 +130,17 @@ _LATER: dict[str, Callable[[Execution], Any]] = {
 }
 
 
-def about(problem: Problem, engine: str) -> dict[str, Any]:
+# of compiled runs: with room for what each has of its own, so that no copy of it grows
+_COMPILED = {"_later": _LATER} | dict.fromkeys(("stop", "seconds", "compiled", "states", "assessment", "sampler"))
+
+
+def about(problem: Problem, compiled: bool) -> dict[str, Any]:
     """Return what all runs of a problem have in common."""
     program, settings = problem.program, problem.settings
-    return {
+    return (_COMPILED if compiled else {}) | {
         "model": program.path,
         "digest": program.digest,
-        "engine": engine,
+        "engine": "c" if compiled else "python",
         "scheme": settings.scheme,
         "method": settings.method.name if settings.method else "two-step",
         "output_names": program.outputs,

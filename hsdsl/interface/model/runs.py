@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Self, cast
+from functools import cached_property, partial, wraps
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import checks_methods, did_you_mean
+from hsdsl.base.names import checks_arguments, checks_methods, did_you_mean
 from hsdsl.base.numbers.arithmetic import FLOAT64
-from hsdsl.base.progress import in_notebook, running
+from hsdsl.base.progress import in_notebook, is_notebook, running
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import Options, overrides_of
@@ -47,6 +47,28 @@ def elsewhere(model: Runs, name: str) -> str | None:
     return ELSEWHERE.get(name)
 
 
+Call = TypeVar("Call", bound=Callable[..., Execution])
+
+
+def kept(simulate: Call) -> Call:
+    """Let a call that was made before run what it has kept; to bind so many arguments takes as long as a short run.
+
+    It is found where the arguments that differ from their defaults are given in their order.
+    """
+    checked: Any = checks_arguments(simulate, "Model.simulate", elsewhere)
+
+    @wraps(simulate)
+    def call(self: Runs, until: Any = None, **given: Any) -> Execution:
+        if until is not None:
+            given = {"until": until, **given}
+        ready = self.kept_runs.find(call_key(*given, *given.values()))
+        if ready is None or is_notebook():
+            return checked(self, **given)
+        return visible_run(ready.simulate(None, self.pipeline.seconds), ready)
+
+    return cast("Call", call)
+
+
 @partial(checks_methods, elsewhere=elsewhere, name="Model")
 class Runs:
     """A checked model as far as it runs; see `Model`."""
@@ -54,7 +76,7 @@ class Runs:
     def __init__(self, of: HybridSystem | Pipeline) -> None:
         self.pipeline = of if isinstance(of, Pipeline) else Pipeline(of)
         self._smaller: dict[tuple[str, ...], Self] = {}
-        self._prepared: CallCache[Prepared] = CallCache(MOST_PREPARED)
+        self.kept_runs: CallCache[Prepared] = CallCache(MOST_PREPARED)
 
     @cached_property
     def _differentiator(self) -> Differentiator:
@@ -92,6 +114,7 @@ class Runs:
         """Resolve the options of the file, of ``settings`` and of a call (see `hsdsl.engine.preparation.options`)."""
         return self.pipeline.resolve(settings, call)
 
+    @kept
     def simulate(
         self,
         until: Any = None,
@@ -159,15 +182,18 @@ class Runs:
         del call["self"], call["outputs"], call["watch"]
         if outputs is not None:
             return self._reduced_run(outputs, call, watch)
-        key = call_key(*call.values())
-        ready = self._prepared.find(key)
+        given = {
+            name: value for name, value in call.items() if value is not None and (name, value) != ("engine", "auto")
+        }
+        key = call_key(*given, *given.values())
+        ready = self.kept_runs.find(key)
         with in_notebook() as show:
             watch = watch or (show and partial(running, show))
             if ready is not None:
                 run = ready.simulate(watch, self.pipeline.seconds)
             else:
                 ready, run = automatic.run(self._linked(call), watch, self.pipeline.seconds)
-                self._prepared.keep(key, ready)
+                self.kept_runs.keep(key, ready)
         return visible_run(run, ready)
 
     def _linked(self, call: Mapping[str, Any]) -> Prepared:

@@ -277,10 +277,10 @@ typedef struct {
 /* The number of the first time that is outside the run by more than the tie tolerance, or -1. */
 HS_EXPORT int64_t hs_sample(const hs_sampling *sampling);
 
-/* The same of a packed run: `memory` has the times, and room behind them for states, results and scratch. */
+/* The same of a packed run and of what `shared` asks for: `memory` has the times, and room behind them for states,
+   results and scratch. */
 HS_EXPORT int64_t hs_sample_record(const hs_sampling *shared, const hs_record *record, const int32_t *layout,
-                                   const int32_t *dimension, const int32_t *column, int64_t samples, int32_t columns,
-                                   int32_t outputs, int32_t left, double *memory);
+                                   int64_t samples, double *memory);
 
 /* Many instances of one model: `task` must come first; of each run only the results below are kept. */
 typedef struct hs_ensemble {

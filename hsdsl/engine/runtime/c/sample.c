@@ -168,15 +168,13 @@ int64_t hs_sample(const hs_sampling *s) {
   return -1;
 }
 
-int64_t hs_sample_record(const hs_sampling *shared, const hs_record *record, const int32_t *layout,
-                         const int32_t *dimension, const int32_t *column, int64_t samples, int32_t columns,
-                         int32_t outputs, int32_t left, double *memory) {
+int64_t hs_sample_record(const hs_sampling *shared, const hs_record *record, const int32_t *layout, int64_t samples,
+                         double *memory) {
   hs_sampling s = *shared;
   s.rows = record->rows, s.arcs = record->arcs, s.width = record->width, s.degree = record->degree;
   s.times = record->times, s.values = record->values, s.recorded = record->recorded, s.pieces = record->pieces;
-  s.arc = record->arc, s.layout = layout, s.dimension = dimension, s.column = column;
-  s.samples = samples, s.columns = columns, s.outputs = outputs, s.left = left;
-  s.time = memory, s.states = s.time + samples, s.results = s.states + columns * samples;
-  s.scratch = s.results + outputs * samples;
+  s.arc = record->arc, s.layout = layout, s.samples = samples;
+  s.time = memory, s.states = s.time + samples, s.results = s.states + s.columns * samples;
+  s.scratch = s.results + s.outputs * samples;
   return hs_sample(&s);
 }
