@@ -167,17 +167,14 @@ class Pipeline:
         """The pipeline of the model with a mode for each surface that two modes press on."""
         if SLIDING in self._part:
             return self
-        files, part = self._files, (*self._part, SLIDING)
-        cached = self._kept(part)
-        if cached is not None:
-            program, files = cached
-            whole = len(program.modes) == len(self.program.modes)
-            return self if whole else Pipeline(None, self.seconds["load"], files, program, part, self._left_out)
+        part = (*self._part, SLIDING)
+        if kept := self._kept(part, lambda program: len(program.modes) == len(self.program.modes)):
+            return kept
         system = self._with_sliding(self.system)
         if system is self.system:
             self.keep(self.program, part)
             return self
-        return Pipeline(system, self.seconds["load"], files, None, part, self._left_out)
+        return Pipeline(system, self.seconds["load"], self._files, None, part, self._left_out)
 
     @cached_property
     def program(self) -> Program:
@@ -195,8 +192,13 @@ class Pipeline:
         if self._files is not None and _method_exists(program):
             program_cache.keep(self._files, program, part)
 
-    def _kept(self, part: program_cache.Part) -> tuple[Program, ModelFiles] | None:
-        return None if self._files is None else program_cache.find(self._files, part)
+    def _kept(self, part: program_cache.Part, is_whole: Callable[[Program], bool]) -> Pipeline | None:
+        """The pipeline of a program that was kept, this one where that is the whole model; None if there is none."""
+        found = None if self._files is None else program_cache.find(self._files, part)
+        if found is None or is_whole(found[0]):
+            return found and self
+        program, files = found
+        return Pipeline(None, self.seconds["load"], files, program, part, program.left_out)
 
     @property
     def columns(self) -> list[str]:
@@ -318,21 +320,14 @@ class Pipeline:
     def derived(self, name: tuple[str, ...], make: Callable[[], HybridSystem]) -> Pipeline:
         """The pipeline of a system made of this one, whose program is kept under a name of its own."""
         part = (*self._part, name)
-        cached = self._kept(part)
-        if cached is not None:
-            program, files = cached
-            return Pipeline(None, 0.0, files, program, part)
-        return Pipeline(make(), 0.0, self._files, part=part)
+        return self._kept(part, lambda _: False) or Pipeline(make(), 0.0, self._files, part=part)
 
     def only(self, names: tuple[str, ...]) -> Pipeline:
         """The pipeline of these states and outputs with what they need; this one where that is the whole model."""
         began = time.perf_counter()
         part = (*self._part, names)
-        cached = self._kept(part)
-        if cached is not None:
-            program, files = cached
-            whole = program.left_out == self.program.left_out
-            return self if whole else Pipeline(None, self.seconds["load"], files, program, part)
+        if kept := self._kept(part, lambda program: program.left_out == self.program.left_out):
+            return kept
         from hsdsl.language.elaborate.derived import left_out, only
 
         system = only(self.system, names)
