@@ -220,6 +220,14 @@ def _names_a_parameter(part: ast.stmt) -> bool:
     return isinstance(part, ast.Assign) and isinstance(part.value, ast.Subscript)
 
 
+def bounds_of(source: Source, i: int) -> list[float | None]:
+    """The bounds that the file gives a parameter, with the exported values of the others."""
+    program, data = source.problem.program, source.problem.timeline.segments[0].data
+    own, names = data[: len(program.parameters)], [f"{kind}_{i}" for kind in ("minimum", "maximum")]
+    known = program.constants.names
+    return [float(source.problem.kernel.constant(name, own)[0]) if name in known else None for name in names]
+
+
 def data_names(program: Program) -> list[str]:
     """Names of the numbers that a mode is bound to: parameters, lines of segments of inputs, switches, contacts."""
     names = [f"p{i}" for i in range(len(program.parameters))]

@@ -26,7 +26,7 @@ from hsdsl.engine.simulate import Problem
 from hsdsl.engine.simulate.verdict.run_view import RunView
 from hsdsl.export import Modes
 from hsdsl.export.c.problem import array, comment, function, string
-from hsdsl.export.source import Source, derived, drivable, filled, structural, used_by, with_sources
+from hsdsl.export.source import Source, bounds_of, derived, drivable, filled, structural, used_by, with_sources
 from hsdsl.language.elaborate.inputs import switch_name
 from hsdsl.mathematics.lower.slopes import Slopes, lower_given, lower_slopes
 
@@ -199,7 +199,7 @@ def _parameters(source: Source) -> list[Variable]:
         if i in hidden:
             continue
         start = None if parameter.name in own else float(values[i])
-        least, most = (_bound(source, f"{kind}_{i}") for kind in ("minimum", "maximum"))
+        least, most = bounds_of(source, i)
         found.append(
             Variable(
                 "parameter",
@@ -214,13 +214,6 @@ def _parameters(source: Source) -> list[Variable]:
             )
         )
     return found
-
-
-def _bound(source: Source, name: str) -> float | None:
-    program, data = source.problem.program, source.problem.timeline.segments[0].data
-    if name not in program.constants.names:
-        return None
-    return float(source.problem.kernel.constant(name, data[: len(program.parameters)])[0])
 
 
 def _inputs(source: Source) -> list[Variable]:

@@ -7,7 +7,7 @@ parameters, for `parts/page.c`.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from math import isfinite
 from typing import Any
@@ -30,7 +30,7 @@ from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.control import LARGEST_SHARE
 from hsdsl.engine.simulate.switches import same
 from hsdsl.export.c.problem import array, function
-from hsdsl.export.source import Source, derived, used_by, with_sources
+from hsdsl.export.source import Source, bounds_of, derived, used_by, with_sources
 from hsdsl.mathematics.program import ModeProgram, Program
 
 Data = dict[str, Any]
@@ -109,10 +109,8 @@ def _mode(mode: ModeProgram, colour: str) -> Data:
 def _parameters(source: Source) -> Iterator[Data]:
     values = dict(zip(source.problem.program.parameters, source.problem.timeline.segments[0].data, strict=False))
     frozen = fixed(source.problem)
-    bounds = _bounds(source, values)
-    for parameter in source.system.parameters:
-        name = parameter.name
-        least, most = bounds[name]
+    for i, parameter in enumerate(source.system.parameters):
+        name, (least, most) = parameter.name, bounds_of(source, i)  # those of later values are checked in the page
         low, high = _range(float(values[name]))
         yield {
             "name": name,
@@ -126,19 +124,6 @@ def _parameters(source: Source) -> Iterator[Data]:
             "fixed": name in frozen,
             "hidden": False,
         }
-
-
-def _bounds(source: Source, values: Mapping[str, Any]) -> dict[str, tuple[float | None, float | None]]:
-    """The bounds of the file, with the exported values; those of later values are checked in the page."""
-    kernel, numbers = source.problem.kernel, tuple(values.values())
-    names = source.problem.program.constants.names
-    return {
-        name: tuple(
-            float(kernel.constant(f"{kind}_{i}", numbers)[0]) if f"{kind}_{i}" in names else None
-            for kind in ("minimum", "maximum")
-        )
-        for i, name in enumerate(values)
-    }  # pyright: ignore[reportReturnType]
 
 
 def _starts(source: Source, run: Execution) -> Iterator[Data]:
