@@ -375,7 +375,7 @@ def test_the_axes_of_a_picture_have_units(tmp_path: Path) -> None:
     first, second = [x for x in orbit.state if x not in orbit.drift][:2]
     assert (left.get_xlabel(), left.get_ylabel()) == tuple(label(x, orbit.units) for x in (first, second))
     assert (right.get_xlabel(), right.get_ylabel()) == ("real part", "imaginary part")
-    assert "stable, multipliers" in seen[0].get_suptitle()
+    assert seen[0].get_suptitle().endswith(": stable orbit") and ", multipliers " in left.get_title(loc="left")
 
 
 def test_a_refusal_names_the_state_that_does_not_return():

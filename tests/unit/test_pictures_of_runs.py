@@ -13,12 +13,11 @@ import hand_made
 import numpy as np
 import pytest
 from matplotlib import colors
-from matplotlib.figure import Figure
 
 import hsdsl
 from hsdsl.analysis.plot import View, analyses, plot
 from hsdsl.analysis.plot.animation import FPS, MOST, Drawn, Stage, frame_times, shapes_at
-from hsdsl.analysis.plot.curves import curves
+from hsdsl.analysis.plot.curves import curves, lap
 from hsdsl.analysis.plot.figure import picture
 from hsdsl.analysis.plot.page import page, thinned
 from hsdsl.analysis.plot.style import fills, looks, styled
@@ -84,7 +83,7 @@ def test_labels_must_be_one_for_each_run():
 def test_several_runs_share_panels_and_each_has_a_ribbon():
     other = hand_made.bouncing_ball(restitution="0.25")
     figure = picture([BALL, other], View(columns=["h", "v"], labels=["half", "quarter"]))
-    h, v, ribbon, phase = figure.axes
+    h, v, phase = figure.axes  # both are in one mode, which needs no ribbon
     for axis, name in ((h, "h"), (v, "v")):
         for run, drawn in zip((BALL, other), lines(axis), strict=True):
             x, y = drawn.get_data()
@@ -92,10 +91,37 @@ def test_several_runs_share_panels_and_each_has_a_ribbon():
             expected = np.concatenate([run.sample(x[at][:1])[name], run.sample(x[at][1:], "left")[name]])
             jumps = np.isin(x[at], [made.time for made in run.transitions])
             assert np.allclose(y[at][~jumps], expected[~jumps], atol=1e-9)
-    assert [text.get_text() for text in ribbon.get_yticklabels()] == ["half", "quarter"]
-    assert len(ribbon.collections) == 2 and len(lines(phase)) == 2
+    assert len(lines(phase)) == 2
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts[:2] == ["half", "quarter"] and texts[2:] == list(dict.fromkeys(arc.mode for arc in BALL.arcs))
+    assert texts == ["half", "quarter", "start", "before a jump", "after"]
+    figure = picture([hand_made.thermostat(3)] * 2, View(columns=["T"], labels=["one", "other"]))
+    ribbon = figure.axes[1]
+    assert [text.get_text() for text in ribbon.get_yticklabels()] == ["one", "other"] and len(ribbon.collections) == 4
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["one", "other", "on", "off", "transition"]
+
+
+def test_very_many_runs_are_pale_lines_from_dark_to_light():
+    figure = picture([BALL] * 30, View(columns=["h"], phases=[]))
+    drawn = lines(figure.axes[0])
+    assert len(drawn) == 30 and len({each.get_color() for each in drawn}) == 30
+    assert all(each.get_alpha() < 1 for each in drawn) and len(figure.legends[0].get_texts()) == 5
+    figure.draw_without_rendering()
+    assert figure.axes[0].get_window_extent().height > figure.bbox.height / 2
+
+
+def test_equal_columns_of_very_many_parts_share_a_panel():
+    """Each mass is marked at its own impacts only, where it has a panel."""
+    model = hsdsl.load(Path(__file__).parents[2] / "models" / "parts" / "chain.yaml")
+    run = model.simulate()
+    view = View(**run.view())
+    assert {name: len(each) for name, each in view.panels([run]).items()} == {
+        "energy": 1,
+        "mass[*].x": 20,
+        "mass[*].v": 20,
+    }
+    hits = sum(each.edge == "mass[8].hit" for each in run.transitions)
+    axis = picture([run], View(columns=["mass[8].v"])).axes[0]
+    assert [len(each.get_xdata()) for each in axis.get_lines() if each.get_marker() == "o"] == [hits, hits]
 
 
 def test_a_run_without_a_column_leaves_the_other_s():
@@ -376,14 +402,15 @@ def test_a_stable_piece_of_a_branch_ends_at_its_marks():
 
 
 @pytest.mark.parametrize(("states", "jump"), [(["s", "w"], [(1, 0), (0, 0)]), (["s"], [(1, 1), (1, 0)])])
-def test_an_orbit_is_closed_by_the_jump_of_its_section(states, jump):
+def test_an_orbit_has_the_jump_of_its_section(states, jump):
     """A timer over one period: s rises to 1 and is set to 0, w is 0."""
     text = "hsdsl: 1\nmodes: {m: {flow: {s: 1, w: 0}, transitions: [{when: s >= 1, to: m, reset: {s: 0}}]}}"
-    run = hsdsl.loads(f"{text}\ninitial: {{mode: m, s: 0, w: 0}}\nexperiment: {{until: 1}}\n").simulate()
-    axis = Figure().subplots()
-    analyses._draw_run(axis, run, states, 1.0)
-    (dotted,) = (line for line in axis.lines if line.get_linestyle() == ":")
-    assert np.asarray(dotted.get_xydata()) == pytest.approx(np.array(jump, float), abs=1e-12)
+    run = hsdsl.loads(f"{text}\ninitial: {{mode: m, s: 0, w: 0}}\nexperiment: {{until: 2.5}}\n").simulate()
+    drawn = lap(curves(run), 1.0)
+    figure = analyses.plot_orbit.__wrapped__(drawn, states, np.zeros(1), View(), "m->m", "")
+    marks = [each.get_xydata()[0] for each in figure.axes[0].lines if each.get_marker() == "o"]
+    assert np.array(marks) == pytest.approx(np.array(jump, float), abs=1e-12)
+    assert figure.legends[0].get_texts()[-1].get_text() == "after"
 
 
 def test_pages_have_guards_that_move(tmp_path):

@@ -111,6 +111,8 @@ def test_of_many_switches_the_shares_are_drawn():
     assert np.allclose(late.of["on"][:20], 1) and np.allclose(late.of["on"][21:], 0.5, atol=0.05)
     figure = _figure(run)
     assert [text.get_text() for text in figure.legends[0].get_texts()] == [f"{m}, share of the time" for m in of]
+    strip, panel = figure.axes[1], figure.axes[0]
+    assert len(strip.collections) == 2 and not panel.collections  # no band behind the curve
 
 
 def test_a_mode_occupied_too_shortly_to_see_has_no_band():
@@ -123,10 +125,14 @@ def test_a_mode_occupied_too_shortly_to_see_has_no_band():
     ]
 
 
-def test_labels_of_one_level_become_one():
+def test_labels_of_one_level_become_one_beside_the_panel():
     guards = [GuardLine("on", "T", 1.0, "a"), GuardLine("off", "T", 1.0, "b"), GuardLine("off", "T", 0.0, "c")]
-    axis = _figure(hand_made.thermostat(30), guards=guards).axes[0]
-    assert [text.get_text() for text in axis.texts] == ["a, b", "c"]
+    figure = _figure(hand_made.thermostat(30), guards=guards)
+    figure.draw_without_rendering()
+    axis = figure.axes[0]
+    assert sorted(text.get_text().splitlines() for text in axis.texts) == [["b", "a"], ["c"]]
+    first, second = (text.get_window_extent() for text in axis.texts)
+    assert min(first.x0, second.x0) >= axis.get_window_extent().x1 and not first.overlaps(second)
 
 
 def test_every_mode_has_a_colour_of_its_own():
@@ -137,9 +143,9 @@ def test_every_mode_has_a_colour_of_its_own():
 def test_names_of_modes_stand_above_their_bands_or_in_a_legend():
     few = _figure(hand_made.thermostat(2))
     assert {"on", "off"} <= {text.get_text() for text in few.axes[0].texts}
-    assert few.legends == []
+    assert [text.get_text() for text in few.legends[0].get_texts()] == ["transition"]
     many = _figure(hand_made.thermostat(50))
-    assert [text.get_text() for text in many.legends[0].get_texts()] == ["on", "off"]
+    assert [text.get_text() for text in many.legends[0].get_texts()] == ["on", "off", "transition"]
 
 
 def test_stop_levels_are_dotted_lines_where_their_mode_is():
@@ -162,11 +168,20 @@ def test_a_level_of_several_modes_has_one_label():
     assert [text.get_text() for text in axis.texts].count("T >= level") == 1
 
 
+def _sawtooth(teeth):
+    """X rises from 0 to 1 and falls back at once; y is 1 throughout."""
+    draft = hand_made.Draft()
+    for k in range(teeth + 1):
+        draft.arc("m", ("x", "y"), k, [(float(k + s), [float(s), 1.0], [], 0.0, []) for s in (0, 1)])
+    return draft.make()
+
+
 @pytest.mark.parametrize(("transitions", "markers"), [(4, 2), (60, 2), (61, 1), (400, 1), (401, 0)])
 def test_markers_are_thinned_out(transitions, markers):
-    axis = _figure(hand_made.thermostat(transitions)).axes[0]
-    marked = [drawn for drawn in axis.get_lines() if drawn.get_marker() == "o"]
-    assert [len(drawn.get_xdata()) for drawn in marked] == [transitions] * markers
+    """Of many transitions only those are marked where the column jumps."""
+    for axis, kept in zip(_figure(_sawtooth(transitions)).axes[:2], (True, transitions <= 60), strict=True):
+        marked = [drawn for drawn in axis.get_lines() if drawn.get_marker() == "o"]
+        assert [len(drawn.get_xdata()) for drawn in marked] == [transitions if kept else 0] * markers
 
 
 @pytest.mark.parametrize("states", [1, 2, 7, 17])
@@ -398,7 +413,8 @@ def test_many_modes_are_rows_of_bars():
     run = hsdsl.loads(f"hsdsl: 1\nmodes:\n{steps}initial: {{mode: m1, x: 0}}\nexperiment: {{until: 2}}\n").simulate()
     figure = _figure(run)
     rows = [text.get_text() for text in figure.axes[-1].get_yticklabels()]
-    assert rows == [f"m{k}" for k in range(1, 11)] and not figure.legends
+    assert rows == [f"m{k}" for k in range(1, 11)]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["transition"]
 
 
 def test_parts_with_many_modes_together_have_a_row_each():
@@ -416,7 +432,7 @@ experiment: {until: 4}
     names = [[text.get_text() for text in axis.get_yticklabels()] for axis in figure.axes]
     (rows,) = [row for row in names if row[0] == "lamp[1]"]
     assert rows == ["lamp[1]", "lamp[2]", "lamp[3]", "lamp[4]"]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["off", "lit"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["off", "lit", "transition"]
 
 
 def test_colours_of_many_modes_differ_and_are_no_black():

@@ -137,14 +137,14 @@ class Fit:
 
     def plot_residuals(self, path: str | os.PathLike[str]) -> None:
         """Draw the residuals to a .png or .svg file: the measurements minus the run over time, and how often."""
-        from hsdsl.analysis.plot.fits import plot_residuals
+        from hsdsl.analysis.plot.ensembles import plot_residuals
 
         heading = f"{counted(self.measured.count, 'measurement')} minus the run; dotted: transitions"
         plot_residuals(path, self.execution, self.measured.times, self.residuals, self.units, heading)
 
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the measurements and the run to a .png or .svg file."""
-        from hsdsl.analysis.plot.fits import plot_measured
+        from hsdsl.analysis.plot.ensembles import plot_measured
 
         values = ", ".join(f"{name} = {number(value, 6)}" for name, value in self.values.items())
         heading = (

@@ -108,11 +108,15 @@ class Orbit:
     def plot(self, path: str | os.PathLike[str]) -> None:
         """Draw the orbit and its multipliers to a .png or .svg file."""
         from hsdsl.analysis.plot.analyses import plot_orbit
+        from hsdsl.analysis.plot.curves import View, curves, lap
 
         states = [x for x in self.state if x not in self.drift]
-        name = called(self.execution.title, self.execution.model)
-        title = f"{name}: {self.verdict}, multipliers {shown(self.multipliers)}"
-        plot_orbit(path, self.execution, states, self.multipliers, self.period, title, self.units)
+        title = f"{called(self.execution.title, self.execution.model)}: {self.verdict} orbit"
+        unit = self.units.get("t", "")
+        facts = f"period {number(self.period, 7)} {unit}".rstrip()
+        facts += f", multipliers {shown(self.multipliers, 4)}" if len(self.multipliers) else ""
+        drawn = lap(curves(self.execution), float(self.period))
+        plot_orbit(path, drawn, states, self.multipliers, View(title=title, units=self.units), self.section, facts)
 
     @property
     def units(self) -> dict[str, str]:
@@ -183,13 +187,11 @@ def _pairs(found: Array) -> list[dict[str, float]]:
     return [{"real": float(m.real), "imaginary": float(m.imag), "size": float(np.abs(m))} for m in found]
 
 
-def shown(found: Array) -> str:
+def shown(found: Array, digits: int = 12) -> str:
     """Multipliers, a pair of conjugate ones as one; what is not known from zero is zero."""
     parts: list[str] = []
     for m in np.where(np.abs(found) < LEAST_MARGIN, 0.0, found):
-        if m.imag == 0:
-            parts.append(number(float(m.real), 12))
-        elif m.imag > 0:
-            size = number(float(np.abs(m)), 12)
-            parts.append(f"{number(float(m.real), 12)} +- {number(float(m.imag), 12)}i (size {size})")
+        real, imaginary, size = (number(float(part), digits) for part in (m.real, m.imag, np.abs(m)))
+        if m.imag >= 0:
+            parts.append(f"{real} +- {imaginary}i (size {size})" if m.imag else real)
     return ", ".join(parts) or "none"

@@ -70,13 +70,14 @@ def axes(runs: Execution | Sequence[Execution], figure: Any = None, **options: A
             f"hsdsl.analysis.plot.plot(run, '{os.fspath(figure)}') writes a picture",
         )
     with styled():
-        from hsdsl.analysis.plot.figure import draw, size_of
+        from hsdsl.analysis.plot.figure import draw
 
-        if figure is None:
+        def new(size: tuple[float, float]) -> Any:
             from matplotlib import pyplot
 
-            figure = pyplot.figure(figsize=size_of(several, view), layout="constrained")
-        return draw(several, view, figure)
+            return pyplot.figure(figsize=size, layout="constrained")
+
+        return draw(several, view, new if figure is None else lambda _: figure)
 
 
 def _several(runs: Execution | Sequence[Execution]) -> list[Execution]:

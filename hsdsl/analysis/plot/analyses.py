@@ -3,10 +3,8 @@
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import groupby, pairwise
-from textwrap import fill
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,9 +13,11 @@ from hsdsl.analysis.plot.style import (
     ALARM,
     FAINT,
     INK,
-    PALETTE,
+    RUNS,
+    colours,
     curve,
     empty,
+    heading,
     label,
     legend_below,
     time_label,
@@ -25,7 +25,7 @@ from hsdsl.analysis.plot.style import (
     whole_ticks,
 )
 from hsdsl.base.errors import UsageError
-from hsdsl.engine.execution import Array, Execution
+from hsdsl.engine.execution import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,11 +33,11 @@ if TYPE_CHECKING:
 
     from hsdsl.analysis.metrics.geometry import Domain, Formula, Gate, Space
     from hsdsl.analysis.metrics.points import PathPiece
+    from hsdsl.analysis.plot.curves import Curves, View
 
 
 BANDS = ("#0b5394", "#c8c8c8", "#b45f06")  # colours of distances over time
 DECADES = 12  # below the largest value: smaller ones are drawn there
-TITLE = 90  # letters of a line of a title
 LONGEST = 40  # letters of a label of runs from nearby
 MOST = 12  # sequences of transitions in their legend
 MARKERS = {"fold": "o", "branch point": "P", "flip": "D", "torus": "s", "grazing": "X"}
@@ -62,7 +62,7 @@ def plot_over_time(times: Array, bounds: dict[str, tuple[Array, Array]], title: 
     axis.set_yscale("log")
     axis.set_xlabel("time t")
     axis.set_ylabel("distance")
-    axis.set_title(title, loc="left", parse_math=False)
+    heading(figure, title)
     legend_below(figure, axis.get_legend_handles_labels()[0], 9.0)
     return figure
 
@@ -81,7 +81,7 @@ def plot_nearby(points: Sequence[tuple[float, float, tuple[str, ...]]], title: s
         label = ", ".join(sequence) or "no transition"
         label = label if k < MOST else "_"  # matplotlib leaves it out of the legend
         label = label if len(label) <= LONGEST else f"{label[: LONGEST - 3]}... ({len(sequence)})"
-        axis.plot([r for r, _ in mine], [d for _, d in mine], "o", color=PALETTE[k % len(PALETTE)], label=label)
+        axis.plot([r for r, _ in mine], [d for _, d in mine], "o", color=RUNS[k % len(RUNS)], label=label)
     radii = sorted({r for r, *_ in points})
     finite = [d for r, d, _ in points if r == radii[-1] and 0 < d < np.inf]
     if finite:
@@ -90,7 +90,7 @@ def plot_nearby(points: Sequence[tuple[float, float, tuple[str, ...]]], title: s
     axis.set_yscale("log")
     axis.set_xlabel("radius, relative to the scales")
     axis.set_ylabel("distance of the executions, rho")
-    axis.set_title(title, loc="left", fontsize=10, parse_math=False)
+    heading(figure, title)
     if len(sequences) > MOST:
         axis.plot([], [], "o", color="white", label=f"and {len(sequences) - MOST} other sequences")
     rows = legend_below(figure, axis.get_legend_handles_labels()[0], 7.0)
@@ -121,82 +121,55 @@ def plot_branch(
     for stable, part in groupby(pieces, key=lambda piece: _stable(piece[0][2], piece[1][2])):
         along = list(part)
         line = [along[0][0], *(b for _, b in along)]
-        style, colour = ("-", PALETTE[5]) if stable else ("--", PALETTE[6])
+        style, colour = ("-", RUNS[0]) if stable else ("--", RUNS[1])
         label = "stable" if stable else "unstable"
         known = label in axis.get_legend_handles_labels()[1]
         axis.plot([p[0] for p in line], [p[1] for p in line], style, color=colour, label="_" if known else label)
     for kind, marker in MARKERS.items():
         found = [(p, x) for name, p, x in marks if name == kind]
         if found:
-            axis.plot([p for p, _ in found], [x for _, x in found], marker, color=PALETTE[1], label=kind)
+            axis.plot([p for p, _ in found], [x for _, x in found], marker, color=RUNS[1], label=kind)
     legend_below(figure, axis.get_legend_handles_labels()[0], 8.0)
     axis.set_xlabel(parameter, parse_math=False)
     axis.set_ylabel(state, parse_math=False)
-    axis.set_title(fill(title, TITLE), loc="left", fontsize=10, parse_math=False)
+    heading(figure, title)
     return figure
-
-
-POINTS = 2000
-LETTERS = 90  # of a line of the title
 
 
 @to_file
-def plot_orbit(
-    run: Execution, states: Sequence[str], multipliers: Array, period: float, title: str, units: Mapping[str, str]
-) -> Figure:
-    """Draw a run over one period; jumps are dotted."""
-    figure = empty(10, 4.6)
+def plot_orbit(run: Curves, states: Sequence[str], multipliers: Array, view: View, section: str, facts: str) -> Figure:
+    """Draw one lap of a run, coloured by mode, and the multipliers."""
+    from matplotlib.lines import Line2D
+
+    from hsdsl.analysis.plot.figure import draw_panel, draw_phase, marks, modes_named
+
+    figure = empty(10, 4.8)
     left, right = figure.subplots(1, 2)
-    _draw_run(left, run, states, period)
-    across, up = (states[0], states[1]) if len(states) > 1 else ("t", states[0])
-    left.set_xlabel(label(across, units) if len(states) > 1 else time_label(units), parse_math=False)
-    left.set_ylabel(label(up, units), parse_math=False)
+    plane = len(states) > 1
+    if plane:
+        draw_phase(left, [run], (states[0], states[1]), view)
+        shades = colours(run.modes).items() if len(run.modes) > 1 else ()
+        named: list[Any] = [Line2D([], [], color=curve(shade), label=mode) for mode, shade in shades]
+    else:
+        draw_panel(left, [run], states[:1], view, 3.5)
+        left.set_xlabel(time_label(view.units), parse_math=False)
+        left.set_ylabel(label(states[0], view.units), parse_math=False)
+        named = modes_named(left, run, None, 4.0)
     draw_circle(right, multipliers)
-    figure.suptitle(textwrap.fill(title, LETTERS), x=0.01, ha="left", fontsize=11, fontweight="bold", parse_math=False)
+    heading(figure, view.title or "", facts, left, 6 if plane else 16)
+    legend_below(figure, [*named, *marks([run], states[:2], plane, f"right after {section}")], 10.0)
     return figure
-
-
-def _draw_run(axis: Axes, run: Execution, states: Sequence[str], period: float) -> None:
-    """Draw the first two states against each other, or one over time."""
-    first: tuple[float, float] | None = None
-    before: tuple[float, float] | None = None
-    for arc in run.arcs:
-        start, end = float(run.times[arc.first]), min(float(run.times[arc.last]), period)
-        if end < start or not set(states[:2]) <= set(arc.states):
-            before = None
-            continue
-        times = np.linspace(start, end, max(2, int(POINTS * (end - start) / period)))
-        table = run.sample(times[1:-1])
-        columns: list[Array] = []
-        for name in states[:2]:
-            k = arc.states.index(name)
-            last = run.values[arc.last, k] if end == float(run.times[arc.last]) else run.sample([end], "left")[name][0]
-            columns.append(np.concatenate(([run.values[arc.first, k]], table[name], [last])).astype(float))
-        x, y = columns if len(columns) == 2 else (times, columns[0])
-        axis.plot(x, y, color=PALETTE[0])
-        if before is not None:
-            _draw_jump(axis, before, (float(x[0]), float(y[0])))
-        before = float(x[-1]), float(y[-1])
-        first = first or (float(x[0]), float(y[0]))
-        if end >= period:
-            break
-    if first is not None and before is not None:  # the jump of the section closes the orbit
-        _draw_jump(axis, before, first if len(states) > 1 else (before[0], first[1]))
-
-
-def _draw_jump(axis: Axes, start: tuple[float, float], end: tuple[float, float]) -> None:
-    axis.plot([start[0], end[0]], [start[1], end[1]], ":", color=PALETTE[1])
 
 
 def draw_circle(axis: Axes, multipliers: Array) -> None:
     """Draw the unit circle and multipliers."""
     angles = np.linspace(0, 2 * np.pi, 200)
     axis.plot(np.cos(angles), np.sin(angles), color=FAINT)
-    for inside, colour in ((True, PALETTE[0]), (False, PALETTE[1])):
+    for inside, colour in ((True, RUNS[0]), (False, RUNS[1])):
         chosen = [complex(m) for m in multipliers.tolist() if (abs(m) < 1) is inside]
         axis.plot([m.real for m in chosen], [m.imag for m in chosen], "o", color=colour)
     axis.set_aspect("equal", "datalim")
-    axis.set_title("Floquet multipliers", fontsize=9)
+    axis.set_title("Floquet multipliers" if len(multipliers) else "no Floquet multipliers", fontsize=9)
     axis.set_xlabel("real part")
     axis.set_ylabel("imaginary part")
 
@@ -234,11 +207,11 @@ def plot_curve(x: Axis, of: Quantity, title: str) -> Figure:
     order = np.argsort(x.values, kind="stable")
     if of.words:
         numbers = [of.words.index(str(v)) if v is not None else np.nan for v in of.values[order]]
-        axes.plot(x.values[order], numbers, ".", color=curve(PALETTE[5]))
+        axes.plot(x.values[order], numbers, ".", color=curve(RUNS[0]))
         axes.set_yticks(range(len(of.words)), of.words, parse_math=False)
     else:
         line = "-" if x.grid is not None and len(x.grid) == len(x.values) else "."
-        axes.plot(x.values[order], of.values[order], line, color=curve(PALETTE[5]), linewidth=1.2, markersize=2)
+        axes.plot(x.values[order], of.values[order], line, color=curve(RUNS[0]), linewidth=1.2, markersize=2)
         whole_ticks(axes.yaxis, of.values)
     axes.set_ylabel(of.label, parse_math=False)
     return _labelled(figure, axes, x, title)
@@ -250,7 +223,7 @@ def plot_dots(x: Axis, of: Quantity, where: Any, title: str) -> Figure:
     (figure, axes), many = _empty(), len(of.values) > DOT
     size, alpha = (0.4, 0.35) if many else (1.2, 0.8)
     dots: dict[str, Any] = {"markersize": size, "alpha": alpha, "markeredgewidth": 0, "rasterized": True}
-    axes.plot(x.values[where], of.values, "o", color=curve(PALETTE[5]), **dots)
+    axes.plot(x.values[where], of.values, "o", color=curve(RUNS[0]), **dots)
     axes.set_ylabel(of.label, parse_math=False)
     whole_ticks(axes.yaxis, of.values)
     axes.margins(x=MARGIN)
@@ -303,7 +276,7 @@ def _labelled(figure: Figure, axes: Axes, x: Axis, title: str) -> Figure:
     if x.logarithmic:
         axes.set_xscale("log")
     axes.set_xlabel(x.label, parse_math=False)
-    axes.set_title(title, loc="left", fontsize=10, parse_math=False)
+    heading(figure, title)
     return figure
 
 
@@ -313,7 +286,7 @@ def _by_words(of: Quantity) -> tuple[Any, dict[str, Any]]:
 
     words = of.words[:MOST_WORDS]
     numbers = np.array([words.index(v) if v in words else np.nan for v in of.values], dtype=float)
-    colours = ListedColormap([PALETTE[i % len(PALETTE)] for i in range(len(words))])
+    colours = ListedColormap([RUNS[i % len(RUNS)] for i in range(len(words))])
     return numbers, {"cmap": colours, "norm": BoundaryNorm(np.arange(len(words) + 1) - 0.5, max(1, len(words)))}
 
 
@@ -344,7 +317,7 @@ def _legend(figure: Figure, axes: Axes, drawn: Any, of: Quantity) -> None:
         return
     from matplotlib.patches import Patch
 
-    handles = [Patch(color=PALETTE[i % len(PALETTE)], label=word) for i, word in enumerate(of.words[:MOST_WORDS])]
+    handles = [Patch(color=RUNS[i % len(RUNS)], label=word) for i, word in enumerate(of.words[:MOST_WORDS])]
     handles += [Patch(color="#dddddd", label="other")] if len(of.words) > MOST_WORDS else []
     legend = figure.legend(handles=handles, title=of.label, loc="outside right upper", frameon=False, edgecolor=FAINT)
     for text in legend.get_texts():

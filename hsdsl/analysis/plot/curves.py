@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -24,8 +25,11 @@ BANDS = 400  # with more changes of mode than this, time is cut into BINS and a 
 BINS = 1500
 STAYS, MOST_SHARES = 12, 300  # stays in modes that a bin of shares has, and the most bins
 MOVING = 1000  # points of a guard that moves
+MOST_PANELS = 6  # with one column each, where nobody chose them and parts are alike
+INDEX = re.compile(r"\[(\d+)\]")
 SEVERAL = "several modes"
 ROUND_OFF = 1e-12  # of the size of a state
+CLOSE = 1e-9  # of a period
 
 
 class GuardLine(NamedTuple):
@@ -55,7 +59,8 @@ class Curves:
     ``begins`` marks the first point of each arc, ``jumps`` are the indices of points behind transitions. ``bands`` are
     the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many, and then
     ``shares`` says how much of a time each mode takes.
-    ``error`` is how much of its size a state may be off: one that changes by less is drawn as a constant.
+    ``error`` is how much of its size a state may be off: one that changes by less is drawn as a constant. ``parts`` is
+    for each jump the name of the part that its edge is of, or nothing.
     """
 
     samples: Samples
@@ -65,6 +70,14 @@ class Curves:
     ends_badly: bool = False
     error: float = ROUND_OFF
     shares: Shares | None = None
+    parts: Sequence[str] = ()
+
+    def jumps_of(self, name: str) -> Array:
+        """The jumps that a column of a part may make: those of the part, and of what is in no part."""
+        own = name.rpartition(".")[0]
+        if not own or len(self.parts) != len(self.jumps):
+            return self.jumps
+        return self.jumps[[part in ("", own) for part in self.parts]]
 
     @property
     def span(self) -> tuple[float, float]:
@@ -116,7 +129,19 @@ def curves(execution: Execution) -> Curves:
     error = max(ROUND_OFF, 10 * float(run.settings.get("tolerance") or 0))
     stays = merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
     shares = _shares(stays) if len(stays) > BANDS else None
-    return Curves(samples, begins, jumps, _bands(stays), not run.stop.complete, error, shares)
+    parts = [made.edge.rpartition(".")[0] for made in run.transitions]
+    return Curves(samples, begins, jumps, _bands(stays), not run.stop.complete, error, shares, parts)
+
+
+def lap(run: Curves, period: float) -> Curves:
+    """Cut off what is after one period; the jump at its end stays."""
+    samples = run.samples
+    count = int(np.searchsorted(samples.time, period * (1 + CLOSE), side="right"))
+    rows = ("time", "mode", "jump", "kind", "state_columns", "output_columns", "present")
+    names = {name: getattr(samples, name) for name in ("states", "outputs")}
+    samples = Samples(**{name: getattr(samples, name)[:count] for name in rows}, **names)
+    bands = [(mode, begin, min(end, period)) for mode, begin, end in run.bands if begin < period * (1 - CLOSE)]
+    return replace(run, samples=samples, begins=run.begins[:count], jumps=run.jumps[run.jumps < count], bands=bands)
 
 
 def _in_float64(execution: Execution) -> Execution:
@@ -260,6 +285,16 @@ class View:
         if self.columns is None:
             return [name for name in known if name not in self._timers(known)]
         return [checked(name, known) for name in dict.fromkeys(self.columns)]
+
+    def panels(self, runs: Sequence[Execution]) -> dict[str, list[str]]:
+        """Return the columns of each panel: one, or of a system of many parts those with the same name in each part."""
+        names = self.names(runs)
+        if self.columns is not None or len(names) <= MOST_PANELS:
+            return {name: [name] for name in names}
+        found: dict[str, list[str]] = {}
+        for name in sorted(names, key=lambda name: [int(k) for k in INDEX.findall(name)]):
+            found.setdefault(INDEX.sub("[*]", name), []).append(name)
+        return {each[0] if len(each) == 1 else name: each for name, each in found.items()}
 
     def pairs(self, runs: Sequence[Execution]) -> list[Pair]:
         """Return the pairs of phase plots.

@@ -1,23 +1,26 @@
 # pyright: reportUnknownMemberType=false
-"""Pictures of ensembles: medians of samples over time, with bands that hold shares of the runs."""
+"""Pictures of ensembles, as medians with bands of samples over time, and of fits, with measurements and residuals."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hsdsl.analysis.plot.curves import checked
-from hsdsl.analysis.plot.style import PALETTE, empty, label, legend_below, time_label, to_file
+from hsdsl.analysis.plot.curves import checked, curves, limits_of, line
+from hsdsl.analysis.plot.style import FAINT, RUNS, empty, heading, label, legend_below, time_label, to_file
+from hsdsl.analysis.report import words
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, counted
 from hsdsl.base.numbers.arithmetic import TIE
-from hsdsl.engine.execution import Array, Ensemble
+from hsdsl.engine.execution import Array, Ensemble, Execution
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+MOST_MARKED = 60  # transitions up to which each is marked
 
 
 class Spread(NamedTuple):
@@ -71,11 +74,57 @@ def _draw(times: Array, spreads: dict[str, Spread], title: str, time: str, who: 
         for k, (share, (low, high)) in enumerate(spread.bands.items()):
             alpha = 0.2 + 0.25 * k / max(1, len(spread.bands) - 1)
             held = f"{100 * share:.3g} % of {who}"
-            axis.fill_between(times, low, high, color=PALETTE[5], alpha=alpha, linewidth=0, label=held)
-        axis.plot(times, spread.median, color=PALETTE[5], linewidth=1.4, label="median")
+            axis.fill_between(times, low, high, color=RUNS[0], alpha=alpha, linewidth=0, label=held)
+        axis.plot(times, spread.median, color=RUNS[0], linewidth=1.4, label="median")
         axis.set_ylabel(name, parse_math=False)
         axis.margins(x=0)
     axes[-1].set_xlabel(time, parse_math=False)
-    figure.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
+    heading(figure, title)
     legend_below(figure, axes[0].get_legend_handles_labels()[0], 9.0)
+    return figure
+
+
+def measured(
+    run: Execution, times: Array, columns: Mapping[str, Array], units: Mapping[str, str], values: str = ""
+) -> Figure:
+    """Draw measurements and the run fitted to them, a panel for each column; ``values`` are what was fitted."""
+    figure = empty(9, 1.3 + 2.4 * len(columns))
+    axes = figure.subplots(len(columns), 1, squeeze=False, sharex=True)[:, 0]
+    drawn = curves(run)
+    for axis, (name, column) in zip(axes, columns.items(), strict=True):
+        low, high = limits_of([drawn], name)
+        along = line(drawn.samples.time, drawn.column(name), drawn.begins, (*drawn.span, low, high))
+        axis.plot(*along, color=RUNS[0], label="run")
+        axis.plot(times, column, ".", color=RUNS[1], markersize=max(3.0, 7.0 - len(times) / 50), label="measured")
+        axis.set_ylabel(label(name, units), parse_math=False)
+    axes[-1].set_xlabel(time_label(units), parse_math=False)
+    heading(figure, words.heading(run), values, axes[0])
+    legend_below(figure, axes[0].get_legend_handles_labels()[0], 9.0)
+    return figure
+
+
+plot_measured = to_file(measured)
+
+
+@to_file
+def plot_residuals(
+    run: Execution, times: Array, columns: Mapping[str, Array], units: Mapping[str, str], facts: str
+) -> Figure:
+    """Draw residuals over time and how often they occur, a row for each column; dotted lines are transitions."""
+    figure = empty(9, 1.3 + 2.2 * len(columns))
+    axes = figure.subplots(len(columns), 2, squeeze=False, sharey="row", width_ratios=[4, 1])
+    made = np.array([float(each.time) for each in run.transitions])
+    made = made[made <= times.max()] if len(made) <= MOST_MARKED else made[:0]
+    for (axis, often), (name, column) in zip(axes, columns.items(), strict=True):
+        known = column[np.isfinite(column)]
+        axis.axhline(0, color=FAINT, linewidth=0.9)
+        axis.plot(times, column, ".", color=RUNS[1], markersize=max(3.0, 7.0 - len(times) / 50))
+        for time in made.tolist():
+            axis.axvline(time, color=FAINT, linewidth=0.9, linestyle="dotted")
+        often.hist(known, bins="auto", orientation="horizontal", color=RUNS[1])
+        often.tick_params(labelleft=False)
+        axis.set_ylabel("residual of " + label(name, units), parse_math=False)
+    axes[-1, 0].set_xlabel(time_label(units), parse_math=False)
+    axes[-1, 1].set_xlabel("measurements")
+    heading(figure, words.heading(run), facts, axes[0, 0])
     return figure

@@ -1,10 +1,10 @@
 # pyright: reportUnknownMemberType=false
-"""The figure of one run or of several: panels over time, phase plots, headings and legend."""
+"""The figure of one run or of several: a strip of modes, panels over time, phase plots, headings and legend."""
 
 from __future__ import annotations
 
-import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import ceil, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -24,19 +24,20 @@ from hsdsl.analysis.plot.curves import (
     curves,
     limits_of,
     line,
-    merged,
-    modes_of,
     moving_levels,
 )
+from hsdsl.analysis.plot.strip import LINE, LONGEST_LABEL, MOST_BANDS, Strip
 from hsdsl.analysis.plot.style import (
     ALARM,
     FAINT,
     INK,
     LETTER,
+    MOST_DASHED,
     Look,
     colours,
     curve,
     fills,
+    heading,
     label,
     legend_below,
     looks,
@@ -45,22 +46,26 @@ from hsdsl.analysis.plot.style import (
 )
 from hsdsl.analysis.report import words
 from hsdsl.base.names import shown
-from hsdsl.base.parts import parts_in, short_names
+from hsdsl.base.parts import short_names
 from hsdsl.engine.execution import Execution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import FigureBase
-    from matplotlib.patches import Patch
-
 
 MARGIN = 0.9  # inches for title and time axis
 HEIGHTS = {1: 3.2, 2: 2.3, 3: 1.9, 4: 1.7}  # of a panel, by panels on top of each other
 LOWEST = 1.5
 WIDTHS = {1: 9.0, 2: 13.0, 3: 16.0}  # of the panels, by panels side by side
-RIBBON, LINE = 0.28, 0.2  # inches of a run's ribbon, and of a line of text
 SMALLEST, LARGEST = 3.6, 5.2  # of a phase plot
 LONGEST = 40  # letters of a name in the legend
+MOST_LABELS = 3  # of guards on top of each other
+BOTH_SIDES = 60  # transitions up to which each is marked, with the values before and after
+AFTER_ONLY = 400  # and up to which the values after jumps are
+MOST_MARKED = 4  # curves in a panel whose transitions are marked
+LEVEL: dict[str, Any] = {"color": "#444444", "linestyle": "dotted", "linewidth": 1.1}
+SMALL: dict[str, Any] = {"fontsize": 7.5, "color": "#444444", "parse_math": False}
+NAME: dict[str, Any] = {**SMALL, "fontsize": 8}
 
 
 class Plan(NamedTuple):
@@ -70,29 +75,29 @@ class Plan(NamedTuple):
     down: int
     phase_across: int
     phase_down: int
-    ribbon: float
+    strip: float
     width: float
     phase: float
     height: float
 
     @classmethod
-    def of(cls, names: int, pairs: int, rows: int) -> Plan:
-        """Give every panel room to be read; ``rows`` of bars above them show modes."""
-        across = 1 if names <= 6 else 2 if names <= 16 else 3
-        down = max(1, -(-names // across))
-        ribbon = RIBBON * min(rows, MOST_ROWS) + LINE if rows > 1 else 0.0
-        height = down * HEIGHTS.get(down, LOWEST) + ribbon
+    def of(cls, panels: int, pairs: int, strip: Strip | None) -> Plan:
+        """Give every panel room to be read."""
+        across = 1 if panels <= 6 else 2 if panels <= 16 else 3
+        down = max(1, -(-panels // across))
+        above = strip.inches if strip else 0.0
+        height = down * HEIGHTS.get(down, LOWEST) + above
         phase_down = min(pairs, max(1, round(height / LARGEST), ceil(sqrt(pairs))))
         phase_across = -(-pairs // phase_down) if pairs else 0
         phase = min(max(height / phase_down, SMALLEST), LARGEST) if pairs else 0.0
         return cls(
-            across, down, phase_across, phase_down, ribbon, WIDTHS[across], phase, max(height, phase * phase_down)
+            across, down, phase_across, phase_down, above, WIDTHS[across], phase, max(height, phase * phase_down)
         )
 
     @property
-    def room(self) -> float:
-        """The inches of a panel's width."""
-        return self.width / self.across - 0.8
+    def room(self) -> tuple[float, float]:
+        """About the inches of a panel's width and height."""
+        return self.width / self.across - 0.8, (self.height - self.strip) / self.down - 0.3
 
     @property
     def size(self) -> tuple[float, float]:
@@ -102,54 +107,53 @@ class Plan(NamedTuple):
 
 def picture(runs: Sequence[Execution], view: View) -> Figure:
     """Draw runs to a figure of their own."""
-    figure = Figure(figsize=size_of(runs, view), layout="constrained")
+    made: list[Figure] = []
+
+    def figure(size: tuple[float, float]) -> Figure:
+        made.append(Figure(figsize=size, layout="constrained"))
+        return made[0]
+
     draw(runs, view, figure)
-    return figure
+    return made[0]
 
 
-def size_of(runs: Sequence[Execution], view: View) -> tuple[float, float]:
-    """Return the inches that a figure of runs takes."""
-    many = len(runs) == 1 and len({arc.mode for arc in runs[0].arcs}) > MOST_BANDS
-    rows = _rows([curves(runs[0])]) if many else 0 if len(runs) == 1 else len(runs)
-    return Plan.of(len(view.names(runs)), len(view.pairs(runs)), rows).size
-
-
-def _rows(data: Sequence[Curves]) -> int:
-    """How many rows of bars show modes: one for each of several runs; of one run, where it has many modes."""
-    if len(data) > 1:
-        return len(data)
-    return max(2, len(rows_of(data[0]))) if len(data[0].modes) > MOST_BANDS else 0
-
-
-def draw(runs: Sequence[Execution], view: View, figure: FigureBase) -> list[Axes]:
-    """Draw runs to a figure; return the axes: panels over time, then phase plots."""
-    names, pairs, labels = view.names(runs), view.pairs(runs), view.called(runs)
+def draw(runs: Sequence[Execution], view: View, make: Callable[[tuple[float, float]], FigureBase]) -> list[Axes]:
+    """Draw runs to a figure made for its inches; return the axes: panels over time, then phase plots."""
+    shown_panels, pairs, labels = view.panels(runs), view.pairs(runs), view.called(runs)
     data = [curves(run) for run in runs]
-    plan = Plan.of(len(names), len(pairs), _rows(data))
+    strip = Strip.of(data, labels)
+    plan = Plan.of(len(shown_panels), len(pairs), strip)
+    figure = make(plan.size)
     visited = {arc.mode for run in runs for arc in run.arcs}
-    guards = [guard for guard in view.guards if guard.mode in visited]
+    view = replace(view, guards=[guard for guard in view.guards if guard.mode in visited])
     widths = [plan.width, plan.phase * plan.phase_across] if pairs else [1]
     outer = figure.add_gridspec(1, len(widths), width_ratios=widths)
-    ribbon, panels = _panels(figure, outer[0, 0], plan, max(1, len(names)))
-    for name, axis in zip(names, panels, strict=False):
-        draw_panel(axis, data, name, [guard for guard in guards if guard.state == name], view, plan.room)
+    ribbon, panels = _panels(figure, outer[0, 0], plan, max(1, len(shown_panels)))
+    for (name, columns), axis in zip(shown_panels.items(), panels, strict=False):
+        draw_panel(axis, data, columns, view, plan.room[1])
+        axis.set_ylabel(label(name, view.units), parse_math=False)
     _time_labels(panels, plan.across, view)
-    rows: list[Patch] | None = None
-    if ribbon is not None and len(data) == 1:
-        rows = draw_rows(ribbon, data[0])
-    elif ribbon is not None:
-        draw_ribbons(ribbon, data, labels)
-    phases = _phases(figure, outer[0, 1], plan, pairs, data, guards, view) if pairs else []
-    _headings(figure, ribbon or panels[0], runs, view, plan)
-    _legend(figure, panels[0], data, labels, plan, rows)
+    if ribbon is not None and strip is not None:
+        strip.draw(ribbon, labels if len(data) > 1 else [*strip.rows])
+    phases = _phases(figure, outer[0, 1], plan, pairs, data, view) if pairs else []
+    top = ribbon or panels[0]
+    title = view.title or ", ".join(dict.fromkeys(map(words.heading, runs)))
+    facts = _facts(runs[0]) if len(runs) == 1 else _facts_of_several(runs)
+    heading(figure, title, facts, top, 6 if ribbon else 16 + _raise_of(top))
+    handles = modes_named(panels[0], data[0], strip, plan.room[0]) if len(data) == 1 else _runs_named(labels, strip)
+    columns = [name for each in shown_panels.values() for name in each if len(each) <= MOST_MARKED]
+    rows = legend_below(
+        figure, [*_of_families(shown_panels), *handles, *marks(data, columns, bool(pairs))], plan.size[0]
+    )
     if isinstance(figure, Figure):
+        figure.set_figheight(figure.get_figheight() + rows * LINE)
         figure.align_ylabels(panels)
     return [*panels, *phases]
 
 
 def _panels(figure: FigureBase, place: Any, plan: Plan, count: int) -> tuple[Axes | None, list[Axes]]:
-    """Add the axes of the ribbons, where there are any, and of the panels."""
-    ratios = [plan.ribbon, *[(plan.height - plan.ribbon) / plan.down] * plan.down][plan.ribbon == 0 :]
+    """Add the axes of the strip, where there is one, and of the panels."""
+    ratios = [plan.strip, *[(plan.height - plan.strip) / plan.down] * plan.down][plan.strip == 0 :]
     grid = GridSpecFromSubplotSpec(len(ratios), plan.across, subplot_spec=place, height_ratios=ratios)
     first = len(ratios) - plan.down
     axes: list[Axes] = []
@@ -160,18 +164,12 @@ def _panels(figure: FigureBase, place: Any, plan: Plan, count: int) -> tuple[Axe
 
 
 def _phases(
-    figure: FigureBase,
-    place: Any,
-    plan: Plan,
-    pairs: Sequence[Pair],
-    data: Sequence[Curves],
-    guards: Sequence[GuardLine],
-    view: View,
+    figure: FigureBase, place: Any, plan: Plan, pairs: Sequence[Pair], data: Sequence[Curves], view: View
 ) -> list[Axes]:
     grid = GridSpecFromSubplotSpec(plan.phase_down, plan.phase_across, subplot_spec=place)
     axes = [figure.add_subplot(grid[i % plan.phase_down, i // plan.phase_down]) for i in range(len(pairs))]
     for axis, pair in zip(axes, pairs, strict=True):
-        draw_phase(axis, data, pair, guards, view)
+        draw_phase(axis, data, pair, view)
     return axes
 
 
@@ -181,16 +179,6 @@ def _time_labels(axes: Sequence[Axes], across: int, view: View) -> None:
             axis.tick_params(labelbottom=False)
         else:
             axis.set_xlabel(time_label(view.units), parse_math=False)
-
-
-def _headings(figure: FigureBase, top: Axes, runs: Sequence[Execution], view: View, plan: Plan) -> None:
-    heading = view.title or ", ".join(dict.fromkeys(map(words.heading, runs)))
-    heading = textwrap.fill(heading, int(plan.size[0] * 10))
-    figure.suptitle(heading, x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
-    facts = _facts(runs[0]) if len(runs) == 1 else _facts_of_several(runs)
-    facts = textwrap.fill(facts, int(plan.width / (plan.across if len(runs) == 1 else 1) * 14))
-    pad = 16 + raise_of(top) if plan.ribbon == 0 else 6
-    top.set_title(facts, loc="left", fontsize=8.5, color="#555555", pad=pad, parse_math=False)
 
 
 def _facts(run: Execution) -> str:
@@ -207,101 +195,106 @@ def _facts_of_several(runs: Sequence[Execution]) -> str:
     return f"{len(runs)} runs" + (f", {badly} stopped before the end" if badly else "")
 
 
-def _legend(
-    figure: FigureBase,
-    top: Axes,
-    data: Sequence[Curves],
-    labels: Sequence[str],
-    plan: Plan,
-    rows_shown: list[Patch] | None,
-) -> None:
-    """Write names of modes above their bands, or in a legend below everything, where it covers nothing."""
-    modes = modes_of(data)
-    names = short_names(modes)
-    handles: list[Any] = []
-    if rows_shown is not None:
-        handles = [*rows_shown]
-    elif len(data) > 1:
-        handles = [
-            Line2D([], [], linewidth=1.6, label=shown(label, LONGEST), **look)
-            for label, look in zip(labels, looks(len(data)), strict=True)
-        ]
-        handles += [
-            Patch(label=shown(names[mode], LONGEST), **fill) for mode, fill in fills(modes, light=False).items()
-        ]
-    elif (shares := data[0].shares) is not None:
-        named = short_names([*shares.of])
-        handles = [
-            Patch(label=f"{shown(named[mode], LONGEST)}, share of the time", **fill)
-            for mode, fill in fills([*shares.of]).items()
-        ]
-    elif modes and not name_bands(top, data[0], plan.room):
-        handles = [Patch(label=shown(names[mode], LONGEST), **fill) for mode, fill in fills(modes).items()]
-    rows = legend_below(figure, handles, plan.size[0])
-    if isinstance(figure, Figure):
-        figure.set_figheight(figure.get_figheight() + rows * LINE)
+def modes_named(top: Axes, run: Curves, strip: Strip | None, width: float) -> list[Patch]:
+    """Write names of modes above their bands, or return what a legend says of them."""
+    if strip is None:
+        names = short_names(run.modes)
+        above = not run.modes or _name_bands(top, run, width, names)
+        return [] if above else [Patch(label=shown(names[m], LONGEST), **fill) for m, fill in fills(run.modes).items()]
+    return _strip_named(strip)
 
 
-MOST_BANDS = 9  # modes whose colours and hatches differ
-MOST_ROWS = 40  # of bars of modes that each have a name
-BOTH_SIDES = 60  # transitions up to which the values before and after are marked
-AFTER_ONLY = 400  # and up to which the value after is
-LONGEST_LABEL = 24  # letters of a run's label
+def _strip_named(strip: Strip) -> list[Patch]:
+    """What a legend says of the modes in a strip: nothing where its rows are modes."""
+    if [*strip.fill] == [*strip.rows]:
+        return []
+    names, of = short_names([*strip.fill]), ", share of the time" if strip.shares else ""
+    return [Patch(label=shown(names[mode], LONGEST) + of, **fill) for mode, fill in strip.fill.items()]
 
 
-def draw_panel(
-    axis: Axes, runs: Sequence[Curves], name: str, guards: Sequence[GuardLine], view: View, room: float
-) -> None:
-    """Draw one run with the bands of its modes and the levels of guards, or several, each in a style of its own.
+def _runs_named(labels: Sequence[str], strip: Strip | None) -> list[Any]:
+    """What a legend says of several runs; of very many it names some."""
+    each, count = looks(len(labels)), len(labels)
+    chosen = range(count) if count <= MOST_DASHED else [k * (count - 1) // 4 for k in range(5)]
+    lines = [Line2D([], [], label=shown(labels[k], LONGEST), **each[k]) for k in chosen]
+    return [*lines, *(_strip_named(strip) if strip else [])]
 
-    The panel is about ``room`` inches wide.
+
+def _of_families(panels: Mapping[str, Sequence[str]]) -> list[Line2D]:
+    """What a legend says of panels that each show the columns of many parts; of very many it names the ends."""
+    columns = max(panels.values(), key=len, default=())
+    each = looks(len(columns))
+    ends = [0, -1] if len(columns) > MOST_DASHED else range(len(columns)) if len(columns) > 1 else ()
+    return [Line2D([], [], label=columns[k].rpartition(".")[0], **each[k]) for k in ends]
+
+
+def marks(data: Sequence[Curves], columns: Sequence[str], start: bool, name: str = "start") -> list[Line2D]:
+    """What a legend says of the marks at transitions, and at the start where it has one."""
+    look: Look = {"color": INK, "linestyle": "", "markersize": 4}
+    found = [Line2D([], [], marker="D", label=name, **look)] if start else []
+    look["marker"] = "o"
+    all_made = [(run, column, len(run.jumps_of(column))) for run in data for column in columns]
+    made = [each for each in all_made if 0 < each[2] <= AFTER_ONLY] if len(data) <= MOST_MARKED else []
+    few = [each for each in made if each[2] <= BOTH_SIDES]
+    if any(_jumps(run, column) for run, column, _ in few):
+        hollow: Look = {"markerfacecolor": "white", "markeredgewidth": 0.9}
+        return [*found, Line2D([], [], label="before a jump", **look, **hollow), Line2D([], [], label="after", **look)]
+    if any(_jumps(run, column) for run, column, _ in made):
+        return [*found, Line2D([], [], label="after a jump", **look)]
+    return [*found, *([Line2D([], [], label="transition", **look)] if few else [])]
+
+
+def _jumps(run: Curves, name: str) -> bool:
+    """Whether a column jumps at a transition, by more than its error."""
+    values = run.column(name)
+    size = np.nanmax(np.abs(values), initial=0.0)
+    return bool(np.any(np.abs(values[run.jumps] - values[run.jumps - 1]) > run.error * size))
+
+
+def draw_panel(axis: Axes, runs: Sequence[Curves], names: Sequence[str], view: View, tall: float) -> None:
+    """Draw a column of one run with its bands and levels of guards, or of several; or many columns of the run.
+
+    The panel is about ``tall`` inches high.
     """
     start, end = min(run.span[0] for run in runs), max(run.span[1] for run in runs)
     if start == end:
         start, end = start - 0.5, end + 0.5
+    guards = [guard for guard in view.guards if guard.state in names]
+    moving = list(moving_levels(runs, guards))
     levels = [guard.value for guard in guards if guard.moving is None]
-    for _, _, values in moving_levels(runs, guards):
-        levels += [float(end) for end in (np.nanmin(values), np.nanmax(values))] if np.isfinite(values).any() else []
-    low, high = with_guards(limits_of(runs, name), levels)
+    levels += [float(end(v)) for *_, v in moving if np.isfinite(v).any() for end in (np.nanmin, np.nanmax)]
+    ends = np.array([limits_of(runs, name) for name in names])
+    low, high = with_guards((ends[:, 0].min(), ends[:, 1].max()), levels)
     axis.set_xlim(start - 0.008 * (end - start), end + 0.008 * (end - start))  # room for markers at the ends
     axis.set_ylim(low, high)
-    if len(runs) == 1:
-        if len(runs[0].modes) <= MOST_BANDS:
-            _draw_bands(axis, runs[0])
-        _draw_guards(axis, runs[0], [guard for guard in guards if guard.moving is None], (low, high), room)
-    elif guards:
-        for level in dict.fromkeys(guard.value for guard in guards if guard.moving is None):
-            axis.axhline(level, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)
-    _draw_moving(axis, runs, guards)
-    for run, look in zip(runs, looks(len(runs)), strict=True):
-        _draw_curve(axis, run, name, look, (start, end, low, high))
-    whole_ticks(axis.yaxis, np.concatenate([run.column(name) for run in runs]))
-    if not any(run.has_values(name) for run in runs):
+    if Strip.of(runs, [""] * len(runs)) is None and len(runs) == 1:
+        _draw_bands(axis, runs[0])
+    _draw_guards(axis, runs, guards, moving, tall)
+    several = [(run, name) for run in runs for name in names]
+    each = looks(len(several)) if len(runs) == 1 else [look for look in looks(len(runs)) for _ in names]
+    for (run, name), look in zip(several, each, strict=True):
+        _draw_curve(axis, run, name, look, (start, end, low, high), len(several) <= MOST_MARKED)
+    whole_ticks(axis.yaxis, np.concatenate([run.column(name) for run, name in several]))
+    if not any(run.has_values(name) for run, name in several):
         axis.text(0.5, 0.5, "no value in this run", transform=axis.transAxes, ha="center", va="center", color=FAINT)
-    axis.set_ylabel(label(name, view.units), parse_math=False)
 
 
 def _draw_bands(axis: Axes, run: Curves) -> None:
-    """Draw a band for each stay in a mode; of very many, areas as high as the mode's share of the time there."""
-    whole: Look = {"transform": axis.get_xaxis_transform(), "zorder": 0}
-    if run.shares is None:
-        for mode, fill in fills(run.modes).items():
-            spans = [(begin, end - begin) for name, begin, end in run.bands if name == mode]
-            axis.broken_barh(spans, (0, 1), label=mode, **whole, **fill)
-        return
-    low = np.zeros(len(run.shares.edges))
-    for mode, fill in fills([*run.shares.of]).items():
-        share = run.shares.of[mode]
-        high = low + np.append(share, share[-1])
-        axis.fill_between(run.shares.edges, low, high, step="post", label=mode, **whole, **fill)
-        low = high
+    """Draw a band for each stay in a mode."""
+    for mode, fill in fills(run.modes).items():
+        spans = [(begin, end - begin) for name, begin, end in run.bands if name == mode]
+        axis.broken_barh(spans, (0, 1), label=mode, transform=axis.get_xaxis_transform(), zorder=0, **fill)
 
 
-def _draw_curve(axis: Axes, run: Curves, name: str, look: Look, ends: tuple[float, float, float, float]) -> None:
+def _draw_curve(
+    axis: Axes, run: Curves, name: str, look: Look, ends: tuple[float, float, float, float], marked: bool
+) -> None:
     values, time = run.column(name), run.samples.time
     x, y = line(time, values, run.begins, ends)
-    axis.plot(x, y, linewidth=1.3, rasterized=len(x) > 60_000, label=name, **look)
-    mark_jumps(axis, time, values, run.jumps, look["color"])
+    wide: Look = {"linewidth": 1.3, **look}
+    axis.plot(x, y, rasterized=len(x) > 60_000, label=name, **wide)
+    if marked:
+        mark_jumps(axis, time, values, run.jumps_of(name), look["color"])
     if len(time) == 1:
         axis.plot(time, values, "o", color=look["color"], markersize=4)
     if run.ends_badly:
@@ -309,170 +302,112 @@ def _draw_curve(axis: Axes, run: Curves, name: str, look: Look, ends: tuple[floa
         axis.axvline(run.span[1], color=colour, linewidth=1.2, linestyle=look["linestyle"])
 
 
-def rows_of(run: Curves) -> dict[str, list[tuple[str, float, float]]]:
-    """Bars of many modes by what is written beside them: for each part with several modes, else for each mode."""
-    parts = parts_in([mode for mode in run.modes if mode != SEVERAL])
-    if parts is None:
-        return {mode: [band for band in run.bands if band[0] == mode] for mode in run.modes}
-    return {
-        part: merged([(modes.get(mode, SEVERAL), begin, end) for mode, begin, end in run.bands])
-        for part, modes in parts.items()
-    }
-
-
-def draw_rows(axis: Axes, run: Curves) -> list[Patch]:
-    """Draw the modes of one run as rows of bars; return what a legend says of them: nothing where rows are modes."""
-    from matplotlib.patches import Patch
-
-    rows = rows_of(run)
-    named = dict.fromkeys(mode for bands in rows.values() for mode, _, _ in bands)
-    by_part = [*named] != [*rows]
-    one: Look = {"facecolor": INK, "linewidth": 0}
-    fill = fills([*named], light=False) if by_part else dict.fromkeys(named, one)
-    for row, bands in enumerate(rows.values()):
-        for mode in dict.fromkeys(mode for mode, _, _ in bands):
-            spans = [(begin, end - begin) for name, begin, end in bands if name == mode]
-            axis.broken_barh(spans, (row - 0.4, 0.8), **fill[mode])
-    _rows_named(axis, [*rows])
-    return [Patch(label=shown(mode, LONGEST_LABEL), **fill[mode]) for mode in named] if by_part else []
-
-
-def _rows_named(axis: Axes, names: Sequence[str]) -> None:
-    axis.set_ylim(len(names) - 0.5, -0.5)
-    named = range(0, len(names), -(-len(names) // MOST_ROWS))
-    axis.set_yticks(named, [shown(names[row], LONGEST_LABEL) for row in named])
-    for text in axis.get_yticklabels():
-        text.set_parse_math(False)
-    axis.tick_params(left=False, labelbottom=False)
-    axis.spines["left"].set_visible(False)
-
-
-def draw_ribbons(axis: Axes, runs: Sequence[Curves], labels: Sequence[str]) -> None:
-    """Draw a bar of modes for each run, the first on top."""
-    fill = fills(modes_of(runs), light=False)
-    for row, run in enumerate(runs):
-        for mode in run.modes:
-            spans = [(begin, end - begin) for name, begin, end in run.bands if name == mode]
-            axis.broken_barh(spans, (row - 0.4, 0.8), label=mode, **fill[mode])
-    _rows_named(axis, labels)
-
-
-def raise_of(axis: Axes) -> float:
+def _raise_of(axis: Axes) -> float:
     """Points by which what is above an axis is raised: where its numbers have a common power of ten, that is there."""
     form = axis.yaxis.get_major_formatter()
     form.set_locs(list(axis.yaxis.get_majorticklocs()))
-    return 10.0 if form.get_offset() else 0.0
+    return 12.0 if form.get_offset() else 0.0
 
 
-def name_bands(axis: Axes, data: Curves, width: float) -> bool:
+def _name_bands(axis: Axes, data: Curves, width: float, names: Mapping[str, str]) -> bool:
     """Write each mode's name above its first wide band, if every name fits somewhere; return whether it did."""
-    raised, names = raise_of(axis), short_names(data.modes)
+    raised = _raise_of(axis)
     start, end = data.span
-    places: dict[str, tuple[float, float]] = {}
+    places: dict[str, float] = {}
     for mode, begin, stop in data.bands:
         if (stop - begin) / (end - start) * width > LETTER * (len(names[mode]) + 2):
-            places.setdefault(mode, (begin, stop))
+            places.setdefault(mode, begin)
     if len(places) < len(data.modes) or len(data.bands) > 3 * len(data.modes) + 6:
         return False
-    for mode, (begin, _) in places.items():
+    for mode, begin in places.items():
         axis.annotate(
             names[mode], (begin, 1), xycoords=axis.get_xaxis_transform(), xytext=(2, 2 + raised),
-            textcoords="offset points", va="bottom", ha="left", fontsize=8, color="#444444", parse_math=False,
+            textcoords="offset points", va="bottom", ha="left", **NAME,
         )  # fmt: skip
     return True
 
 
 def mark_jumps(axis: Axes, x: Array, y: Array, jumps: Array, colour: str) -> None:
-    """Mark transitions: open circles before, full ones after; fewer and smaller the more there are."""
+    """Mark transitions: open circles before, full ones after; of many only the jumps, and of very many none.
+
+    Between transitions at one instant is a dot.
+    """
     if not len(jumps) or len(jumps) > AFTER_ONLY:
         return
-    few = len(jumps) <= BOTH_SIDES
-    size = 4.0 if len(jumps) <= 20 else 3.0 if few else 1.8
-    if few:
+    size = 4.0 if len(jumps) <= 20 else 3.0
+    passed = np.isin(jumps, jumps - 1)  # the next point is after a transition, too
+    if len(jumps) <= BOTH_SIDES:
         hollow: dict[str, Any] = {"markerfacecolor": "white", "markeredgewidth": 0.9}
-        axis.plot(x[jumps - 1], y[jumps - 1], "o", color=colour, markersize=size, **hollow)
+        first = jumps[~np.isin(jumps - 1, jumps)]
+        if passed.any():
+            axis.plot(x[jumps[passed]], y[jumps[passed]], "o", color=colour, markersize=1.8, markeredgewidth=0.0)
+        axis.plot(x[first - 1], y[first - 1], "o", color=colour, markersize=size, **hollow)
+        jumps = jumps[~passed]
+    else:
+        jumps, size = jumps[(x[jumps] != x[jumps - 1]) | (y[jumps] != y[jumps - 1])], 1.8
     axis.plot(x[jumps], y[jumps], "o", color=colour, markersize=size, markeredgewidth=0.0)
 
 
 def with_guards(ends: tuple[float, float], levels: Sequence[float]) -> tuple[float, float]:
-    """Widen an axis for the levels that are near it, with room for their labels."""
+    """Widen an axis for the levels that are near it."""
     low, high = ends
     size = high - low
-    for level in levels:
-        if low - size / 2 < level < high + size / 2:
-            if level > (ends[0] + ends[1]) / 2:
-                high = max(high, level + 0.17 * size)
-            else:
-                low = min(low, level - 0.17 * size)
-    return low, high
+    near = [level for level in levels if low - size / 2 < level < high + size / 2]
+    return min([low, *(level - size / 16 for level in near)]), max([high, *(level + size / 16 for level in near)])
 
 
-def _draw_moving(axis: Axes, runs: Sequence[Curves], guards: Sequence[GuardLine]) -> None:
-    """Draw guards that move as dotted lines, each with its label at its last time."""
-    named = set[str]()
-    for guard, times, values in moving_levels(runs, guards):
-        text, finite = guard.label, np.flatnonzero(np.isfinite(values))
-        if not len(finite):
-            continue
-        axis.plot(times, values, color="#444444", linestyle="dotted", linewidth=1.1, zorder=1)
-        if text not in named:
-            named.add(text)
-            last = finite[-1]
-            label = axis.annotate(
-                shown(text, LONGEST_LABEL), (times[last], values[last]), xytext=(-3, -4), textcoords="offset points",
-                ha="right", va="top", fontsize=7.5, color="#444444", parse_math=False,
-            )  # fmt: skip
-            label.set_in_layout(False)
+def _draw_guards(
+    axis: Axes,
+    runs: Sequence[Curves],
+    guards: Sequence[GuardLine],
+    moving: Sequence[tuple[GuardLine, Array, Array]],
+    tall: float,
+) -> None:
+    """Draw each level, of one run where its modes are occupied; labels stand beside the panel, where no curve is."""
+    low, high = axis.get_ylim()
+    labels: dict[tuple[float, str], None] = {}
+    fixed = [guard for guard in guards if guard.moving is None and low < guard.value < high]
+    for name, level in dict.fromkeys((guard.label, guard.value) for guard in fixed):
+        modes = {SEVERAL, *(guard.mode for guard in fixed if (guard.label, guard.value) == (name, level))}
+        spans = [band[1:] for band in runs[0].bands if band[0] in modes] if len(runs) == 1 else [axis.get_xlim()]
+        if spans:
+            axis.hlines(
+                [level] * len(spans), *zip(*spans, strict=True), colors="#444444", linestyles="dotted", linewidth=1.1
+            )
+            labels[level, name] = None
+    for guard, times, values in moving:
+        if len(finite := np.flatnonzero(np.isfinite(values))):
+            axis.plot(times, values, zorder=1, **LEVEL)
+            if guard.label not in {name for _, name in labels}:
+                labels[min(max(float(values[finite[-1]]), low), high), guard.label] = None
+    _label_levels(axis, sorted(labels), 0.13 / tall * (high - low))
 
 
-def _draw_guards(axis: Axes, data: Curves, guards: Sequence[GuardLine], ends: tuple[float, float], room: float) -> None:
-    """Draw each level where its modes are occupied, and label it at the end; labels that would collide become one."""
-    low, high = ends
-    longest = max((len(guard.label) for guard in guards), default=0)
-    share = max(0.15, 1.2 * longest * LETTER / room)
-    near = share * (data.span[1] - data.span[0]), 0.04 * (high - low)
-    labels: dict[tuple[float, float], list[str]] = {}
-    for name, level in dict.fromkeys((guard.label, guard.value) for guard in guards):
-        modes = {SEVERAL, *(guard.mode for guard in guards if (guard.label, guard.value) == (name, level))}
-        spans = [(begin, end) for mode, begin, end in data.bands if mode in modes]
-        if not spans or not low < level < high:
-            continue
-        begins, stops = [begin for begin, _ in spans], [end for _, end in spans]
-        axis.hlines([level] * len(spans), begins, stops, colors="#444444", linestyles="dotted", linewidth=1.1)
-        close = (at for at in labels if abs(at[0] - stops[-1]) < near[0] and abs(at[1] - level) < near[1])
-        labels.setdefault(next(close, (stops[-1], level)), []).append(name)
-    start, whole = data.span[0], (data.span[1] - data.span[0]) or 1
-    for (end, level), texts in labels.items():
-        above, distinct = level > (low + high) / 2, list(dict.fromkeys(texts))
-        before = len(distinct[0]) <= (end - start) / whole * room / LETTER  # else the axis would cut it off
-        joined = _joined(distinct, int(((end - start) / whole if before else 1) * room / LETTER))
-        at, shift, side = (end, -3, "right") if before else (start, 3, "left")
-        text = axis.annotate(
-            joined, (at, level), xytext=(shift, 4 if above else -4), textcoords="offset points",
-            ha=side, va="bottom" if above else "top", fontsize=7.5, color="#444444", parse_math=False,
+def _label_levels(axis: Axes, levels: Sequence[tuple[float, str]], line: float) -> None:
+    """Write labels at rising levels, those that would collide on top of each other; a line of text is so high."""
+    groups: list[list[tuple[float, str]]] = []
+    for level, text in levels:
+        if groups and level - groups[-1][-1][0] < line * min(len(groups[-1]), MOST_LABELS):
+            groups[-1].append((level, text))
+        else:
+            groups.append([(level, text)])
+    for group in groups:
+        texts = [shown(text, LONGEST_LABEL) for text in dict.fromkeys(text for _, text in reversed(group))]
+        more = [f"and {len(texts) - MOST_LABELS + 1} more"] if len(texts) > MOST_LABELS else []
+        axis.annotate(
+            "\n".join([*texts[: MOST_LABELS - len(more)], *more]), (1, float(np.mean([level for level, _ in group]))),
+            xycoords=axis.get_yaxis_transform(), xytext=(3, 0), textcoords="offset points", ha="left", va="center",
+            linespacing=1.0, annotation_clip=False, **SMALL,
         )  # fmt: skip
-        text.set_bbox({"facecolor": "white", "alpha": 0.55, "linewidth": 0, "pad": 0.8})
-        text.set_in_layout(False)
 
 
-def _joined(texts: Sequence[str], most: int) -> str:
-    """Join labels, as many as fit, with how many there are more; at least one."""
-    count = next((k for k in range(len(texts), 1, -1) if len(", ".join(texts[:k])) + 9 * (k < len(texts)) <= most), 1)
-    more = f" and {len(texts) - count} more" if count < len(texts) else ""
-    return (", ".join(texts[:count]) if count > 1 else shown(texts[0], max(LONGEST_LABEL, most - len(more)))) + more
-
-
-LEVEL: dict[str, Any] = {"color": "#444444", "linestyle": "dotted", "linewidth": 1.1}
-
-
-def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, guards: Sequence[GuardLine], view: View) -> None:
+def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, view: View) -> None:
     """Draw one run coloured by mode where it has several, or several, each in a style of its own; guards are dotted."""
-    fixed = [guard for guard in guards if guard.moving is None]
-    levels = [[guard.value for guard in fixed if guard.state == name] for name in pair]
+    levels = [[each.value for each in view.guards if each.moving is None and each.state == name] for name in pair]
     across, up = (with_guards(limits_of(runs, name), at) for name, at in zip(pair, levels, strict=True))
     axis.set(xlim=across, ylim=up)
     for run, look in zip(runs, looks(len(runs)), strict=True):
-        _draw_run(axis, run, pair, _parts(run, look, len(runs) == 1), (*across, *up))
+        _draw_pair(axis, run, pair, _parts(run, look, len(runs) == 1), (*across, *up), len(runs) <= MOST_MARKED)
     for level in dict.fromkeys(levels[0]):
         axis.axvline(level, **LEVEL)
     for level in dict.fromkeys(levels[1]):
@@ -482,23 +417,28 @@ def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, guards: Sequence[
     axis.set_box_aspect(1)
 
 
-def _draw_run(
-    axis: Axes, run: Curves, pair: Pair, parts: Sequence[tuple[Look, Array]], ends: tuple[float, float, float, float]
+def _draw_pair(
+    axis: Axes,
+    run: Curves,
+    pair: Pair,
+    parts: Sequence[tuple[Look, Array]],
+    ends: tuple[float, float, float, float],
+    marked: bool,
 ) -> None:
     x, y = run.column(pair[0]), run.column(pair[1])
     for look, here in parts:
+        wide: Look = {"linewidth": 1.1 if len(run.jumps) <= AFTER_ONLY else 0.6, **look}
         drawn = line(np.where(here, x, np.nan), np.where(here, y, np.nan), run.begins, ends)
-        axis.plot(*drawn, linewidth=1.1, rasterized=len(drawn[0]) > 60_000, **look)
+        axis.plot(*drawn, rasterized=len(drawn[0]) > 60_000, **wide)
     colour = looks(1)[0]["color"] if len(parts) > 1 else parts[0][0]["color"]
-    mark_jumps(axis, x, y, run.jumps, colour)
+    if marked:
+        mark_jumps(axis, x, y, run.jumps, colour)
     axis.plot(x[:1], y[:1], marker="D", color=colour, markersize=4.5, linestyle="")
-    if np.isfinite([x[0], y[0]]).all():
-        axis.annotate("start", (x[0], y[0]), xytext=(5, 4), textcoords="offset points", fontsize=7.5, color="#444444")
 
 
 def _parts(run: Curves, look: Look, alone: bool) -> list[tuple[Look, Array]]:
     """Divide the points by mode, each with its colour; all in one where there are no colours to tell modes by."""
-    if not alone or len(run.modes) < 2 or SEVERAL in run.modes:
+    modes = list(dict.fromkeys([*(mode for mode in run.modes if mode != SEVERAL), *run.samples.mode.tolist()]))
+    if not alone or not 1 < len(modes) <= MOST_BANDS:
         return [(look, np.ones(len(run.samples), dtype=bool))]
-    shades = colours(run.modes).items()
-    return [({**look, "color": curve(colour)}, run.samples.mode == mode) for mode, colour in shades]
+    return [({**look, "color": curve(shade)}, run.samples.mode == mode) for mode, shade in colours(modes).items()]

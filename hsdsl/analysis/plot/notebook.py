@@ -66,7 +66,7 @@ def measured_html(
 ) -> str:
     """Return lines of text, and a picture of measurements and the run fitted to them."""
     with styled():
-        from hsdsl.analysis.plot.fits import measured
+        from hsdsl.analysis.plot.ensembles import measured
 
         return f"{lines_html(text)}\n{_element(measured(run, times, columns, units), words.heading(run))}"
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import wraps
 from pathlib import Path
+from textwrap import fill
 from threading import RLock
 from typing import TYPE_CHECKING, Any, BinaryIO, Concatenate, ParamSpec
 
@@ -21,6 +22,7 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.names import visible_lines
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure, FigureBase
 
@@ -42,6 +44,7 @@ STYLE: dict[str, Any] = {
     "text.color": "#222222",
     "axes.formatter.useoffset": False,
     "axes.formatter.limits": (-4, 5),
+    "axes.formatter.use_mathtext": True,
     "agg.path.chunksize": 20_000,
     "hatch.linewidth": 0.6,
 }
@@ -49,10 +52,12 @@ FORMATS = (".png", ".svg")
 Look = dict[str, Any]  # matplotlib's arguments for a line
 INK, FAINT, ALARM = "#16324f", "#8a8a8a", "#d55e00"
 # Okabe and Ito 2008: people with any colour vision tell them apart
-PALETTE = ("#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#f0e442", "#0072b2", "#d55e00")
-RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222", "#e69f00", "#56b4e9")  # lines of runs, by Okabe and Ito
+PALETTE = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442")  # of modes
+TINTS = (0.2, 0.2, 0.33, 0.3, 0.3, 0.3, 0.5)  # of their bands: the first three differ in grey, too
+RUNS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#222222", "#e69f00", "#56b4e9")  # of lines and marks
 DASHES = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1.2, 1.2)))  # distinct without any colour
-PLAIN, HATCHES = 5, ("////", "\\\\\\\\", "xxxx", "....")  # of the bands of modes: so many without, then these
+MOST_DASHED = 12  # lines that each have a colour and dashes; more are a family, from dark to light
+PLAIN, HATCHES = 3, ("////", "\\\\\\\\", "xxxx", "....")  # of the bands of modes: so many without, then these
 _drawing = RLock()  # matplotlib's settings are the whole process's
 
 
@@ -117,11 +122,14 @@ def legend_below(figure: FigureBase, handles: Sequence[Any], width: float) -> in
     """Put a legend below everything, where it covers nothing; return how many rows it has in ``width`` inches."""
     if not handles:
         return 0
-    widest = max(len(str(handle.get_label())) for handle in handles) * LETTER + 0.6
-    columns = min(len(handles), max(1, int(width / widest)))
+    widths = [len(str(handle.get_label())) * LETTER + 0.6 for handle in handles]
+    fitting = len(handles) if sum(widths) < 1.1 * width else int(width / max(widths))  # most letters are narrower
+    columns = min(len(handles), max(1, fitting))
     legend = figure.legend(handles=handles, loc="outside lower left", ncols=columns, frameon=False, fontsize=8.5)
     for text in legend.get_texts():
         text.set_parse_math(False)
+    for line in legend.get_lines():
+        line.set_alpha(1)  # pale ones would not be seen
     return -(-len(handles) // columns)
 
 
@@ -158,10 +166,21 @@ def _import() -> None:
 
 
 def looks(count: int) -> list[Look]:
-    """Give each run a line of its own colour and dashes; a single one is drawn in ink."""
+    """Give each run a line of its own colour and dashes; one is drawn in ink, and very many from dark to light."""
     if count == 1:
         return [{"color": INK, "linestyle": "-", "solid_capstyle": "round"}]
-    return [{"color": RUNS[k % len(RUNS)], "linestyle": DASHES[k % len(DASHES)]} for k in range(count)]
+    if count <= MOST_DASHED:
+        return [{"color": RUNS[k % len(RUNS)], "linestyle": DASHES[k % len(DASHES)]} for k in range(count)]
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    shades = map(to_hex, colormaps["viridis"](np.linspace(0, 0.92, count)))
+    return [{"color": shade, "linestyle": "-", "linewidth": 0.8, "alpha": pale(count)} for shade in shades]
+
+
+def pale(count: int) -> float:
+    """How opaque each of many lines is, that those below are seen."""
+    return max(0.15, min(1.0, 4 / np.sqrt(count)))
 
 
 def colours(modes: Sequence[str]) -> dict[str, str]:
@@ -174,30 +193,40 @@ def colours(modes: Sequence[str]) -> dict[str, str]:
     return chosen | {mode: "#7a7a7a" for mode in modes if mode == SEVERAL}
 
 
-def band(colour: str, alone: bool = False) -> str:
-    """Lighten a colour for the background, more so where it is the only one."""
-    return _mixed(colour, 0.1 if alone else 0.24, "#ffffff")
+def band(colour: str, share: float = 0.24) -> str:
+    """Lighten a colour for the background."""
+    return _mixed(colour, share, "#ffffff")
 
 
 def fills(modes: Sequence[str], light: bool = True) -> dict[str, Look]:
-    """Fill the bands of modes; from the sixth on they are hatched: light colours are too few to tell them apart."""
+    """Fill the bands of modes; from the fourth on they are hatched: light colours are too few to tell them apart."""
     found: dict[str, Look] = {}
     for i, (mode, colour) in enumerate(colours(modes).items()):
         hatch = HATCHES[(i - PLAIN) % len(HATCHES)] if i >= PLAIN and mode != SEVERAL else None
-        strong = _mixed(colour, 0.5, "#ffffff") if light else "#ffffff"
-        found[mode] = {"facecolor": band(colour, len(modes) == 1) if light else colour, "linewidth": 0}
-        found[mode] |= {"hatch": hatch, "edgecolor": strong} if hatch else {}
+        tint = 0.06 if len(modes) == 1 else TINTS[i % len(TINTS)]
+        found[mode] = {"facecolor": band(colour, tint) if light else colour, "linewidth": 0}
+        found[mode] |= {"hatch": hatch, "edgecolor": band(colour, 0.5) if light else "#ffffff"} if hatch else {}
     return found
 
 
 def curve(colour: str) -> str:
     """Darken a colour for a line on white."""
-    return _mixed(colour, 0.75, "#000000")
+    return _mixed(colour, 0.85, "#000000")
 
 
 def _mixed(colour: str, share: float, other: str) -> str:
     parts = (int(colour[i : i + 2], 16) * share + int(other[i : i + 2], 16) * (1 - share) for i in (1, 3, 5))
     return "#" + "".join(f"{round(part):02x}" for part in parts)
+
+
+def heading(figure: Any, title: str, facts: str = "", top: Axes | None = None, pad: float = 6) -> None:
+    """Write a title above a figure, and facts in smaller letters above its first axes; both are wrapped."""
+    width = figure.bbox.width / figure.dpi
+    text = fill(title, max(20, int(width * 10)))
+    figure.suptitle(text, x=0.01, ha="left", fontsize=12, fontweight="bold", parse_math=False)
+    if facts and top is not None:
+        text = fill(facts, max(20, int(width * 13)))
+        top.set_title(text, loc="left", fontsize=8.5, color="#555555", pad=pad, parse_math=False)
 
 
 def label(name: str, units: Mapping[str, str]) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.analysis.plot.style import FAINT, PALETTE, empty, to_file
+from hsdsl.analysis.plot.style import FAINT, RUNS, empty, to_file
 from hsdsl.interface.chart.rows import Row
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def _looks(rows: Sequence[Row]) -> Looks:
         groups.setdefault((row.attempt.tool.name, row.attempt.tool.scheme), {})[row.attempt.tool.label] = None
     return {
         label: {
-            "color": PALETTE[group % len(PALETTE)],
+            "color": RUNS[group % len(RUNS)],
             "marker": MARKERS[method % len(MARKERS)],
             "markersize": 5,
             "linewidth": 1.3,
