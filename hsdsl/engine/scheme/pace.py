@@ -1,4 +1,7 @@
-"""Steps that do not lead on: how a run notices that no shorter step helps. See hsdsl/engine/simulate/stalls.py."""
+"""What does not lead on: steps of which no shorter one helps, and transitions without flow between that come back.
+
+See hsdsl/engine/simulate/stalls.py and transitions.py there.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,7 @@ from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.scheme.primitives import flow_between
-from hsdsl.engine.scheme.words import Here, Time, Vector, inline
+from hsdsl.engine.scheme.words import Count, Here, Room, Time, Vector, inline
 
 IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
 MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off
@@ -15,6 +18,7 @@ MOST_CREEPING = 2000  # in a row: the run would take a thousand times its length
 SHORT = 1e-6  # of a run
 MOST_SHORT = 100000  # steps within that, in one flight: so the run would take a hundred billion
 MOST_CHATTER = 2000  # a step that turns the flow around counts 2, any other takes 1 back
+PARALLEL = 1e-6  # of a component: flows that differ by less move no state on by more than this share of the way back
 JUMP_HALVINGS = 40  # of the way between two states: what changes as much over the last of them jumps
 
 
@@ -107,3 +111,52 @@ def jump_between(here: Here, k: int, t: Time, x: Vector, t1: Time, z: Vector) ->
     if not (size > 0 and 2 * abs(behind - before) >= size):
         return None
     return high, before, behind
+
+
+@dataclass
+class Cascade:
+    """One of the states that such transitions led to, with which those after it are compared (Brent's algorithm).
+
+    There is none where ``room`` is 0.
+    """
+
+    x: Room
+    mode: int = 0
+    length: Count = 0
+    room: Count = 0
+
+
+def same_state(a: Vector, b: Vector, n: int) -> bool:
+    """Whether two states are one."""
+    same = True
+    for k in range(n):
+        same = same and a[k] == b[k]
+    return same
+
+
+def returns(cascade: Cascade, flowed: bool, mode: int, x: Vector, n: int) -> bool:
+    """Count a transition that led to a state; return whether one of the same cascade has led there before."""
+    if not flowed and cascade.room > 0:
+        if mode == cascade.mode and same_state(x, cascade.x, n):
+            return True
+        cascade.length += 1
+        if cascade.length != cascade.room:
+            return False
+    cascade.room = 1 if flowed or cascade.room == 0 else 2 * cascade.room
+    cascade.length = 0
+    cascade.mode = mode
+    for k in range(n):
+        cascade.x[k] = x[k]
+    return False
+
+
+def takes_back(slope: Vector, back: Vector, n: int) -> bool:
+    """Whether one direction is opposite to another that is not zero, in each component."""
+    first = 0
+    while first < n and slope[first] == 0:
+        first += 1
+    share = back[first] / slope[first] if first < n else 0
+    for k in range(n):
+        if not abs(back[k] - share * slope[k]) <= PARALLEL * abs(share) * abs(slope[k]):
+            return False
+    return share < 0

@@ -24,7 +24,7 @@ FOLDER = Path(__file__).parent
 ROOT = FOLDER.parents[2]
 BY_HAND = "primitives"  # the text whose C is `primitives.h`
 # in the order in which they build on each other
-TEXTS = ("control", "pace", "cascade", "polynomials", "roots", "linear", "scales", "newton", "radau")
+TEXTS = ("control", "pace", "polynomials", "roots", "linear", "scales", "newton", "radau")
 PLAIN = {"Number": "hs_real", "Time": "hs_time", "int": "int", "bool": "int", "Count": "int64_t"}
 VECTORS = {
     "Here": "hs_run *", "Room": "hs_real *", "Vector": "const hs_real *", "list[Room]": "hs_real **",

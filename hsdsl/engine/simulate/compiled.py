@@ -81,7 +81,7 @@ class CompiledPlan:
 
 
 def _tables(program: Program) -> Any:
-    from hsdsl.engine.simulate.verdict.screen import FormulaTables  # only verdicts ask for it
+    from hsdsl.engine.runtime.formulas import FormulaTables  # only verdicts ask for it
 
     return FormulaTables(program)
 

@@ -16,9 +16,8 @@ from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper, hermite
 from hsdsl.engine.kernel import Vector
-from hsdsl.engine.scheme.cascade import takes_back
 from hsdsl.engine.scheme.control import accept, begin_steps, reject, struggles
-from hsdsl.engine.scheme.pace import count_step
+from hsdsl.engine.scheme.pace import count_step, takes_back
 from hsdsl.engine.simulate.contact import holds_next, unresolved
 from hsdsl.engine.simulate.control import error_ratio
 from hsdsl.engine.simulate.run import ModeState, Run

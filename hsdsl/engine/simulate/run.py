@@ -11,7 +11,7 @@ from hsdsl.engine.execution import Stop, Transition
 from hsdsl.engine.integrators.stepper import Derivatives, State, Stepper, stepper
 from hsdsl.engine.integrators.taylor import taylor_stepper
 from hsdsl.engine.kernel import ModeKernel
-from hsdsl.engine.scheme.cascade import Cascade
+from hsdsl.engine.scheme.pace import Cascade
 from hsdsl.engine.scheme.roots import Roots
 from hsdsl.engine.simulate.control import Control
 from hsdsl.engine.simulate.input_segments import Segment

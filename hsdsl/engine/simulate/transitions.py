@@ -25,7 +25,7 @@ from hsdsl.base.names import nth_memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, TIE, Number
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.stepper import State
-from hsdsl.engine.scheme.cascade import returns
+from hsdsl.engine.scheme.pace import returns
 from hsdsl.engine.simulate.moving import moved_reset
 from hsdsl.engine.simulate.stops import ENTERED, endless, entered_final, left_domain, reset_not_finite, too_many_wait
 from hsdsl.engine.simulate.surfaces import ANY, Arrival, Crossing

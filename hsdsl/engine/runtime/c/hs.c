@@ -10,7 +10,6 @@
 /* printed from hsdsl/engine/scheme */
 #include "control.c"
 #include "pace.c"
-#include "cascade.c"
 #include "polynomials.c"
 #include "roots.c"
 

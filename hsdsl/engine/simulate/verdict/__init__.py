@@ -27,11 +27,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hsdsl.engine.execution import INCOMPLETE, LEFT, Execution, Verdict
+from hsdsl.engine.simulate.compiled import CompiledRun
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stalls import SHORT
 from hsdsl.engine.simulate.stops import Diagnostics, show
@@ -42,9 +43,6 @@ from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
 from hsdsl.engine.simulate.verdict.screen import Margins, screens_of
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
 from hsdsl.mathematics.program import Program
-
-if TYPE_CHECKING:
-    from hsdsl.engine.simulate.compiled import CompiledRun
 
 __all__ = ["RunView", "assess", "assess_compiled"]
 
