@@ -34,17 +34,31 @@ HS_INLINE int implicit_step_in(hs_run *run, hs_blocks of, hs_time t, hs_real h) 
   return solved ? 0 : NO_CONVERGENCE;
 }
 
+/* Steps of systems with so many states, a function each: a compiler takes much longer for a large one. */
+#define STEPS_OF(name, own, columns)                                      \
+  HS_APART static int name(hs_run *run, hs_time t, hs_real h) {           \
+    const hs_blocks of = blocks_of(run->here.table);                      \
+    return implicit_step_in(run, of_size(of, own, columns), t, h);        \
+  }
+#if !defined(__OPTIMIZE_SIZE__)
+STEPS_OF(step_of_two, 2, 0)
+STEPS_OF(step_of_three, 3, 0)
+STEPS_OF(step_of_two_and_column, 2, 1)
+STEPS_OF(step_of_two_and_columns, 2, of.varied->count)
+STEPS_OF(step_of_three_and_columns, 3, of.varied->count)
+#endif
+
 /* Try a step; compiled for two and three states apart, a tenth faster, and a third where these have columns. */
 static int implicit_step(hs_run *run, hs_time t, hs_real h) {
   const hs_mode *const mode = run->here.table;
   const hs_blocks of = blocks_of(mode);
 #if !defined(__OPTIMIZE_SIZE__)
-  if (!columns_of(mode) && of.n == 2) return implicit_step_in(run, of_size(of, 2, 0), t, h);
-  if (!columns_of(mode) && of.n == 3) return implicit_step_in(run, of_size(of, 3, 0), t, h);
+  if (!columns_of(mode) && of.n == 2) return step_of_two(run, t, h);
+  if (!columns_of(mode) && of.n == 3) return step_of_three(run, t, h);
   if (columns_of(mode) && of.whole && !of.pattern) {
-    if (of.n == 4 && of.own == 2) return implicit_step_in(run, of_size(of, 2, 1), t, h);
-    if (of.own == 2) return implicit_step_in(run, of_size(of, 2, of.varied->count), t, h);
-    if (of.own == 3) return implicit_step_in(run, of_size(of, 3, of.varied->count), t, h);
+    if (of.n == 4 && of.own == 2) return step_of_two_and_column(run, t, h);
+    if (of.own == 2) return step_of_two_and_columns(run, t, h);
+    if (of.own == 3) return step_of_three_and_columns(run, t, h);
   }
 #endif
   return implicit_step_in(run, of, t, h);
