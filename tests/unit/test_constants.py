@@ -23,7 +23,8 @@ IN_C_ALONE = {
     "PAUSED", "LANDED", "AT_BOUNDARY", "WITHOUT_VALUE", "NO_VALUE", "NO_CONVERGENCE", "TESTS",  # answers of functions
     "LEAST_MOST_DEGREE", "BLOCK", "STEPS_BEFORE_SEARCH", "SMALL", "FEWEST_WAITS",  # of memory
     "LEVELS", "END_LEVELS", "MOST_PARTS_TRIED", "COARSE_PARTS_TRIED", "CLOSE_SHARE",  # of the screen
-    "MOST_LANES", "WIDTH", "FAR", "LOST", "MOST_LOST", "ROWS_OF_PLACE",  # of lanes
+    "MOST_LANES", "WIDTH", "FAR", "LOST", "MOST_LOST", "KEPT", "KEPT_OF_PLACE", "MOST_ASIDE",  # of lanes
+    "MOST_NEWTON", "MOST_SETTLINGS",  # and how these find roots
     "TINIEST", "LIBRARY",  # of ranges: Python takes the next number instead
 }  # fmt: skip
 
