@@ -350,6 +350,27 @@ def test_rows_at_samples_and_both_rows_of_each_jump(tmp_path):
     assert json.loads((tmp_path / "run.csv.json").read_text())["table"]["rows"] == 8
 
 
+@pytest.mark.parametrize(
+    ("samples", "jumps", "expected"),
+    [
+        ([0.5, 1.0, 2.5], "none", [("0.5", "0"), ("1.0", "3"), ("2.5", "3")]),
+        ([0.5, 2.5], "after", [("0.5", "0"), ("1.0", "3"), ("2.5", "3"), ("3.0", "4")]),
+        (None, "after", [("0.0", "0"), ("1.0", "3"), ("3.0", "4")]),
+    ],
+)
+def test_jumps_have_one_row_or_none(samples, jumps, expected, tmp_path):
+    """Three transitions at t = 1 and one at t = 3, the end."""
+    hand_made.modes_of_different_size().save(tmp_path / "run.csv", samples=samples, jumps=jumps)
+    assert [(row[0], row[2]) for row in _read(tmp_path / "run.csv")[1:]] == expected
+
+
+@pytest.mark.parametrize(("name", "jumps"), [("run.csv", "none"), ("run.csv", "once"), ("run.npz", "after")])
+def test_rows_of_jumps_that_there_are_not_are_refused(name, jumps, tmp_path):
+    with pytest.raises(UsageError):
+        hand_made.modes_of_different_size().save(tmp_path / name, jumps=jumps)
+    assert not list(tmp_path.iterdir())
+
+
 def test_rows_at_samples_with_strips(tmp_path):
     hand_made.bouncing_ball(bounces=1, wait=0.125).save(tmp_path / "run.csv", samples=[0.0, 2.0, 2.0625, 2.125])
     assert [row[:3] + row[4:5] for row in _read(tmp_path / "run.csv")[1:]] == [

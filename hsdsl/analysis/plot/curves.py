@@ -135,13 +135,10 @@ def curves(execution: Execution) -> Curves:
 
 def lap(run: Curves, period: float) -> Curves:
     """Cut off what is after one period; the jump at its end stays."""
-    samples = run.samples
-    count = int(np.searchsorted(samples.time, period * (1 + CLOSE), side="right"))
-    rows = ("time", "mode", "jump", "kind", "state_columns", "output_columns", "present")
-    names = {name: getattr(samples, name) for name in ("states", "outputs")}
-    samples = Samples(**{name: getattr(samples, name)[:count] for name in rows}, **names)
+    count = int(np.searchsorted(run.samples.time, period * (1 + CLOSE), side="right"))
+    samples, begins = run.samples.at(slice(count)), run.begins[:count]
     bands = [(mode, begin, min(end, period)) for mode, begin, end in run.bands if begin < period * (1 - CLOSE)]
-    return replace(run, samples=samples, begins=run.begins[:count], jumps=run.jumps[run.jumps < count], bands=bands)
+    return replace(run, samples=samples, begins=begins, jumps=run.jumps[run.jumps < count], bands=bands)
 
 
 def _in_float64(execution: Execution) -> Execution:

@@ -14,9 +14,9 @@ from typing import Any
 
 from hsdsl.analysis.store.npz import load, save_npz
 from hsdsl.analysis.store.table import (
-    at_samples,
     forget_sidecar,
     read_sidecar,
+    rows_of,
     sidecar_of,
     write_csv,
     write_parquet,
@@ -34,21 +34,26 @@ _TABLES = {".csv": write_csv, ".parquet": write_parquet}
 
 @checks_arguments
 def save(
-    execution: Execution, path: str | os.PathLike[str], samples: Any | None = None, columns: Sequence[str] | None = None
+    execution: Execution,
+    path: str | os.PathLike[str],
+    samples: Any | None = None,
+    columns: Sequence[str] | None = None,
+    jumps: str = "both",
 ) -> tuple[Path, ...]:
     """Save an execution; see :meth:`hsdsl.engine.execution.Execution.save`."""
     target = Path(path)
     suffix = target.suffix.lower()
     if suffix == ".npz":
-        if columns is not None:
-            raise UsageError("an .npz file holds the whole execution: choose columns for .csv or .parquet only")
+        if columns is not None or jumps != "both":
+            raise UsageError(
+                "an .npz file holds the whole execution: choose columns and jumps for .csv or .parquet only"
+            )
         with replacing(target) as file:
             save_npz(execution, file)
         return (target,)
     if suffix not in _TABLES:
         raise UsageError(f"{target} should end in .csv, .parquet or .npz: the suffix gives the format")
-    rows = execution.rows() if samples is None else at_samples(execution, samples)
-    rows = rows.only(execution.shown if columns is None else columns)
+    rows = rows_of(execution, samples, jumps).only(execution.shown if columns is None else columns)
     description = sidecar_of(target)
     with unplaced(target) as table:
         _TABLES[suffix](rows, table.file)

@@ -28,20 +28,30 @@ from hsdsl.engine.execution.records import optional
 from hsdsl.engine.execution.run import evaluate, find, within
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
+JUMPS = ("both", "after", "none")
 BLOCK = 2**14  # rows of which the text is made at once
 
 
-def at_samples(execution: Execution, samples: Any) -> Samples:
-    """Give the rows at sample times, and both rows of each jump, in the order of hybrid time.
+def rows_of(execution: Execution, samples: Any, jumps: str) -> Samples:
+    """Give the integrator's rows, or those at sample times, in the order of hybrid time; ``jumps`` as in `save`.
 
     Samples outside the run are left out: a run may stop before the last one.
     """
+    if jumps not in JUMPS:
+        raise UsageError(f"jumps: expected {', '.join(JUMPS[:-1])} or {JUMPS[-1]}, got {jumps!r}")
+    if samples is None and jumps == "none":
+        raise UsageError("a table without rows of jumps needs samples", "choose them, such as --samples every=0.05")
+    found = execution.rows() if samples is None else _at_samples(execution, samples, jumps != "none")
+    return found if jumps == "both" else found.at(np.append(found.time[1:] != found.time[:-1], True))
+
+
+def _at_samples(execution: Execution, samples: Any, jumps: bool) -> Samples:
     instants, inside = within(execution, samples)
     rows, times = find(execution, instants[inside], "right")
     ends = [
         row
         for before, after in zip(execution.arcs, execution.arcs[1:], strict=False)
-        if before.jump != after.jump
+        if jumps and before.jump != after.jump
         for row in (before.last, after.first)
     ]
     points = {(int(row), execution.times[row]) for row in ends} | set(zip(rows.tolist(), times, strict=True))

@@ -347,6 +347,12 @@ class Samples(Deferred):
         """All states, then all outputs."""
         return self.states + self.outputs
 
+    def at(self, rows: Any) -> Samples:
+        """Keep only these rows, an index array, a mask or a slice."""
+        by_row = ("time", "mode", "jump", "kind", "state_columns", "output_columns", "present")
+        chosen = {name: getattr(self, name)[rows] for name in by_row}
+        return Samples(states=self.states, outputs=self.outputs, **chosen)
+
     def only(self, columns: Sequence[str] | None) -> Samples:
         """Keep only the named states and outputs, in the given order (states before outputs).
 

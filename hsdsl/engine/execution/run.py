@@ -571,7 +571,7 @@ class Execution(Deferred):
         times : numbers
             Within :attr:`time_span`, or outside it by at most the tie tolerance.
         side : {"right", "left"}
-            At a jump: the value after the last transition at that instant, or before the first.
+            At a jump, also of a strict event: the value after the last transition at that instant, or before the first.
         columns : names, optional
             States and outputs in the file; by default all.
 
@@ -593,7 +593,11 @@ class Execution(Deferred):
         return self.rows().only(self.shown).to_pandas()
 
     def save(
-        self, path: str | os.PathLike[str], samples: Any | None = None, columns: Sequence[str] | None = None
+        self,
+        path: str | os.PathLike[str],
+        samples: Any | None = None,
+        columns: Sequence[str] | None = None,
+        jumps: str = "both",
     ) -> tuple[Path, ...]:
         """Save to ``.npz`` (everything, without loss), or to ``.csv`` or ``.parquet`` (a table, with a JSON
         sidecar).
@@ -605,10 +609,13 @@ class Execution(Deferred):
         path : path
             The suffix chooses the format.
         samples : times, optional
-            For a table: rows at these times and both rows of each jump, instead of the integrator's rows. Times outside
-            the run are skipped (a run may stop early). The default is the run's own :attr:`sample_times`.
+            For a table: rows at these times and at jumps, instead of the integrator's rows. Times outside the run are
+            skipped (a run may stop early). The default is the run's own :attr:`sample_times`.
         columns : names, optional
             For a table: its states and outputs, in this order; by default those of :attr:`shown`.
+        jumps : "both", "after" or "none"
+            For a table: the rows of a jump. ``both`` are the row before it and the row after it, at the same time.
+            With ``after`` no two rows have the same time. With ``none`` there are rows at ``samples`` only.
 
         Returns
         -------
@@ -617,7 +624,8 @@ class Execution(Deferred):
 
         Raises UsageError: for an unknown suffix or column, a file that cannot be written, or a missing library.
         """
-        return shown("save", self, path, samples=self.sample_times if samples is None else samples, columns=columns)
+        samples = self.sample_times if samples is None else samples
+        return shown("save", self, path, samples=samples, columns=columns, jumps=jumps)
 
     @property
     def sample_times(self) -> Array | None:

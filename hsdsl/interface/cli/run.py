@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Exit, Option
 
@@ -38,7 +38,8 @@ STOPPED = 3
 PRECISION = "Compute with this many decimal digits (mpmath). The default tolerance of taylor follows."
 EXPLAIN = "Print every reason of the verdict."
 ESTIMATE = "Run again with smaller steps, and print the distance between the two runs."
-SAMPLES = "Rows of tables: every=TIME or count=N; jumps have both sides. Default: the file's samples, or all steps."
+SAMPLES = "Rows of tables: every=TIME or count=N, and rows at jumps. Default: the file's samples, or all steps."
+JUMPS = "Rows of a jump in tables: both sides, only the one after, or none besides samples. Default: both."
 EVERY = "Write each K-th step and each jump to --out (.csv) during the run, in constant memory."
 DRAW = "Draw the run: .png, .svg, or .html (an interactive page). --outputs chooses what is drawn."
 FILM = "Run again and write a film of the model's scene: .gif, or .mp4 if ffmpeg is installed."
@@ -61,6 +62,7 @@ def run(
     estimate: Annotated[bool, Option("--estimate", help=ESTIMATE)] = False,
     out: Annotated[Path | None, option("FILE", "Save the execution: .csv, .parquet or .npz.")] = None,
     samples: Annotated[str | None, option("N", SAMPLES)] = None,
+    jumps: Annotated[Literal["both", "after", "none"], option("ROWS", JUMPS)] = "both",
     every: Annotated[int | None, option("K", EVERY)] = None,
     plot: Annotated[Path | None, option("FILE", DRAW)] = None,
     phase: Phases = None,
@@ -72,6 +74,8 @@ def run(
     """Simulate a model and summarise what happened."""
     with answer.reporting():
         _check_files(out, plot, animate, outputs)
+        if jumps != "both" and (out is None or out.suffix.lower() == ".npz" or every is not None):
+            raise UsageError("--jumps chooses rows of a table: give --out FILE.csv or .parquet, without --every")
         loaded = hsdsl.load(model)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
@@ -98,7 +102,7 @@ def run(
                 settings = {name: value for name, value in settings.items() if value is not None}
                 result = loaded.stream(out, every=every, columns=names, **settings)
         if every is None:
-            _answer(loaded, result, shown, estimate, explain, out, plot, settings["parameters"], answer)
+            _answer(loaded, result, shown, estimate, explain, out, jumps, plot, settings["parameters"], answer)
             if animate is not None:
                 with progress(answer.hidden) as show:
                     settings["watch"] = None
@@ -140,6 +144,7 @@ def _answer(
     estimate: bool,
     explain: bool,
     out: Path | None,
+    jumps: str,
     plot: Path | None,
     parameters: dict[str, str],
     answer: Answer,
@@ -150,7 +155,7 @@ def _answer(
     if estimated is not None:
         execution = execution.estimated()
     if out is not None:
-        for written in execution.save(out, columns=names):
+        for written in execution.save(out, columns=names, jumps=jumps):
             say(f"wrote {written}")
     if plot is not None:
         model.plot(execution, plot, parameters, **shown)
