@@ -17,8 +17,8 @@ import numpy as np
 from hsdsl.analysis.orbits.level import Level
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.analysis.sensitivity.targets import derivative_name, own, shift_name
+from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.execution import Array, Execution
-from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 
 Differentiate = Callable[[Mapping[str, float], float, float, int, Sequence[str]], Sensitivity]
 ROUNDOFF = ROUNDOFF_UNITS * float(np.finfo(float).eps)

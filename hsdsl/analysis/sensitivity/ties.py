@@ -23,11 +23,11 @@ import numpy as np
 
 from hsdsl.analysis.sensitivity.targets import derivative_name, own, shift_name
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.execution import Transition
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.input_segments import make_timeline
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.engine.simulate.verdict.commutation import land_after
 from hsdsl.engine.simulate.verdict.misses import rising_zero
 from hsdsl.engine.simulate.verdict.run_view import Place, RunView

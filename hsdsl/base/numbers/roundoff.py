@@ -19,6 +19,7 @@ from typing import Any
 
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
 
+ROUNDOFF_UNITS = 32  # below so many of the sizes of its terms a surface counts as zero
 LIBRARY = 16  # units of round-off that functions of the library may be wrong by
 BEYOND = {"pi": 1.2246467991473532e-16, "e": 1.4456468917292502e-16}  # what their nearest floats leave out
 

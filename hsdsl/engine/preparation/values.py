@@ -31,8 +31,8 @@ from hsdsl.engine.integrators import AUTO, Method
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.preparation.options import DEFAULT, FILE, KEYS, SCALE, Options, names_of
 from hsdsl.engine.simulate import Settings
+from hsdsl.engine.simulate.problem import Waits
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.transitions import Waits
 from hsdsl.mathematics.program import ModeProgram, Program
 
 if TYPE_CHECKING:

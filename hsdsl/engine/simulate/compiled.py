@@ -23,12 +23,10 @@ from hsdsl.engine.simulate.columns import Columns, Shape, StateLayouts
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.input_segments import Timeline
 from hsdsl.engine.simulate.output_buffers import Sink
-from hsdsl.engine.simulate.problem import Problem
+from hsdsl.engine.simulate.problem import Problem, Tails
 from hsdsl.engine.simulate.review import Review
-from hsdsl.engine.simulate.settings import Settings
+from hsdsl.engine.simulate.settings import Settings, along_steps, interpolation
 from hsdsl.engine.simulate.stops import Diagnostics
-from hsdsl.engine.simulate.surfaces import along_steps, interpolation
-from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.workspace import Workspace, Workspaces
 from hsdsl.mathematics.program import Program
 

@@ -24,11 +24,12 @@ from functools import partial, reduce
 from itertools import pairwise
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Number
+from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.execution import Stop, Transition
 from hsdsl.engine.integrators.stepper import State, rows_of
 from hsdsl.engine.simulate.run import ModeState, Run
 from hsdsl.engine.simulate.stops import FREE
-from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS, Surfaces, joined, total
+from hsdsl.engine.simulate.surfaces import Surfaces, joined, total
 from hsdsl.mathematics.program import HELD, LOOKED_AT
 
 SAME_UNITS = 4  # of round-off, relative to its scale: how far a reset may move a state that it keeps

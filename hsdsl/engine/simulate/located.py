@@ -19,6 +19,7 @@ from functools import cache
 from itertools import chain
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
+from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Polynomial, Stages, State
@@ -45,12 +46,11 @@ from hsdsl.engine.simulate.contact import (
 from hsdsl.engine.simulate.control import error_ratio
 from hsdsl.engine.simulate.relaxed import ALMOST, NOT_FINITE, TOO_WRONG, UNSOLVED, Event, go_on, sizes, standing_on
 from hsdsl.engine.simulate.run import ModeState, Run
+from hsdsl.engine.simulate.settings import UNKNOWN_TOLERANCE
 from hsdsl.engine.simulate.stalls import across_jump, make_pace
 from hsdsl.engine.simulate.stops import FREE, LEFT, left_domain, reached, reached_in_strip, slides
 from hsdsl.engine.simulate.surfaces import (
     NONE,
-    ROUNDOFF_UNITS,
-    UNKNOWN_TOLERANCE,
     Arrival,
     Crossing,
     Curves,

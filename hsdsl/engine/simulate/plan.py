@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.engine.execution import Array, Execution, Stop
 from hsdsl.engine.runtime import structures
@@ -16,14 +16,15 @@ from hsdsl.engine.simulate.compiled import CompiledPlan, CompiledRun
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.moving import finer_settings
 from hsdsl.engine.simulate.output_buffers import Sink
-from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.recorder import OutOfRoom, Progress, Recorder, Room
+from hsdsl.engine.simulate.problem import Problem, Tails
 from hsdsl.engine.simulate.result import about, from_recorder, written
 from hsdsl.engine.simulate.review import Judge, Judged, Review
-from hsdsl.engine.simulate.run import ModeState, Run
 from hsdsl.engine.simulate.settings import Settings
 from hsdsl.engine.simulate.stops import interrupted, memory
-from hsdsl.engine.simulate.transitions import Tails
+
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.recorder import Progress
+    from hsdsl.engine.simulate.run import ModeState, Run
 
 
 def _relaxed(run: Run, here: ModeState | Stop) -> Stop:
@@ -50,7 +51,7 @@ SCHEMES: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
     "located": _located,
     "paoli-schatzman": _paoli_schatzman,
 }
-Watch = Callable[[Progress], None]
+Watch = Callable[["Progress"], None]
 Streamed = tuple[Stop, CompiledRun, dict[str, Array]]
 
 
@@ -132,6 +133,9 @@ class Prepared(Problem):
 
     def _fresh(self, review: Review | None) -> Run:
         """A run that nothing is recorded of yet."""
+        from hsdsl.engine.simulate.recorder import Recorder, Room  # what is compiled needs none
+        from hsdsl.engine.simulate.run import Run
+
         settings, arithmetic, program = self.settings, self.kernel.arithmetic, self.program
         degree = settings.method.degree if settings.method else 0
         outputs, width = len(program.outputs), max(len(mode.states) for mode in program.modes)
@@ -147,6 +151,7 @@ class Prepared(Problem):
 
     def _by_python_loop(self, run: Run, watch: Watch | None, spent: dict[str, float]) -> Execution:
         from hsdsl.engine.simulate.contact import start_sizes
+        from hsdsl.engine.simulate.recorder import OutOfRoom
         from hsdsl.engine.simulate.transitions import enter
 
         if watch is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,9 +17,11 @@ from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.compiled import CompiledRun
 from hsdsl.engine.simulate.output_buffers import arcs_of, last_arc, transitions_of
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.run import Run
 from hsdsl.engine.simulate.settings import Settings
 from hsdsl.engine.simulate.stops import LEFT_OUT, TWO_STEP, Diagnostics, noted, warnings_of
+
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.run import Run
 
 COLUMNS = ("times", "values", "outputs", "depth", "coefficients")
 

@@ -16,11 +16,10 @@ from hsdsl.engine.scheme.roots import Roots
 from hsdsl.engine.simulate.control import Control
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.moving import moved_by_flow, moved_crossing
-from hsdsl.engine.simulate.problem import Problem
+from hsdsl.engine.simulate.problem import Problem, Tails
 from hsdsl.engine.simulate.recorder import OpenArc, Recorder
 from hsdsl.engine.simulate.stops import Diagnostics, limit
 from hsdsl.engine.simulate.surfaces import Crossing, Surfaces, larger, make_roots
-from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.mathematics.program import ModeProgram
 
 if TYPE_CHECKING:

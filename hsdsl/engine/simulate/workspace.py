@@ -20,8 +20,8 @@ from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.kernel import CompiledModel, runtime
 from hsdsl.engine.simulate.columns import Shape
 from hsdsl.engine.simulate.output_buffers import OutputBuffers, grown
+from hsdsl.engine.simulate.problem import Waits
 from hsdsl.engine.simulate.review import Review
-from hsdsl.engine.simulate.transitions import Waits
 
 VISITED = 64
 MOST_KEPT = 4  # workspaces of one model and method

@@ -24,7 +24,7 @@ from hsdsl.engine.runtime.structures import METHOD_KINDS, SCHEMES, Row, array_at
 from hsdsl.engine.simulate import Problem, Settings
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.moving import LEAST_UNITS
-from hsdsl.engine.simulate.surfaces import Interpolation, along_steps, interpolation
+from hsdsl.engine.simulate.settings import Interpolation, along_steps, interpolation
 from hsdsl.export.source import Source, derived, filled, given, structural
 from hsdsl.mathematics.program import ModeProgram, Program
 

@@ -13,6 +13,7 @@ from hsdsl.base.defaults import DEFAULT_TOLERANCE
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
 from hsdsl.base.numbers.arithmetic import Number
+from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.base.parts import Part, present
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.integrators import AUTO, METHODS
@@ -28,7 +29,6 @@ from hsdsl.engine.preparation.values import (
     with_parameters,
 )
 from hsdsl.engine.preparation.visible import visible_run
-from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.engine.simulate.verdict.errors import SAFE
 from hsdsl.interface.model.call_cache import CallCache, call_key
 from hsdsl.mathematics.program import Program

@@ -20,7 +20,6 @@ from hsdsl.engine.preparation.options import arguments_of
 from hsdsl.engine.preparation.pipeline import pipeline_of
 from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.preparation.visible import with_output_function
-from hsdsl.engine.simulate.recorder import Progress
 from hsdsl.interface.model.runs import Runs, elsewhere
 
 if TYPE_CHECKING:
@@ -32,6 +31,7 @@ if TYPE_CHECKING:
     from hsdsl.analysis.orbits.sampling import OrbitalStability
     from hsdsl.analysis.sweep import Sweep
     from hsdsl.analysis.sweep.manifest import Manifest
+    from hsdsl.engine.simulate.recorder import Progress
     from hsdsl.interface.model.estimate import Estimate
     from hsdsl.interface.model.stream import Streamed
 

@@ -18,13 +18,13 @@ from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.simulate import Prepared
-from hsdsl.engine.simulate.recorder import Progress
 from hsdsl.interface.model.call_cache import CallCache, call_key
 from hsdsl.mathematics.program import Program
 
 if TYPE_CHECKING:
     from hsdsl.analysis.sensitivity.result import Sensitivity
     from hsdsl.engine.integrators import ButcherTableau
+    from hsdsl.engine.simulate.recorder import Progress
     from hsdsl.interface.model.differentiate import Differentiator
     from hsdsl.language.system import HybridSystem
 

@@ -32,9 +32,9 @@ from typing import Any
 import numpy as np
 
 from hsdsl.engine.execution import INCOMPLETE, LEFT, Execution, Verdict
+from hsdsl.engine.scheme.pace import SHORT
 from hsdsl.engine.simulate.compiled import CompiledRun
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.stalls import SHORT
 from hsdsl.engine.simulate.stops import Diagnostics, show
 from hsdsl.engine.simulate.verdict.commutation import choices, first_of_many, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary

@@ -15,9 +15,8 @@ from hsdsl.base.names import memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Transition
 from hsdsl.engine.integrators.stepper import State
+from hsdsl.engine.simulate.problem import Tails
 from hsdsl.engine.simulate.stops import show
-from hsdsl.engine.simulate.surfaces import Arrival
-from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Queue
 
@@ -163,6 +162,8 @@ def land_after(run: RunView, place: Place, k: int, since: Number, tails: Tails) 
 def _goes_at_once(place: Place, since: Number) -> int | None:
     """The edge that goes at once from a state."""
     surfaces, edges = place.surfaces, place.mode.edges
+    from hsdsl.engine.simulate.surfaces import Arrival  # few runs come here
+
     beyond = surfaces.enter(place.t, place.x, place.kernel.surfaces(place.t, *place.x), Arrival(since))
     ready = [k for k in beyond if k < len(edges) and not edges[k].conditional]
     ready = ready or surfaces.standing(place.t, place.x, since)

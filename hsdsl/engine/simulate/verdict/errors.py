@@ -30,7 +30,7 @@ from hsdsl.base.numbers.enclosures import Range, Undecided, as_range
 from hsdsl.engine.execution import Execution, Transition
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.simulate.moving import ERROR_UNITS
-from hsdsl.engine.simulate.transitions import Tails
+from hsdsl.engine.simulate.problem import Tails
 from hsdsl.mathematics.program import ModeProgram
 
 if TYPE_CHECKING:

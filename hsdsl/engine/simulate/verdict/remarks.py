@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
 from hsdsl.base.numbers.enclosures import Array, Range, as_range
+from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import Diagnostics, Remark, loop_remarks, may_be_passed, of_edge, wall_of, warnings_of
-from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.engine.simulate.verdict.crossings import sliding_spans
 from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, ROUNDS, RunView
 from hsdsl.mathematics.program import ModeProgram

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import groupby
 from math import inf, isfinite
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,14 +23,15 @@ from hsdsl.base.numbers.enclosures import Range, Undecided, as_range
 from hsdsl.engine.execution import Arc, Execution, Stop, Transition
 from hsdsl.engine.integrators.stepper import Polynomial, State
 from hsdsl.engine.kernel import ModeKernel
-from hsdsl.engine.simulate.problem import Problem
+from hsdsl.engine.simulate.problem import Problem, Tails
 from hsdsl.engine.simulate.stops import Remark, show, wall_of
-from hsdsl.engine.simulate.surfaces import Surfaces, at
-from hsdsl.engine.simulate.transitions import Tails
 from hsdsl.engine.simulate.verdict.errors import SAFE, Errors
 from hsdsl.engine.simulate.verdict.screen import Screen, screened
 from hsdsl.engine.simulate.verdict.shadow import ErrorsByShadow, shadow_errors
 from hsdsl.mathematics.program import ModeProgram
+
+if TYPE_CHECKING:
+    from hsdsl.engine.simulate.surfaces import Surfaces
 
 ALONG = 1e-3  # of what a surface may change by: less is along it
 GUARD_ROUNDS = 3  # of Newton's method, back onto a guard
@@ -142,6 +143,8 @@ class RunView:
 
     def place(self, mode: str | int, t: Number, x: State) -> Place:
         """A state of a mode at a time."""
+        from hsdsl.engine.simulate.surfaces import Surfaces  # not every verdict looks at places
+
         index = self._indices[mode] if isinstance(mode, str) else mode
         segment = self.problem.timeline.at(t)
         key = index, segment.start
@@ -167,6 +170,8 @@ class RunView:
 
     def dense_output(self, arc: Arc, row: int) -> Callable[[Number], Place]:
         """The dense output of the step from a row to the next: states by the share of the step."""
+        from hsdsl.engine.simulate.surfaces import at
+
         t, h = self.times[row], self.times[row + 1] - self.times[row]
         x, d = self.state(arc, row), len(arc.states)
         piece: Polynomial = tuple(tuple(c[:d]) for c in self.execution.coefficients[row].tolist())
@@ -405,7 +410,7 @@ class RunView:
         assert self.errors is not None
         columns = self.errors.columns
         sizes = tuple(float(self.errors.sizes[row, columns[name]]) for name in place.mode.states)
-        surfaces = Surfaces(place.kernel, place.mode.edges, sizes, self.arithmetic)
+        surfaces = replace(place.surfaces, scale=sizes)
         return surfaces.roundoff_bound(k, place.t, place.x, entry=True)
 
 

@@ -53,8 +53,7 @@ from hsdsl.engine.integrators import Method
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.integrators.taylor import terms
 from hsdsl.engine.simulate.moving import flow_roundoff, moved_reset, surface_roundoff
-from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.transitions import Tails
+from hsdsl.engine.simulate.problem import Problem, Tails
 from hsdsl.engine.simulate.verdict.errors import Errors
 
 MOST_ORDER = 30  # of series in C: HS_MOST_ORDER
