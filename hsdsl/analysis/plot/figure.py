@@ -245,10 +245,12 @@ def marks(data: Sequence[Curves], columns: Sequence[str], start: bool, name: str
 
 
 def _jumps(run: Curves, name: str) -> bool:
-    """Whether a column jumps at a transition, by more than its error."""
+    """Whether a column jumps at a transition by more than its error, or has a value only before or only after it."""
     values = run.column(name)
-    size = np.nanmax(np.abs(values), initial=0.0)
-    return bool(np.any(np.abs(values[run.jumps] - values[run.jumps - 1]) > run.error * size))
+    known = values[np.isfinite(values)]
+    before, after = values[run.jumps - 1], values[run.jumps]
+    apart = np.abs(after - before) > run.error * np.max(np.abs(known), initial=0.0)
+    return bool(np.any(apart | (np.isfinite(before) != np.isfinite(after))))
 
 
 def draw_panel(axis: Axes, runs: Sequence[Curves], names: Sequence[str], view: View, tall: float) -> None:
