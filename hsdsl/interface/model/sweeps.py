@@ -223,9 +223,8 @@ class ChunkWork:
 
         A row that stops all others from being run is found by halves, and is refused by itself.
         """
-        varied = self.manifest.variation.values(first, last)
         try:
-            return table(self.manifest, first, varied, self._ensemble(varied))
+            return self._made(first, last)
         except UsageError as error:
             if last - first == 1:
                 why = error.why if isinstance(error, NothingToRunError) else str(error)
@@ -233,7 +232,8 @@ class ChunkWork:
         middle = (first + last) // 2
         return library().concat_tables([self.rows(first, middle), self.rows(middle, last)])
 
-    def _ensemble(self, varied: Mapping[str, Any]) -> Any:
+    def _made(self, first: int, last: int) -> Any:
+        varied = self.manifest.variation.values(first, last)
         call: dict[str, Any] = dict(self.manifest.arguments)
         groups = {group: dict(call.pop(group, {})) for group in ("parameters", "initial")}
         for name, values in varied.items():
@@ -242,7 +242,7 @@ class ChunkWork:
         found = run_ensemble(self.model, call | groups, kept.samples, 0, self.threads, None, kept.transitions)
         if (found.stop == "interrupted").any():
             raise KeyboardInterrupt
-        return found
+        return table(self.manifest, first, varied, found)
 
     def check(self, rows: Sequence[int]) -> None:
         """Refuse a sweep of which no row can be run, all for one reason: a setting is wrong.
@@ -252,7 +252,7 @@ class ChunkWork:
         refusals: list[UsageError] = []
         for k in rows:
             try:
-                self._ensemble(self.manifest.variation.values(k, k + 1))
+                self._made(k, k + 1)
                 return
             except UsageError as error:
                 refusals.append(error)
@@ -275,8 +275,7 @@ def chunk_size(work: ChunkWork, processes: int) -> int:
         size = work.rows(first, first + count).nbytes / count
         return time.process_time() - began, size
 
-    timed(1)  # what is imported and compiled only once does not count
-    alone, size = timed(1)
+    alone, size = timed(1)  # what is imported and compiled only once does not count: it was, for the check
     count, seconds = 1, 0.0
     while seconds < PROBED and count < rows - first:
         count = min(GROWTH * count, rows - first)
