@@ -12,7 +12,7 @@ coefficients there.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial, reduce
 from math import isfinite
@@ -312,6 +312,31 @@ ENCLOSED = Arithmetic(
         "nan": Range(-np.inf, np.inf),
     },
 )  # fmt: skip
+
+
+def _continuous(name: str, function: Callable[..., Range]) -> Callable[..., Range]:
+    """The same function; everything where it may jump, and of what has no bound."""
+    jumps = JUMPING.get(name, lambda *_: False)
+
+    def enclose(*values: Any) -> Range:
+        ranges = list(map(as_range, values))
+        known: Any = reduce(np.logical_and, (r.high - r.low < np.inf for r in ranges))
+        return _unless(np.logical_or(~np.asarray(known), jumps(*ranges)), function(*values))
+
+    return enclose
+
+
+JUMPING: dict[str, Callable[..., Any]] = {
+    **dict.fromkeys(("sign", "heaviside"), lambda x: np.sign(x.low) != np.sign(x.high)),
+    "floor": lambda x: np.floor(x.low) != np.floor(x.high),
+    "atan2": lambda y, x: (x.low <= 0) & (y.low <= 0) & (y.high >= 0),
+    "below": lambda number, bound, *_: (number.low < bound.high) & (number.high >= bound.low),
+}
+CONTINUOUS = replace(
+    ENCLOSED,
+    name="continuous",
+    functions={name: _continuous(name, f) if callable(f) else f for name, f in ENCLOSED.functions.items()},
+)
 
 
 def _restricted(name: str, least: float, most: float) -> Callable[[Any], Range]:

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import NOTHING, Arithmetic
 from hsdsl.base.numbers.bernstein import Array, around_middle
-from hsdsl.base.numbers.enclosures import ENCLOSED, Range, as_range
+from hsdsl.base.numbers.enclosures import CONTINUOUS, ENCLOSED, Range, as_range
 from hsdsl.engine.simulate.moving import ERROR_UNITS
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.verdict.errors import SAFE
@@ -42,12 +42,7 @@ ROUNDOFF_ROUNDS = 3  # from a flow's round-off to what that moves, and what that
 
 def flows(run: RunView) -> tuple[list[Finding], list[str]]:
     """Findings about the flow of every mode along all steps in it."""
-    found: list[Finding] = []
-    if run.undecided("flow change"):
-        visited = {arc.mode for arc in run.flows}
-        if jumping := [mode.name for mode in run.problem.program.modes if mode.jumps and mode.name in visited]:
-            where = f"the flow of mode {', '.join(jumping)} jumps where sign, floor or select does, or atan2 on its cut"
-            found.append(Finding("jump", "unknown", f"{where}; the theorem assumes continuous flows"))
+    found = list(_jumps(run)) if run.undecided("flow change") else []
     if run.errors is None:
         return found, []
     for steps in steps_of(run, marked="changing"):
@@ -56,6 +51,30 @@ def flows(run: RunView) -> tuple[list[Finding], list[str]]:
             unbounded = [*_named(run, "the slope of the flow", "has no bound", _steep(run, steps))] if steep else []
             found += unbounded or _named(run, "a change of the flow", "may not have been seen", _unseen(run, steps))
     return found, []
+
+
+def _jumps(run: RunView) -> Iterator[Finding]:
+    """Modes whose flow may jump where the run was in them."""
+    modes, visited = run.problem.program.modes, {arc.mode for arc in run.flows}
+    jumping = {k: mode.name for k, mode in enumerate(modes) if mode.jumps and mode.name in visited}
+    if jumping and run.errors is not None:
+        with np.errstate(all="ignore"):
+            meets = {steps.mode for steps in steps_of(run) if steps.mode in jumping and len(_meeting(run, steps))}
+        jumping = {k: jumping[k] for k in meets}
+    if jumping:
+        where = f"the flow of mode {', '.join(jumping.values())} jumps where sign, floor or select does"
+        yield Finding("jump", "unknown", f"{where}, or atan2 on its cut; the theorem assumes continuous flows")
+
+
+def _meeting(run: RunView, steps: Parts) -> Parts:
+    """Parts of steps on which the flow may jump within the error."""
+
+    def decides(parts: Parts) -> NDArray[np.bool_]:
+        kernel = run.problem.kernel.over(CONTINUOUS).bind(parts.mode, parts.bound_data)
+        flow = [high(f, len(parts)) - low(f, len(parts)) for f in kernel.flow(parts.times, *parts.states(SAFE))]
+        return ~np.isfinite(np.array(flow)).all(axis=0)[:, None]
+
+    return undecided(steps, decides, HALVINGS)[0]
 
 
 def _named(run: RunView, what: str, how: str, parts: Parts) -> Iterator[Finding]:
