@@ -16,9 +16,10 @@ INTEGRATORS = """# Integrators
 
 The values of `method` and `--method`. `auto` is chosen for each run, and the run says why: `radau` where the start is
 stiff or the run becomes stiff, else `taylor` where every flow is smooth and has derivatives at the start, else
-`{auto}`, and `{auto}` with a fixed step. Where a stage of the shortest first steps of `{auto}` has no value, as the
-root of a tank that begins empty, it is `dop853`. A method with an embedded error estimate is adaptive and keeps a
-`tolerance`; any method takes fixed steps of size `step`. The numbers of the tables are on
+`{auto}`, and `{auto}` with a fixed step. It is `{auto}`, too, where a flow has no Taylor series when an input begins to
+follow another branch, such as `sqrt(max(sin(t), 0))`. Where a stage of the shortest first steps of `{auto}` has no
+value, as the root of a tank that begins empty, it is `dop853`. A method with an embedded error estimate is adaptive and
+keeps a `tolerance`; any method takes fixed steps of size `step`. The numbers of the tables are on
 [their own page](coefficients.md).
 
 """

@@ -23,6 +23,7 @@ from hsdsl.base.samples import Hold
 
 LOOKED_AT, HELD = 1, 2  # what the number of a contact is, 0 for none: see `Program.contacts`
 CURVED = re.compile(r"\w\(|/")
+ENDING = re.compile(r"\b(?:sqrt|pow|log|asin|acos|acosh|atanh)\(")  # functions without a value beyond some number
 JUMPS = re.compile(r"\b(?:sign|floor|atan2|select)\(")
 STEEP = ("sqrt", "asin", "acos", "acosh")
 WHOLE = re.compile(r"q_m?\d+_1|\d+")
@@ -274,6 +275,11 @@ class ModeProgram:
             if name.startswith("condition_"):
                 parts[int(name.split("_")[1])].append(name)
         return tuple(map(tuple, parts))
+
+    @property
+    def ends(self) -> bool:
+        """Whether a routine has functions without a value beyond some number, such as a root."""
+        return ENDING.search(self.routines.source) is not None
 
     @property
     def jumps(self) -> bool:

@@ -51,7 +51,9 @@ CASES = {
     "nothing moves": ("{x: 0}", "x: 1", "1e9", "taylor"),
     "no derivatives at the start": ("{x: -1e9*sqrt(x)}", "x: 0", "1", "dopri5"),
     "a tank that fills": ("{x: 1 - sqrt(x)}", "x: 0", "1", "dopri5"),
-    "derivatives by the states alone": ("{x: 1 + sqrt(t)}", "x: 0", "1", "taylor"),
+    "a root of time at the start": ("{x: 1 + sqrt(t)}", "x: 0", "1", "dopri5"),
+    "a root of time at a switch": ("{x: '1 + sqrt(max(0.4 - t, 0))'}", "x: 0", "1", "dopri5"),
+    "a root, and switches of something else": ("{x: floor(5*t) - sqrt(x)}", "x: 2", "1", "taylor"),
 }
 
 

@@ -4,6 +4,7 @@ import math
 from pathlib import Path
 
 import pytest
+from engines import ENGINES
 
 import hsdsl
 from hsdsl.base.errors import UsageError
@@ -115,3 +116,31 @@ experiment: {{until: 6}}
     assert model.simulate().final.state["x"] == pytest.approx(
         2 * math.cos(start) - 0.4 * (math.pi - 2 * start), rel=1e-9
     )
+
+
+TWO_PARTS = 2 / 3 / 0.3 * (0.7**1.5 + 0.5**1.5)  # the integral of sqrt(|0.3 t - 0.7|) until 4
+ROOTS: list[tuple[str, str, float]] = [
+    ("sqrt(abs(0.3*t - 0.7))", "4", TWO_PARTS),
+    ("max(t/3 - 0.604, 0)**1.5", "3", 3 / 2.5 * 0.396**2.5),
+    ("sqrt(max(sin(t), 0))", "3*pi", 2 * 2.396280469471184),
+    ("sqrt(0.7*t - floor(0.7*t))", "20/7", 2 * 2 / 3 / 0.7),
+    ("acos(min(t/3, 1))", "4", 3.0),
+    ("sqrt(2.1 - w)", "4", 2 * 2 / 3 * (2.1**1.5 - 0.1**1.5)),
+]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("method", ["auto", "dopri5", "dop853", "radau"])
+@pytest.mark.parametrize(("text", "until", "right"), ROOTS, ids=[text for text, _, _ in ROOTS])
+def test_rounding_at_a_switch_takes_no_root_of_its_value(
+    engine: str, method: str, text: str, until: str, right: float
+) -> None:
+    run = hsdsl.loads(MODEL.format(text, until)).simulate(method=method, engine=engine)
+    assert run.stop.reason == "until", run.stop
+    assert run.final.state["x"] == pytest.approx(right, rel=2e-7)
+
+
+@pytest.mark.parametrize("method", ["taylor", "dopri5", "dop853", "radau"])
+@pytest.mark.parametrize("text", ["sqrt(1 - t)", "sqrt(w - 1 + t/4)", "log(0.5 - abs(t - 1))"])
+def test_a_root_that_ends_has_no_value(method: str, text: str) -> None:
+    assert hsdsl.loads(MODEL.format(text, "3")).simulate(method=method).stop.reason == "not_finite"

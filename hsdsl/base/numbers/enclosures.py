@@ -11,7 +11,7 @@ coefficients there.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial, reduce
@@ -314,28 +314,36 @@ ENCLOSED = Arithmetic(
 )  # fmt: skip
 
 
+def _may_jump(name: str, values: Sequence[Range]) -> Any:
+    one, other = values[0], values[min(1, len(values) - 1)]
+    match name:
+        case "sign" | "heaviside":
+            return np.sign(one.low) != np.sign(one.high)
+        case "floor":
+            return np.floor(one.low) != np.floor(one.high)
+        case "atan2":
+            return (other.low <= 0) & (one.low <= 0) & (one.high >= 0)
+        case "below":
+            return (one.low < other.high) & (one.high >= other.low)
+        case _:
+            return False
+
+
 def _continuous(name: str, function: Callable[..., Range]) -> Callable[..., Range]:
     """The same function; everything where it may jump, and of what has no bound."""
-    jumps = JUMPING.get(name, lambda *_: False)
 
     def enclose(*values: Any) -> Range:
-        ranges = list(map(as_range, values))
-        known: Any = reduce(np.logical_and, (r.high - r.low < np.inf for r in ranges))
-        return _unless(np.logical_or(~np.asarray(known), jumps(*ranges)), function(*values))
+        ranges = [as_range(value) for value in values]
+        known: Any = reduce(np.logical_and, [r.high - r.low < np.inf for r in ranges])
+        return _unless(np.logical_or(~np.asarray(known), _may_jump(name, ranges)), function(*values))
 
     return enclose
 
 
-JUMPING: dict[str, Callable[..., Any]] = {
-    **dict.fromkeys(("sign", "heaviside"), lambda x: np.sign(x.low) != np.sign(x.high)),
-    "floor": lambda x: np.floor(x.low) != np.floor(x.high),
-    "atan2": lambda y, x: (x.low <= 0) & (y.low <= 0) & (y.high >= 0),
-    "below": lambda number, bound, *_: (number.low < bound.high) & (number.high >= bound.low),
-}
 CONTINUOUS = replace(
     ENCLOSED,
     name="continuous",
-    functions={name: _continuous(name, f) if callable(f) else f for name, f in ENCLOSED.functions.items()},
+    functions={name: f if isinstance(f, Range) else _continuous(name, f) for name, f in ENCLOSED.functions.items()},
 )
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from textwrap import indent
 from typing import Any
@@ -84,6 +85,8 @@ class PythonKernel:
             self._modes[mode] = compile_routines(routines, self.arithmetic, f"mode {mode}")
         bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
         program = self._program.flows[mode]
+        if program.ends and (self._program.inputs or self._program.switches):
+            bound |= {name: beside(bound[name], self.arithmetic.unit) for name in ENDS_WITH_TIME}
         n, zero = len(program.states), self.arithmetic.zero
         slopes = (spread_out(bound[f"gradient_{k}"], row, n + 1, zero) for k, row in enumerate(program.slopes))
         return ModeKernel(
@@ -176,6 +179,27 @@ def spread_out(routine: Routine, places: Sequence[int], size: int, zero: Number)
 
 
 PLAIN = ("flow", "surfaces", "magnitudes")
+ENDS_WITH_TIME = ("flow", "surfaces")
+UNITS_BESIDE = (2, 8, 32)
+
+
+def beside(routine: Routine, unit: Number) -> Routine:
+    """A routine that has its value a few units of round-off of time away where it has none.
+
+    At an end of a segment of inputs, rounding may give a root the wrong side of zero.
+    """
+
+    def evaluate(t: Number, *x: Number) -> Vector:
+        try:
+            return routine(t, *x)
+        except DOMAIN_ERRORS as error:
+            for units in UNITS_BESIDE:
+                for near in (t + units * unit * abs(t), t - units * unit * abs(t)):
+                    with suppress(*DOMAIN_ERRORS):
+                        return routine(near, *x)
+            raise error
+
+    return evaluate
 
 
 def conjunction(parts: Sequence[Callable[..., tuple[bool, ...]]]) -> Callable[..., tuple[bool, ...]]:

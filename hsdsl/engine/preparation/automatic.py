@@ -5,7 +5,8 @@ With a fixed step it is the table `dopri5`. With a tolerance it is
 ========= ============================================================================================
 `radau`   where the mode of the start, or one that its edges lead to, is stiff (below)
 `taylor`  where every flow is smooth
-`dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor` of a state, or no derivatives at the start
+`dopri5`  where one has `abs`, `sign`, `min`, `max` or `floor` of a state, or no derivatives at the start or, as the
+          root of `max(sin(t), 0)`, no Taylor series where a sample or a switch of an input begins
 `dop853`  where one has no derivatives at the start, and `dopri5` a stage without a value in the shortest steps
 ========= ============================================================================================
 
@@ -40,9 +41,10 @@ import numpy as np
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Array, Execution
 from hsdsl.engine.integrators import AUTO, METHODS, ButcherTableau, Method
+from hsdsl.engine.integrators.taylor import NoSeries, terms
 from hsdsl.engine.kernel import Kernel
 from hsdsl.engine.simulate import Prepared, Settings
-from hsdsl.engine.simulate.input_segments import Timeline
+from hsdsl.engine.simulate.input_segments import Segment, Timeline
 from hsdsl.engine.simulate.plan import Watch
 from hsdsl.engine.simulate.review import Judge
 from hsdsl.mathematics.program import Program
@@ -55,6 +57,7 @@ ON = 2.0**-26  # of what the way's first step moves a surface by: a state so nea
 OTHER_STAGES = "dop853"
 SHORT = (20, 30, 40)  # halvings of the run: the lengths of first steps that are tried
 LAST = 16  # of these, at which a mode must be stiff
+MOST_SEGMENTS = 64  # of inputs, at whose beginnings series are tried
 MOST_STATES, MOST_MODES = 100, 8  # a larger Jacobian, or more modes, take longer to examine than to run
 
 
@@ -88,6 +91,9 @@ def _adaptive(
     kinked = next((each.name for each in program.flows if each.tape is None), None)
     if kinked is not None:
         return METHODS[AUTO], f"the flow of {kinked} has abs, sign, min, max, floor or select of a state"
+    missing = next(_without_series(program, kernel, timeline, near, mode), None)
+    if missing is not None:
+        return METHODS[AUTO], missing
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 
@@ -155,6 +161,28 @@ def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[
     try:
         return bool(np.isfinite(_Flight(kernel, timeline, mode, 0.0, np.array(x, float)).jacobian()).all())
     except DOMAIN_ERRORS:
+        return False
+
+
+def _without_series(
+    program: Program, kernel: Kernel, timeline: Timeline, near: Mapping[int, Sequence[float]], start: int
+) -> Iterator[str]:
+    """Modes whose flow has no Taylor series where one of the first segments begins, near the states of the start.
+
+    Of the modes that the run begins in later, what fails in all segments is due to these states.
+    """
+    for k, x in near.items():
+        tried = timeline.segments[:MOST_SEGMENTS] if program.modes[k].ends else ()
+        fails = [segment for segment in tried if not _has_series(kernel, k, segment, tuple(x))]
+        if fails and (k == start or len(fails) < len(tried)):
+            yield f"the flow of {program.modes[k].name} has no Taylor series at t = {float(fails[0].start):.3g}"
+
+
+def _has_series(kernel: Kernel, mode: int, segment: Segment, x: tuple[float, ...]) -> bool:
+    series = kernel.taylor(mode, segment.data)
+    try:
+        return series is None or bool(terms(series, 1, segment.start, x))
+    except NoSeries:
         return False
 
 

@@ -20,6 +20,7 @@ import sympy as sp
 
 from hsdsl.base.functions import absolute, below, floor, maximum, minimum, rebuilt, replaced, sign
 from hsdsl.base.graphs import closure, filled
+from hsdsl.base.names import without_memory
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 from hsdsl.mathematics import program as lowered
@@ -111,9 +112,12 @@ class LoweredMode:
         """Whether a surface is affine in time and the states, in every choice that numbers of modes make."""
         choices = residual.atoms(below)
         if choices:
-            moving = {TIME, *(state for state, f in zip(self.states, self.flow, strict=True) if f != 0)}
-            if any(choice.args[0].free_symbols & moving for choice in choices):
-                return False  # a `select` by what flows
+            flowing = {TIME, *(state for state, f in zip(self.states, self.flow, strict=True) if f != 0)}
+            seen = {*without_memory(self.mode.states)}
+            remembered = {state for state, name in zip(self.states, self.mode.states, strict=True) if name not in seen}
+            chosen_by = (choice.args[0].free_symbols for choice in choices)
+            if any(symbols & flowing and not symbols & remembered for symbols in chosen_by):
+                return False  # a `select` by what flows; those of events change with transitions alone
             residual = _every_choice(residual)
             slopes = Gradient((residual,), self._places)
         own = residual.free_symbols & self._places.keys()

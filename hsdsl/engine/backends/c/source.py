@@ -41,6 +41,11 @@ _HEAD = """\
 #include "hs_series.h"
 
 """
+_BESIDE = """\
+static int NAME(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
+  return {routine}(p, t, x, out) && hs_beside({routine}, p, t, x, out);
+}}
+"""
 _SERIES = """\
 static int NAME(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines) {{
   hs_real c[{size}] = {{0.0}};
@@ -196,6 +201,7 @@ class Writer:
     def __init__(self, program: Program) -> None:
         self.data = data_names(program)
         self.states, self.queues = program.all_states, program.queues
+        self.timed = bool(program.inputs or program.switches)
         self.functions: dict[str, str] = {}  # by the routine's text
         self.tables: list[str] = []
         self._names: dict[str, str] = {}
@@ -209,6 +215,9 @@ class Writer:
 
     def mode(self, index: int, mode: ModeProgram) -> str:
         routine = self.routines(mode.routines)
+        if mode.ends and self.timed:
+            ends = {name: _BESIDE.format(routine=routine[name]) for name in ("flow", "surfaces")}
+            routine |= {name: self.shared("beside", text) for name, text in ends.items()}
         edges = [self.edge(k, edge, mode, routine) for k, edge in enumerate(mode.edges)]
         fields = [
             *map(str, (len(mode.states), len(mode.edges), len(mode.surfaces), int(mode.final))),

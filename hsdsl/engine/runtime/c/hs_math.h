@@ -9,8 +9,10 @@
 #include <float.h>
 #if defined(HS_FLOAT32)
 #include <tgmath.h> /* the functions of floats */
+#define HS_UNIT 0x1p-24f
 #else
 #include <math.h>
+#define HS_UNIT 0x1p-53
 #endif
 
 #include "hs.h"
@@ -90,6 +92,15 @@ static inline hs_real hs_sign(hs_real x, int *bad) {
 }
 
 static inline hs_real hs_heaviside(hs_real x, int *bad) { return 0.5 * (1.0 + hs_sign(x, bad)); }
+
+/* A routine a few units of round-off of time away from where it has no value. */
+static inline int hs_beside(hs_routine *routine, const hs_real *p, hs_real t, const hs_real *x, hs_real *out) {
+  const hs_real unit = HS_UNIT, size = t < 0.0 ? -t : t;
+  int failed = 1;
+  for (int units = 2; units <= 32 && failed; units *= 4)
+    failed = routine(p, t + units * unit * size, x, out) && routine(p, t - units * unit * size, x, out);
+  return failed;
+}
 
 /* the first of two that compare equal, or cannot be compared */
 static inline hs_real hs_min(hs_real a, hs_real b) { return b < a ? b : a; }

@@ -26,12 +26,10 @@
 
 #if defined(HS_FLOAT32)
 #define HS_BITS 24
-#define HS_UNIT 0x1p-24f
 #define HS_TIE 0x1p-20f
 #define HS_NOTHING 0x1p-96f
 #else
 #define HS_BITS 53
-#define HS_UNIT 0x1p-53
 #define HS_TIE 1e-12
 #define HS_NOTHING 0x1p-960 /* below it numbers have no digits left */
 #endif

@@ -71,8 +71,10 @@ def _meeting(run: RunView, steps: Parts) -> Parts:
 
     def decides(parts: Parts) -> NDArray[np.bool_]:
         kernel = run.problem.kernel.over(CONTINUOUS).bind(parts.mode, parts.bound_data)
-        flow = [high(f, len(parts)) - low(f, len(parts)) for f in kernel.flow(parts.times, *parts.states(SAFE))]
-        return ~np.isfinite(np.array(flow)).all(axis=0)[:, None]
+        jumps = np.zeros((len(parts), 1), dtype=bool)
+        for f in kernel.flow(parts.times, *parts.states(SAFE)):
+            jumps[:, 0] |= ~np.isfinite(high(f, len(parts)) - low(f, len(parts)))
+        return jumps
 
     return undecided(steps, decides, HALVINGS)[0]
 
