@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from hsdsl.base.numbers.arithmetic import FLOAT64, Number
@@ -17,10 +18,10 @@ from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.mathematics.program import Program, Tape
 
-Address = int | None
 Double = ctypes.c_double
 Doubles = ctypes.POINTER(ctypes.c_double)
 RoutinePointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, Double, Doubles, Doubles)
+ShapePointer = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, Doubles, Double, Doubles, Doubles)
 SeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Double, Doubles, Doubles)
 SurfaceSeriesPointer = ctypes.CFUNCTYPE(ctypes.c_int, Doubles, ctypes.c_int, Doubles)
 
@@ -58,10 +59,10 @@ class CompiledKernel(PythonKernel):
         edges, program = structures.array_at(structures.Edge, table.edge, table.edges), self._program.flows[mode]
         pairs = list(zip(edges, program.edges, strict=True))
         gradients = structures.array_at(structures.Sparse, table.gradients, m)
-        rates = structures.addresses(table.rates, m)
+        rates = structures.array_at(structures.Local, table.rates, m)
 
-        def bound(address: Address, results: int, arguments: int = n) -> Routine:
-            return _routine(address, numbers, arguments, results)
+        def bound(routine: Any, results: int, arguments: int = n) -> Routine:
+            return _routine(routine, numbers, arguments, results)
 
         return ModeKernel(
             flow=bound(table.flow, n),
@@ -74,7 +75,8 @@ class CompiledKernel(PythonKernel):
             ),
             rates=tuple(bound(rate, 1) for rate in rates),
             conditions=tuple(
-                conjunction([bound(part, 1) for part in structures.addresses(e.condition, e.parts)]) for e in edges
+                conjunction([bound(part, 1) for part in structures.array_at(structures.Local, e.condition, e.parts)])
+                for e in edges
             ),
             resets=tuple(changed(bound(e.reset, e.changes), edge, 1) for e, edge in pairs),
             spreads=tuple(changed(bound(e.spread, e.changes, 2 * n), edge, n + 1) for e, edge in pairs),
@@ -108,9 +110,11 @@ def _taylor(table: Any, tape: Tape, data: Sequence[Number]) -> Taylor:
     return Taylor(flow, surfaces)
 
 
-def _routine(address: Address, data: ctypes.Array[Double], arguments: int, results: int) -> Routine:
-    assert address is not None
-    function = RoutinePointer(address)
+def _routine(routine: Any, data: ctypes.Array[Double], arguments: int, results: int) -> Routine:
+    if isinstance(routine, structures.Local):
+        function = partial(ShapePointer(routine.shape), routine.of)
+    else:
+        function = RoutinePointer(routine)
     given, found = (Double * max(1, arguments)), (Double * max(1, results))
 
     def call(t: Number, *x: Number) -> Vector:

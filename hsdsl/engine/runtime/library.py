@@ -12,6 +12,7 @@ import platform
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from hsdsl.base import limits
 from hsdsl.base.cache import find, keep, key_of, making
 from hsdsl.base.names import shown
 from hsdsl.engine.runtime.compiler import FLAGS, Compiler, Effort, NoCompiler, TooSlow, find_compiler
-from hsdsl.mathematics.program import Program
+from hsdsl.mathematics.program import ModeProgram, Program
 
 RUNTIME = Path(__file__).parent / "c"
 BACKENDS = Path(__file__).parents[1] / "backends"
@@ -276,7 +277,13 @@ def vectors() -> tuple[str, ...] | None:
 
 def _content(program: Program) -> str:
     data = len(program.parameters), len(program.inputs), len(program.switches)
-    return repr(((*data, len(program.outputs), program.initial_states), program.flows))
+    return repr(((*data, len(program.outputs), program.initial_states), list(map(_briefly, program.flows))))
+
+
+def _briefly(mode: ModeProgram) -> ModeProgram:
+    """A mode without the names of the states that edges lead to: of many parts every edge has those of all."""
+    edges = (replace(edge, target_states=(str(len(edge.target_states)),)) for edge in mode.edges)
+    return replace(mode, edges=tuple(edges))
 
 
 def _longest(program: Program) -> str:

@@ -68,7 +68,7 @@ def _read() -> tuple[dict[str, Any], dict[str, tuple[Any, ...]], tuple[str, ...]
 
 
 STRUCTURES, ENUMERATIONS, STOPPED = _read()
-Mode, Edge, Model, Sparse = (STRUCTURES[f"hs_{name}"] for name in ("mode", "edge", "model", "sparse"))
+Mode, Edge, Model, Sparse, Local = (STRUCTURES[f"hs_{name}"] for name in ("mode", "edge", "model", "sparse", "local"))
 Row, Collocation, Method = (STRUCTURES[name] for name in ("hs_row", "hs_collocation", "hs_method"))
 Timeline, Interpolation, Settings = (STRUCTURES[name] for name in ("hs_timeline", "hs_interpolation", "hs_settings"))
 Visited, Tail, Task = (STRUCTURES[f"hs_{name}"] for name in ("visited", "tail", "task"))
@@ -99,11 +99,6 @@ def start_of(array: np.ndarray[Any, Any]) -> int:
 def array_at(kind: Any, start: int | None, count: int) -> Any:
     """An array of numbers, addresses or structures that is in memory already."""
     return (kind * count).from_address(start) if count else ()
-
-
-def addresses(start: int | None, count: int) -> list[int]:
-    """The addresses in an array of pointers."""
-    return list(array_at(c_void_p, start, count))
 
 
 def interpolation_table(

@@ -6,8 +6,8 @@ A scalar is parsed, looked up and translated by `ExpressionResolver`, with every
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -16,7 +16,7 @@ from hsdsl.base.names import SINCE, closest, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.expression import Expected, ExpressionError, numeric, parse, symbolic
 from hsdsl.language.expression.conditions import Trigger, equation, inequality, the_comparison, trigger_of
-from hsdsl.language.expression.parse import Call, Tree
+from hsdsl.language.expression.parse import Call, Name, Tree, walk
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, state
 from hsdsl.language.expression.timebox import Box
 from hsdsl.language.files import ModelFiles
@@ -48,6 +48,29 @@ def all_of(parts: Iterable[T | None]) -> list[T] | None:
     return whole if len(whole) == len(every) else None
 
 
+class Seen(Mapping[str, Meaning]):
+    """The names of a scope while one expression is built: of parts each is worked out at every look."""
+
+    def __init__(self, values: Mapping[str, Meaning]) -> None:
+        self._values = values
+        self._known: dict[str, Meaning] = {}
+
+    def __getitem__(self, name: str) -> Meaning:
+        if name not in self._known:
+            self._known[name] = self._values[name]
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def items(self) -> Any:
+        """The names with their meanings, for hints."""
+        return self._values.items()
+
+
 class ExpressionResolver:
     """Resolver of expressions: their faults go to ``findings``, and the answer is then None.
 
@@ -58,18 +81,35 @@ class ExpressionResolver:
     box: Box | None = None
     at: Scalar | None = None
 
+    @cached_property
+    def made(self) -> dict[tuple[Any, ...], Value]:
+        """The values of expressions by their text and the meanings of their names."""
+        return {}
+
     def report(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
         """Report a fault at a place."""
         self.findings.add(place.diagnostic(code, message, hint))
 
     def number(self, scalar: Scalar, scope: Scope, finite_now: bool = False) -> Value | None:
         """The value of an expression; with ``finite_now`` it must have one with the file's own parameters."""
-        value = self._built(scalar, scope, "number", lambda tree: symbolic.number(tree, scope, scalar.value))
+        value = self._built(scalar, scope, "number", lambda tree, scope: self._number(tree, scope, scalar.value))
         if value and finite_now and value.number is not None and not numeric.finite(value.number):
             message = f"`{shown(scalar.value, 40)}` has no finite real value with the parameters of this file"
             self.report(scalar.place, "HS118", message)
             return None
         return value
+
+    def _number(self, tree: Tree, scope: Scope, text: str) -> Value:
+        """The value of a tree: made once where its names mean the same, as those of many parts and of their modes."""
+        named = (
+            (node.name if isinstance(node, Name) else node.function)
+            for node in walk(tree)
+            if isinstance(node, (Name, Call))
+        )
+        key = text, *map(scope.values.get, named)
+        if key not in self.made:
+            self.made[key] = symbolic.number(tree, scope, text)
+        return self.made[key]
 
     def tree(self, scalar: Scalar) -> Tree | None:
         """The tree of an expression whose names are looked up later."""
@@ -88,22 +128,25 @@ class ExpressionResolver:
 
     def condition(self, scalar: Scalar, scope: Scope) -> Any | None:
         """The SymPy Boolean of a condition."""
-        return self._built(scalar, scope, "condition", lambda tree: symbolic.condition(tree, scope, scalar.value))
+        return self._built(
+            scalar, scope, "condition", lambda tree, scope: symbolic.condition(tree, scope, scalar.value)
+        )
 
     def equation(self, scalar: Scalar, scope: Scope) -> tuple[Value, Value] | None:
         """Both sides of an equation."""
-        return self._built(scalar, scope, "condition", lambda tree: equation(tree, scope, scalar.value))
+        return self._built(scalar, scope, "condition", lambda tree, scope: equation(tree, scope, scalar.value))
 
     def trigger(self, scalar: Scalar, scope: Scope) -> Trigger | None:
         """The condition of an event."""
-        return self._built(scalar, scope, "condition", lambda tree: trigger_of(tree, scope, scalar.value))
+        return self._built(scalar, scope, "condition", lambda tree, scope: trigger_of(tree, scope, scalar.value))
 
     def inequality(self, scalar: Scalar, scope: Scope, key: str) -> tuple[Value, str, Value] | None:
         """The two sides of one inequality, and its sign between them."""
-        return self._built(scalar, scope, "inequality", lambda tree: inequality(tree, scope, scalar.value, key), key)
+        build = lambda tree, scope: inequality(tree, scope, scalar.value, key)  # noqa: E731
+        return self._built(scalar, scope, "inequality", build, key)
 
     def _built(
-        self, scalar: Scalar, scope: Scope, expected: Expected, build: Callable[[Tree], T], key: str = ""
+        self, scalar: Scalar, scope: Scope, expected: Expected, build: Callable[[Tree, Scope], T], key: str = ""
     ) -> T | None:
         """An object built of an expression; None where it has faults, which are reported, or uses what is broken."""
         if scalar.value == ABSENT:
@@ -112,13 +155,14 @@ class ExpressionResolver:
         if self.box:
             self.box.restart()
         text = "" if scalar.kind == "null" else scalar.value.lower() if scalar.kind == "boolean" else scalar.value
+        scope = replace(scope, values=Seen(scope.values))
         try:
             tree = _tree(text, expected, scope)
             tree = tree if scope.expanded is None else scope.expanded(tree)
             known = self.names_known(scalar, tree, scope)
             if expected == "inequality" and not (isinstance(tree, Call) and scope.faults(tree)):
                 the_comparison(tree, key, text)
-            return build(tree) if known else None
+            return build(tree, scope) if known else None
         except ExpressionError as error:
             self._report(scalar, error)
             return None

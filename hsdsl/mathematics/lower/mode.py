@@ -11,10 +11,10 @@ branch that it is on. `ordering` is the order in which a large and sparse implic
 from __future__ import annotations
 
 from collections import ChainMap, defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
@@ -26,7 +26,17 @@ from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.completion import ConstrainedMode
 from hsdsl.mathematics.lower.constants import Names
-from hsdsl.mathematics.lower.straight import Cut, Definition, Gradient, Statement, print_routines, shared
+from hsdsl.mathematics.lower.straight import (
+    Alike,
+    Cut,
+    Definition,
+    Gradient,
+    Shape,
+    Statement,
+    print_each,
+    print_routines,
+    shared,
+)
 from hsdsl.mathematics.lower.tape import make_tape
 
 _NAN = symbol("nan")
@@ -37,6 +47,15 @@ def lowered_constrained(found: ConstrainedMode, names: Names) -> LoweredMode:
     flags = tuple(symbol(f"d{i}") for i in range(len(found.flags)))
     shared = names.shared | dict(zip(found.flags, flags, strict=True))
     return LoweredMode(found.mode, names._replace(data=(*names.data, *flags), shared=shared))
+
+
+class _Surface(NamedTuple):
+    """A surface: its residual, the shape of that and of the flow, the arguments with slopes, whether it is affine."""
+
+    residual: sp.Basic
+    shape: Shape
+    slopes: tuple[int, ...]
+    affine: bool
 
 
 class LoweredMode:
@@ -53,7 +72,9 @@ class LoweredMode:
         self._places = {argument: i for i, argument in enumerate(self.arguments)}
         self._sizes = tuple(symbol(f"s{i}") for i in range(len(self.states)))
         self._given = self._places | {s: len(self.arguments) + i for i, s in enumerate(self._sizes)}
-        self._slopes = [Gradient((residual,), self._places) for residual in self.residuals]
+        self._along = dict(zip(self.states, self.flow, strict=True))
+        self._known: dict[tuple, tuple[tuple[int, ...], bool]] = {}
+        self._surfaces = list(map(self._surface, self.residuals))
 
     def place(self, expressions) -> tuple[sp.Basic, ...]:
         """Expressions of the file's names over numbered symbols."""
@@ -68,7 +89,7 @@ class LoweredMode:
         mode, data = self.mode, self.names.data
         texts, expressions = zip(*_labelled(mode), strict=True) if mode.states or mode.surfaces else ((), ())
         return {
-            "affine": all(map(self._is_affine, self.residuals, self._slopes)),
+            "affine": all(surface.affine for surface in self._surfaces),
             "jacobian": self._jacobian(),
             "tape": make_tape(self.flow, self.residuals, self.states, data),
             "expressions": tuple(texts),
@@ -91,7 +112,7 @@ class LoweredMode:
             walls=tuple(wall.text for wall in mode.walls),
             flow_texts=mode.flow_texts,
             routines=routines,
-            slopes=tuple(tuple(self._places[a] for a in slopes.sparse[0]) for slopes in self._slopes),
+            slopes=tuple(surface.slopes for surface in self._surfaces),
             slides=mode.slides or (),
             measured=mode.measured,
             derived=mode.derived,
@@ -104,9 +125,45 @@ class LoweredMode:
         bounded = program.jumps or may_hide(self.flow, self.arguments)
         if not bounded:
             return program
-        terms = Terms(self.flow, dict(zip(self.states, self._sizes, strict=True)))
-        definition = Definition("terms", (), terms.bounds, terms.statements, self._given)
-        return replace(program, terms=print_routines((definition,), self.names.data))
+        return replace(program, terms=self._terms())
+
+    def _terms(self) -> lowered.Routines:
+        """The bounds of the terms of the flow."""
+        sizes = dict(zip(self.states, self._sizes, strict=True))
+
+        def bounds(*flow: sp.Expr) -> Definition:
+            terms = Terms(flow, sizes)
+            return Definition("terms", (), terms.bounds, terms.statements)
+
+        return print_each("terms", self.flow, bounds, sizes, self._given, self.names.data)
+
+    def _surface(self, residual: sp.Basic) -> _Surface:
+        """What is known of a surface: once for all that have one shape together with the flow of their states."""
+        shape = Shape((residual,), self._along)
+        key = shape.order(self._places), *shape.key
+        if key not in self._known:
+            slopes = Gradient((residual,), self._places)
+            row = tuple(shape.symbols[argument] for argument in slopes.sparse[0])
+            self._known[key] = row, self._is_affine(residual, slopes)
+        row, affine = self._known[key]
+        symbols = {number: symbol for symbol, number in shape.symbols.items()}
+        return _Surface(residual, shape, tuple(self._places[symbols[number]] for number in row), affine)
+
+    def _derivatives(self, k: int, surface: _Surface) -> Iterator[Alike]:
+        """The slopes of a surface, and its rate along the flow."""
+
+        def gradient():
+            slopes = Gradient((surface.residual,), self._places)
+            return tuple(slopes.sparse[0].values()), slopes.statements
+
+        def rate():
+            slopes = Gradient((surface.residual,), self._places)
+            along = self._along | {TIME: sp.S.One}
+            return (sp.Add(*(slope * along[a] for a, slope in slopes.sparse[0].items())),), slopes.statements
+
+        order = surface.shape.order(self._places)
+        for name, write in (("gradient", gradient), ("rate", rate)):
+            yield Alike(f"{name}_{k}", (name, order), surface.shape, write, self._places)
 
     def _is_affine(self, residual: sp.Basic, slopes: Gradient) -> bool:
         """Whether a surface is affine in time and the states, in every choice that numbers of modes make."""
@@ -152,12 +209,8 @@ class LoweredMode:
         sides = self.place(absolute(s.left) + absolute(s.right) for s in mode.surfaces)
         yield Definition("magnitudes", arguments, sides)
         yield Definition("outputs", arguments, outputs)
-        along = dict(zip(arguments, (sp.S.One, *self.flow), strict=True))
-        for k, slopes in enumerate(self._slopes):
-            row = slopes.sparse[0]
-            rate = sp.Add(*(slope * along[argument] for argument, slope in row.items()))
-            yield self._few(f"gradient_{k}", row.values(), slopes.statements)
-            yield self._few(f"rate_{k}", (rate,), slopes.statements)
+        for k, surface in enumerate(self._surfaces):
+            yield from self._derivatives(k, surface)
         for k, edge in enumerate(mode.edges):
             condition = sp.true if edge.condition is None else edge.condition
             for i, part in enumerate(condition.args if isinstance(condition, sp.And) else (condition,)):

@@ -384,27 +384,56 @@ class Definition(NamedTuple):
     places: Mapping[sp.Symbol, int] | None = None
 
 
-def text_of(definition: Definition) -> str:
+class Alike(NamedTuple):
+    """A routine before printing whose results and statements can be made from expressions of a shape.
+
+    They are made once for all routines of a ``kind`` and that shape. ``places`` has the index of each argument.
+    """
+
+    name: str
+    kind: object
+    shape: Shape
+    write: Callable[[], tuple[tuple, Sequence[Statement]]]
+    places: Mapping[sp.Symbol, int]
+
+
+def text_of(definition: Definition | Alike) -> str:
     """Print one routine as a Python function."""
+    if isinstance(definition, Alike):
+        shape, places = definition.shape, definition.places
+        body = shape.text(definition.kind, lambda: _body(*definition.write()))
+        return _few(definition.name, shape.symbols.keys() & places.keys(), places, body)
     results, statements = tuple(map(sp.sympify, definition.results)), tuple(definition.statements)
-    shape = _Shape((*results, *(part for statement in statements for part in statement)))
+    shape = Shape((*results, *(part for statement in statements for part in statement)))
     body = shape.text(len(results), lambda: _body(results, statements))
     if definition.places is None:
         return f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n{body}"
-    used = shape.symbols.keys() & definition.places.keys()
-    places = sorted((definition.places[symbol], symbol.name) for symbol in used)
-    named = "".join(f"    {name} = given[{i}]\n" for i, name in places)
-    return f"def {definition.name}(*given):\n{named}{body}"
+    return _few(definition.name, shape.symbols.keys() & definition.places.keys(), definition.places, body)
 
 
-def _body(results: tuple, statements: tuple[Statement, ...]) -> str:
+def _few(name: str, given: Iterable[sp.Symbol], places: Mapping[sp.Symbol, int], body: str) -> str:
+    """A routine that names those of some arguments that it uses."""
+    words = set(re.findall(r"\w+", body))
+    named = sorted((places[symbol], symbol.name) for symbol in given if symbol.name in words)
+    return f"def {name}(*given):\n{''.join(f'    {each} = given[{i}]{chr(10)}' for i, each in named)}{body}"
+
+
+def _body(results: tuple, statements: Sequence[Statement]) -> str:
+    return _returned(*_lines(results, tuple(statements)))
+
+
+def _lines(results: tuple, statements: tuple[Statement, ...]) -> tuple[list[str], list[str]]:
+    """The statements, and the results."""
     statements, results = written_out(results, statements)
-    lines = [f"    {symbol.name} = {_printed(expr)}\n" for symbol, expr in statements]
-    return "".join([*lines, f"    return ({''.join(_printed(expr) + ', ' for expr in results)})\n"])
+    return [f"    {symbol.name} = {_printed(expr)}\n" for symbol, expr in statements], list(map(_printed, results))
+
+
+def _returned(lines: Sequence[str], results: Sequence[str]) -> str:
+    return f"{''.join(lines)}    return ({''.join(f'{result}, ' for result in results)})\n"
 
 
 def _printed(expr: sp.Basic) -> str:
-    return expr.name if expr.is_Symbol else _Shape((expr,)).text(None, lambda: KernelPrinter().doprint(expr))
+    return expr.name if expr.is_Symbol else Shape((expr,)).text(None, lambda: KernelPrinter().doprint(expr))
 
 
 _NUMBERED = re.compile(r"([a-z_]+)\d+")
@@ -413,28 +442,31 @@ _MOST_SHAPES = 1 << 14
 _texts: dict[tuple, tuple[list[str], list[int]]] = {}
 
 
-class _Shape:
+class Shape:
     """Expressions up to the numbers in the names of their symbols: what equal ones are written as is made once.
 
     The parts of a large model, and its modes, have the same routines over other symbols. SymPy and the printer put
     operands in an order of their names. So the names of a letter count by their order, and another letter is another
     shape; names that are made in between have letters of their own. Every part of an expression is visited once.
-    ``symbols`` has the symbols with their places among the parts.
+    ``symbols`` has the symbols with their places among the parts, ``names`` the numbered names in order, and ``key``
+    tells shapes apart. With ``beside`` another symbol goes with some symbols.
     """
 
-    def __init__(self, expressions: Iterable[sp.Basic]) -> None:
+    def __init__(self, expressions: Iterable[sp.Basic], beside: Mapping[sp.Basic, sp.Basic] | None = None) -> None:
         self._nodes: list[object] = []
         self._numbers: dict[sp.Basic, int] = {}
         self.symbols: dict[sp.Basic, int] = {}
         ends = list(map(self._visit, expressions))
-        self._names: list[str] = []
+        if beside:
+            ends += [self._visit(beside[symbol]) for symbol in tuple(self.symbols) if symbol in beside]
+        self.names: list[str] = []
         ranks = Counter[str]()
         for symbol in sorted(self.symbols, key=lambda s: s.name):
             if found := _NUMBERED.fullmatch(symbol.name):
                 self._nodes[self.symbols[symbol]] = found[1], ranks[found[1]], symbol.is_real
                 ranks[found[1]] += 1
-                self._names.append(symbol.name)
-        self._key = (*ends, None, *self._nodes)
+                self.names.append(symbol.name)
+        self.key = (*ends, None, *self._nodes)
 
     def _visit(self, whole: sp.Basic) -> int:
         numbers, nodes, waiting = self._numbers, self._nodes, [whole]
@@ -451,11 +483,17 @@ class _Shape:
                 nodes.append((expr.func, *map(numbers.__getitem__, expr.args)) if expr.args else expr)
         return numbers[whole]
 
+    def order(self, places: Mapping[sp.Symbol, int]) -> tuple[int, ...]:
+        """The symbols that are arguments, in the order of these, by their places among the parts."""
+        return tuple(
+            self.symbols[symbol] for symbol in sorted(self.symbols.keys() & places.keys(), key=places.__getitem__)
+        )
+
     def text(self, kind: object, write: Callable[[], str]) -> str:
         """The text of a ``kind`` that is written of the expressions."""
-        key = (kind, *self._key)
+        key = (kind, *self.key)
         if key not in _texts:
-            places = {name: i for i, name in enumerate(self._names)}
+            places = {name: i for i, name in enumerate(self.names)}
             pieces = _WORD.split(write())
             texts, used = pieces[:1], list[int]()
             for word, text in zip(pieces[1::2], pieces[2::2], strict=True):
@@ -468,7 +506,7 @@ class _Shape:
                 _texts.clear()
             _texts[key] = texts, used
         texts, used = _texts[key]
-        return "".join(chain(texts[:1], *zip((self._names[i] for i in used), texts[1:], strict=True)))
+        return "".join(chain(texts[:1], *zip((self.names[i] for i in used), texts[1:], strict=True)))
 
 
 def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[list[Statement], tuple]:
@@ -483,11 +521,82 @@ def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[l
     return in_order([*common, *named], sp.Tuple(*last)), last
 
 
-def print_routines(definitions: Iterable[Definition], data: Sequence[sp.Symbol]) -> Routines:
+class _Written:
+    """How the result of expressions of one shape is written: statements, each with the numbers of its operands.
+
+    Those are the places of symbols among the names of the shape, and behind them those of the statements before it.
+    The last statement is the result.
+    """
+
+    def __init__(self, definition: Definition, names: Sequence[str]) -> None:
+        places = {name: i for i, name in enumerate(names)}
+        self.lines: list[tuple[list[str], list[int]]] = []
+        for line in _body(definition.results, definition.statements).splitlines():
+            name, _, text = line.strip().rpartition(" = ")
+            pieces = _WORD.split(text.removeprefix("return (").removesuffix(", )"))
+            operands, texts = list[int](), pieces[:1]
+            for word, after in zip(pieces[1::2], pieces[2::2], strict=True):
+                if word in places:
+                    operands.append(places[word])
+                    texts.append(after)
+                else:
+                    texts[-1] += word + after
+            places[name] = len(names) + len(self.lines)
+            self.lines.append((texts, operands))
+
+    def text(self, names: Sequence[str], known: dict[str, str]) -> str:
+        """The result over symbols of these names; statements get the names that they are ``known`` by, or new ones."""
+        values, text = list(names), ""
+        for texts, operands in self.lines:
+            text = "".join(chain(texts[:1], *zip(map(values.__getitem__, operands), texts[1:], strict=True)))
+            if len(values) < len(names) + len(self.lines) - 1:
+                values.append(text if texts == ["", ""] else known.setdefault(text, f"u{len(known)}"))
+        return text
+
+
+LEAST_ALIKE = 8  # expressions of one shape that are written one by one
+
+
+def print_each(
+    name: str,
+    expressions: Sequence[sp.Basic],
+    write: Callable[..., Definition],
+    beside: Mapping[sp.Basic, sp.Basic],
+    places: Mapping[sp.Symbol, int],
+    data: Sequence[sp.Symbol],
+) -> Routines:
+    """One routine of what is written of some expressions, one result of each.
+
+    What many parts have in one shape is written once, and statements that are the same are one; the other expressions
+    are written together. ``beside`` has a symbol that may be written where another one is in an expression, and
+    ``places`` the index of each argument.
+    """
+    shapes = [Shape((expr,), beside) for expr in expressions]
+    alike = Counter(shape.key for shape in shapes)
+    others = [k for k, shape in enumerate(shapes) if alike[shape.key] < LEAST_ALIKE]
+    definition = write(*(expressions[k] for k in others))
+    lines, found = _lines(definition.results, tuple(definition.statements))
+    results, known, written = dict(zip(others, found, strict=True)), dict[str, str](), dict[tuple, _Written]()
+    for k, shape in enumerate(shapes):
+        if k in results:
+            continue
+        if shape.key not in written:
+            written[shape.key] = _Written(write(expressions[k]), shape.names)
+        results[k] = written[shape.key].text(shape.names, known)
+    lines += [f"    {each} = {text}\n" for text, each in known.items()]
+    body = _returned(lines, [results[k] for k in range(len(shapes))])
+    given = set[sp.Symbol]().union(*(shape.symbols for shape in shapes)) & places.keys()
+    return _bound((name,), _few(name, given, places, body), data)
+
+
+def print_routines(definitions: Iterable[Definition | Alike], data: Sequence[sp.Symbol]) -> Routines:
     """Put routines into one ``bind`` whose arguments are the data they close over."""
     definitions = tuple(definitions)
-    names = tuple(d.name for d in definitions)
-    body = "".join(textwrap.indent(text_of(d), "    ") for d in definitions)
+    return _bound(tuple(d.name for d in definitions), "".join(map(text_of, definitions)), data)
+
+
+def _bound(names: tuple[str, ...], text: str, data: Sequence[sp.Symbol]) -> Routines:
+    body = textwrap.indent(text, "    ")
     head = f"def bind({', '.join(s.name for s in data)}):\n"
     result = f"({', '.join(names)},)" if names else "()"
     return Routines(names, f"{head}{body}    return {result}\n")

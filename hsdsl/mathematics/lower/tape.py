@@ -11,12 +11,15 @@ See A. Griewank and A. Walther, *Evaluating Derivatives*, Sec. 13.2 (doi:10.1137
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import inf
+from typing import NamedTuple
 
 import sympy as sp
 
+from hsdsl.base.functions import replaced
 from hsdsl.language.system import TIME
-from hsdsl.mathematics.lower.straight import Cut, Definition, print_routines
+from hsdsl.mathematics.lower.straight import Cut, Definition, Shape, print_routines
 from hsdsl.mathematics.program import Operation, Tape
 
 _ONE = sp.Integer(1)
@@ -35,7 +38,7 @@ def make_tape(flow, surfaces, states, data) -> Tape | None:
     """
     writer = _Writer(states)
     try:
-        rows = tuple(writer.line(f) for f in flow)
+        rows = tuple(writer.whole(f) for f in flow)
     except Kinked:
         return None
     needed, count = len(writer.operations), len(writer.constants)
@@ -49,8 +52,11 @@ class _Writer:
     """Lines 0 to n are time and the states; every operation is the next line."""
 
     def __init__(self, states) -> None:
+        self._states = states
         self._known = {TIME: 0} | {s: i for i, s in enumerate(states, 1)}
         self._moving = set(self._known)
+        self._traces: dict[tuple, _Trace | None] = {}
+        self.calls: list[tuple[str, tuple[int, ...], sp.Expr | None, int]] = []
         self._constant: dict[sp.Basic, bool] = {}
         self._first = len(self._known)
         self._numbers: dict[sp.Expr, int] = {}
@@ -59,13 +65,22 @@ class _Writer:
         self.constants: list[sp.Expr] = []
         self.operations: list[Operation] = []
 
+    def whole(self, expr) -> int:
+        """The line of an expression; from its second one on a shape is looked through once."""
+        shape = Shape((expr,))
+        if shape.key not in self._traces:
+            self._traces[shape.key] = None
+            return self.line(expr)
+        trace = self._traces[shape.key] = self._traces[shape.key] or _Trace.of(_Writer(self._states), expr, shape)
+        return trace.written(self, expr, shape)
+
     def line_or_none(self, expr) -> int | None:
         """The line of an expression; None where it is kinked, with nothing written."""
         before = len(self.operations), len(self.constants)
         tables = self._known, self._written, self._numbers
         sizes = list(map(len, tables))
         try:
-            return self.line(expr)
+            return self.whole(expr)
         except Kinked:
             del self.operations[before[0] :], self._degrees[self._first + before[0] :], self.constants[before[1] :]
             for table, size in zip(tables, sizes, strict=True):
@@ -81,7 +96,7 @@ class _Writer:
 
     def _write(self, expr) -> int:
         if self._is_constant(expr):
-            return self._operation("constant", constant=expr)
+            return self.operation("constant", constant=expr)
         if expr.is_Add:
             return self._sum(expr)
         if expr.is_Mul:
@@ -93,7 +108,7 @@ class _Writer:
             return self._solution(expr)
         if name == "below":
             number, bound, one, other = expr.args
-            return self._operation("below", self.line(number), self.line(one), self.line(other), constant=bound)
+            return self.operation("below", self.line(number), self.line(one), self.line(other), constant=bound)
         if name not in _DERIVATIVES:
             raise Kinked(name)
         return _DERIVATIVES[name](self, *map(self.line, expr.args))
@@ -111,6 +126,10 @@ class _Writer:
                 self._moving.add(symbol)
         return self.line(unknown.xreplace(fixed))
 
+    def is_moving(self, symbol: sp.Symbol) -> bool:
+        """Whether a symbol is time or a state."""
+        return symbol in self._moving
+
     def _is_constant(self, expr) -> bool:
         if not expr.args:
             return expr not in self._moving
@@ -118,7 +137,13 @@ class _Writer:
             self._constant[expr] = all(map(self._is_constant, expr.args))
         return self._constant[expr]
 
-    def _operation(self, kind: str, *lines: int, constant=None) -> int:
+    def operation(self, kind: str, *lines: int, constant=None) -> int:
+        """The line of an operation on lines; the same one is written once."""
+        line = self._line_of(kind, lines, constant)
+        self.calls.append((kind, lines, constant, line))
+        return line
+
+    def _line_of(self, kind: str, lines: tuple[int, ...], constant) -> int:
         number = None
         if constant is not None:
             if constant not in self._numbers:
@@ -160,9 +185,9 @@ class _Writer:
         total = self.line(moving[0])
         for term in moving[1:]:
             negative = term.could_extract_minus_sign()
-            total = self._operation("sub" if negative else "add", total, self.line(-term if negative else term))
+            total = self.operation("sub" if negative else "add", total, self.line(-term if negative else term))
         constant = sp.Add(*(t for t in terms if self._is_constant(t)))
-        return total if constant == 0 else self._operation("offset", total, constant=constant)
+        return total if constant == 0 else self.operation("offset", total, constant=constant)
 
     def _product(self, expr) -> int:
         constant = sp.Mul(*(f for f in expr.args if self._is_constant(f)))
@@ -170,18 +195,18 @@ class _Writer:
         below = [1 / f for f in moving if f.is_Pow and f.exp.is_Number and f.exp < 0]
         above = [f for f in moving if not (f.is_Pow and f.exp.is_Number and f.exp < 0)]
         if not above:
-            return self._operation("under", self._factors(below), constant=constant)
+            return self.operation("under", self._factors(below), constant=constant)
         line = self._factors(above)
         if below:
-            line = self._operation("div", line, self._factors(below))
+            line = self.operation("div", line, self._factors(below))
         if constant == -1:
-            return self._operation("neg", line)
-        return line if constant == 1 else self._operation("scale", line, constant=constant)
+            return self.operation("neg", line)
+        return line if constant == 1 else self.operation("scale", line, constant=constant)
 
     def _factors(self, factors) -> int:
         line = self.line(factors[0])
         for factor in factors[1:]:
-            line = self._operation("mul", line, self.line(factor))
+            line = self.operation("mul", line, self.line(factor))
         return line
 
     def _power(self, base, exponent) -> int:
@@ -190,32 +215,32 @@ class _Writer:
         if not self._is_constant(exponent):
             return self.line(sp.exp(exponent * sp.log(base, evaluate=False), evaluate=False))
         if exponent.is_Number and exponent < 0:
-            return self._operation("under", self.line(base**-exponent), constant=_ONE)
+            return self.operation("under", self.line(base**-exponent), constant=_ONE)
         if exponent == sp.Rational(1, 2):
-            return self._operation("sqrt", self.line(base))
+            return self.operation("sqrt", self.line(base))
         if exponent.is_Integer:
             return self._whole_power(self.line(base), int(exponent))
-        return self._operation("pow", self.line(base), constant=exponent)
+        return self.operation("pow", self.line(base), constant=exponent)
 
     def _whole_power(self, base: int, exponent: int) -> int:
         """By squaring: exact where the base is zero, too."""
         result: int | None = None
         while exponent:
             if exponent & 1:
-                result = base if result is None else self._operation("mul", result, base)
+                result = base if result is None else self.operation("mul", result, base)
             exponent >>= 1
             if exponent:
-                base = self._operation("mul", base, base)
+                base = self.operation("mul", base, base)
         assert result is not None
         return result
 
     def chain(self, name: str, u: int, derivative: int) -> int:
         """The function ``name`` of line u, whose derivative by u is a line."""
-        return self._operation(name, u, self.slope(u), derivative)
+        return self.operation(name, u, self.slope(u), derivative)
 
     def slope(self, u: int) -> int:
         """The line of u', which a function of u needs; written once."""
-        return self._operation("slope", u)
+        return self.operation("slope", u)
 
     def ahead(self, lines: int) -> int:
         """The number of the line that follows ``lines`` further lines, after the lines of slopes."""
@@ -237,39 +262,88 @@ class _Writer:
             self._known[key] = one = self.chain(first, u, self.ahead(1))
             self.chain(second, u, self.ahead(1) if turn else one)
             if turn:
-                self._operation("neg", one)
+                self.operation("neg", one)
         return self._known[key]
 
     def tangent(self, name: str, u: int, negative: bool) -> int:
         """Z' = (1 + z**2) u', or (1 - z**2) u'."""
         self.slope(u)
         z = self.chain(name, u, self.ahead(3 if negative else 2))
-        square = self._operation("mul", z, z)
+        square = self.operation("mul", z, z)
         if negative:
-            square = self._operation("neg", square)
-        self._operation("offset", square, constant=_ONE)
+            square = self.operation("neg", square)
+        self.operation("offset", square, constant=_ONE)
         return z
 
     def reciprocal(self, u: int) -> int:
-        return self._operation("under", u, constant=_ONE)
+        return self.operation("under", u, constant=_ONE)
 
     def algebraic(self, name: str, u: int, sign: int, offset: int, root: bool, scale: int = 1) -> int:
         """Z' = scale u' / (offset + sign u**2), or with the square root of that."""
-        line = self._operation("mul", u, u)
+        line = self.operation("mul", u, u)
         if sign < 0:
-            line = self._operation("neg", line)
-        line = self._operation("offset", line, constant=sp.Integer(offset))
+            line = self.operation("neg", line)
+        line = self.operation("offset", line, constant=sp.Integer(offset))
         if root:
-            line = self._operation("sqrt", line)
-        return self.chain(name, u, self._operation("under", line, constant=sp.Integer(scale)))
+            line = self.operation("sqrt", line)
+        return self.chain(name, u, self.operation("under", line, constant=sp.Integer(scale)))
 
     def atan2(self, y: int, x: int) -> int:
         """Z' = (x y' - y x') / (x**2 + y**2)."""
-        squares = (self._operation("mul", x, x), self._operation("mul", y, y))
-        radius = self._operation("add", *squares)
-        by_y = self._operation("div", x, radius)
-        by_x = self._operation("neg", self._operation("div", y, radius))
-        return self._operation("atan2", y, x, by_y, by_x, self.slope(y), self.slope(x))
+        squares = (self.operation("mul", x, x), self.operation("mul", y, y))
+        radius = self.operation("add", *squares)
+        by_y = self.operation("div", x, radius)
+        by_x = self.operation("neg", self.operation("div", y, radius))
+        return self.operation("atan2", y, x, by_y, by_x, self.slope(y), self.slope(x))
+
+
+_PLAIN = frozenset(("constant", "add", "sub", "neg", "offset", "scale", "mul", "div", "under", "sqrt", "pow", "below"))
+
+
+class _Trace(NamedTuple):
+    """The operations that write expressions of one shape, None where one of them names lines that follow it.
+
+    Of each the kind, the lines, and the constant. A line is the place of a symbol among the parts of the shape, or one
+    of the operations, from -1 down; ``symbols`` are those of the expression that it was made of.
+    """
+
+    operations: tuple[tuple[str, tuple[int, ...], sp.Expr | None], ...] | None
+    result: int
+    symbols: Mapping[int, sp.Symbol]
+    constants: dict[tuple, sp.Expr]
+
+    @classmethod
+    def of(cls, writer: _Writer, expr, shape: Shape) -> _Trace:
+        """Trace how a writer without lines writes an expression."""
+        places = {writer.line(symbol): place for symbol, place in shape.symbols.items() if writer.is_moving(symbol)}
+        end = writer.line(expr)
+        plain = all(kind in _PLAIN for kind, *_ in writer.calls)
+        found = []
+        for k, (kind, lines, constant, line) in enumerate(writer.calls if plain else ()):
+            found.append((kind, tuple(map(places.__getitem__, lines)), constant))
+            places.setdefault(line, -1 - k)
+        symbols = {place: symbol for symbol, place in shape.symbols.items()}
+        return cls(tuple(found) if plain else None, places.get(end, 0), symbols, {})
+
+    def written(self, writer: _Writer, expr, shape: Shape) -> int:
+        """The line of another expression of the shape."""
+        if not self.operations:
+            return writer.line(expr)
+        symbols = {place: symbol for symbol, place in shape.symbols.items()}
+        now = {symbol: symbols[place] for place, symbol in self.symbols.items()}
+        lines: list[int] = []
+        for kind, operands, constant in self.operations:
+            given = (lines[-1 - place] if place < 0 else writer.line(symbols[place]) for place in operands)
+            lines.append(writer.operation(kind, *given, constant=self._constant(constant, now)))
+        return lines[-1 - self.result]
+
+    def _constant(self, constant: sp.Expr | None, now: Mapping[sp.Symbol, sp.Symbol]) -> sp.Expr | None:
+        if constant is None or constant.is_Atom:
+            return now.get(constant, constant)
+        key = constant, *(now[symbol] for symbol in self.symbols.values() if symbol in constant.free_symbols)
+        if key not in self.constants:
+            self.constants[key] = replaced(constant, now, {})
+        return self.constants[key]
 
 
 _DERIVATIVES = {

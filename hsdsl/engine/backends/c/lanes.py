@@ -50,16 +50,17 @@ def _mode(writer: Writer, mode: ModeProgram) -> str | None:
     kept = dict(writer.functions)
     texts = dict[str, str](DEFINITION.findall(mode.routines.source))
     flow, surfaces, magnitudes = (writer.function(texts[name]) for name in ("flow", "surfaces", "magnitudes"))
-    gradients = [writer.sparse(writer.function(texts[f"gradient_{k}"]), mode.slopes[k]) for k in mode.surfaces]
-    rates = [writer.function(texts[f"rate_{k}"]) for k in mode.surfaces]
+    gradients = [writer.sparse(writer.few(texts[f"gradient_{k}"]), mode.slopes[k]) for k in mode.surfaces]
+    rates = [writer.few(texts[f"rate_{k}"]) for k in mode.surfaces]
     series, surface_series, lines = writer.series(tape, n, False)
     new = (text for name, text in writer.functions.items() if name not in kept)
     if any(map(_CHOICE.search, new)):
         writer.functions = kept
         return None
+    slopes, rates = writer.table("hs_sparse", "gradients", gradients), writer.table("hs_local", "locals", rates)
     return (
         f"{{{n}, {len(mode.surfaces)}, {flow}, {surfaces}, {series}, {surface_series}, {lines}, {len(mode.edges)}, "
-        f"{magnitudes}, {writer.table('hs_sparse', 'gradients', gradients)}, {writer.pointers(rates)}}}"
+        f"{magnitudes}, {slopes}, {rates}}}"
     )
 
 

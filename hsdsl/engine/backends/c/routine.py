@@ -11,23 +11,24 @@ import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from textwrap import dedent
 
 from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text, stored
 
 _FUNCTION = """\
-static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
+static int {name}({of}const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
   int bad = 0;
-  (void)p, (void)t, (void)x, (void)out;
+  {unused}(void)p, (void)t, (void)x, (void)out;
 {body}
   return bad;
 }}
 """
 _PIECE = """\
-static HS_APART int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict v,
+static HS_APART int {name}({of}const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict v,
     hs_real *restrict out) {{
   int bad = 0;
-  (void)p, (void)t, (void)x, (void)v, (void)out;
+  {unused}(void)p, (void)t, (void)x, (void)v, (void)out;
 {body}
   return {status};
 }}
@@ -42,93 +43,70 @@ static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict 
 }}
 """
 _WHOLE = """\
-static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
+static int {name}({of}const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
   hs_real v[{size}];
   return {calls};
 }}
 """
 
-_SHAPE = """\
-HS_APART
-static int NAME(const int *of, const hs_real *restrict p, hs_real t, const hs_real *restrict x,
-    hs_real *restrict out) {{
-  int bad = 0;
-  (void)p, (void)t, (void)x, (void)out;
-{body}
-  return bad;
-}}
-"""
-_CALL = """\
-static int {name}(const hs_real *restrict p, hs_real t, const hs_real *restrict x, hs_real *restrict out) {{
-  static const int of[] = {{{of}}};
-  return {kind}(of, p, t, x, out);
-}}
-"""
-_OWN_NAME = re.compile(r"\b(?:[a-z]\d+|given\[\d+\])")
+_OF = "const int *of, "
+_OWN_NAME = re.compile(r"\b[a-z]\d+")
+_GIVEN = re.compile(r"^ +(\w+) = given\[(\d+)\]\n", re.MULTILINE)
 
 
-def shape_of(text: str, data: Mapping[str, str]) -> tuple[str, tuple[str, ...]]:
-    """The text of a routine without the numbers of its operands, and these in C, ``x[0]`` or ``p[0]``.
+def shape_of(text: str, data: dict[str, str]) -> tuple[str, tuple[str, ...]]:
+    """The text of a routine of few operands with their places among these as names, and these in C, as ``x[0]``.
 
-    Routines of parts that are alike have one shape. None is one that takes all states.
+    Routines of parts that are alike have one shape.
     """
-    if not text.startswith("(*given)"):
-        return text, ()
+    given = data | {name: f"x[{int(place) - 1}]" for name, place in _GIVEN.findall(text) if name != "t"}
     operands: dict[str, int] = {}
 
     def slot(found: re.Match[str]) -> str:
-        name = found[0]
-        if name.startswith("given"):
-            return "given"
-        operand = f"x[{name[1:]}]" if name[0] == "x" else data.get(name)
+        operand = given.get(found[0])
         if operand is None:  # a name of the routine's own
-            return name
+            return found[0]
         return f"{operand[0]}_{operands.setdefault(operand, len(operands))}"
 
-    return _OWN_NAME.sub(slot, text), tuple(operands)
+    return _OWN_NAME.sub(slot, _GIVEN.sub("", text)), tuple(operands)
 
 
-def shape_function(shape: str, operands: Sequence[str]) -> str:
-    """The function ``NAME`` of the routines of one shape, of where their operands are."""
-    lines = [line for line in shape.splitlines(keepends=True) if not line.endswith(" = given\n")]
-    definition = ast.parse(dedent(f"    def routine{''.join(lines)}")).body[0]
-    assert isinstance(definition, ast.FunctionDef)
+def shape_function(name: str, shape: str, operands: Sequence[str]) -> str:
+    """The function of the routines of one shape, of where their operands are."""
     names = {f"{operand[0]}_{i}": f"{operand[0]}[of[{i}]]" for i, operand in enumerate(operands)}
-    return _SHAPE.format(body=function_body(definition, names | {"t": "t"}))
+    return routine_function(name, shape, names | {"t": "t"}, few=True)
 
 
-def call_of_shape(name: str, kind: str, operands: Sequence[str]) -> str:
-    """A routine as a call of the function of its shape."""
-    return _CALL.format(name=name, kind=kind, of=", ".join(operand[2:-1] for operand in operands))
-
-
-def routine_function(name: str, text: str, data: Mapping[str, str], apart: bool = False) -> str:
+def routine_function(name: str, text: str, data: Mapping[str, str], apart: bool = False, few: bool = False) -> str:
     """A routine, its text being that of a Python function from its arguments on; ``data`` names what it closes over.
 
-    With ``apart`` a value that there is none of is not-a-number, and the others are what they are.
+    With ``apart`` a value that there is none of is not-a-number, and the others are what they are. One of ``few``
+    operands takes where they are.
     """
-    definition = ast.parse(dedent(f"    def routine{text}")).body[0]
+    source = dedent(f"    def routine{text}")
+    definition = ast.parse(source).body[0]
     assert isinstance(definition, ast.FunctionDef)
     names = {**data, **_named(definition)}
-    small = _size(definition) <= LARGE
-    assignments, locals_ = _assignments(definition, dict(names)) if apart or not small else ([], 0)
+    small, of = _size(definition) <= LARGE, _OF if few else ""
+    assignments, locals_ = _assignments(definition, source, dict(names)) if apart or not small else ([], 0)
     if apart := apart and any("&bad" in one.value for one in assignments):
         assignments, locals_ = _each_apart(assignments, locals_), 2 * locals_
     if small and not apart:
-        return _FUNCTION.format(name=name, body=function_body(definition, names))
+        return _FUNCTION.format(name=name, body=function_body(definition, names), of=of, unused="(void)of, " * few)
     if not small:
-        return _in_pieces(name, assignments, max(1, locals_), "0" if apart else "bad")
+        return _in_pieces(name, assignments, max(1, locals_), "0" if apart else "bad", of)
     body = "\n".join(f"  {one.target} = {one.value};" for one in assignments)
     return _APART.format(name=name, size=max(1, locals_), body=body)
 
 
-def _in_pieces(name: str, assignments: list[Assignment], size: int, status: str) -> str:
+def _in_pieces(name: str, assignments: list[Assignment], size: int, status: str, of: str) -> str:
     found = pieces(assignments)
     parts = [f"{name}_{i}" for i in range(len(found))]
     bodies = ("\n".join(f"  {statement}" for statement in piece) for piece in found)
-    functions = (_PIECE.format(name=part, body=body, status=status) for part, body in zip(parts, bodies, strict=True))
-    calls = " || ".join(f"{part}(p, t, x, v, out)" for part in parts)
-    return "".join((*functions, _WHOLE.format(name=name, size=size, calls=calls)))
+    given = {"status": status, "of": of, "unused": "(void)of, " if of else ""}
+    functions = (_PIECE.format(name=part, body=body, **given) for part, body in zip(parts, bodies, strict=True))
+    calls = " || ".join(f"{part}({'of, ' if of else ''}p, t, x, v, out)" for part in parts)
+    return "".join((*functions, _WHOLE.format(name=name, size=size, calls=calls, of=of)))
 
 
 def _failing(assignments: list[Assignment]) -> list[bool]:
@@ -158,14 +136,16 @@ def _size(definition: ast.FunctionDef) -> int:
     return len(definition.body) - 1 + len(last.value.elts)
 
 
-def _assignments(definition: ast.FunctionDef, names: dict[str, str]) -> tuple[list[Assignment], int]:
+def _assignments(definition: ast.FunctionDef, source: str, names: dict[str, str]) -> tuple[list[Assignment], int]:
     """The statements of a routine, with its own names in an array, and how many there are."""
     found: list[Assignment] = []
     own: dict[str, int] = {}
+    lines = source.split("\n")
 
     def add(target: str, value: ast.expr) -> None:
-        used = {node.id for node in ast.walk(value) if isinstance(node, ast.Name)}
-        found.append(Assignment(target, C.expression_of(value, names), [own[name] for name in used & own.keys()]))
+        text = lines[value.lineno - 1][value.col_offset : value.end_col_offset]
+        used = own.keys() & _WORD.findall(text)
+        found.append(Assignment(target, expression(text, names), [own[name] for name in used]))
 
     *statements, last = definition.body
     for i, statement in enumerate(statements):
@@ -229,6 +209,29 @@ C = Language(
 )
 
 
+_WORD = re.compile(r"\b[a-z_]\w*")
+
+
+def expression(text: str, names: Mapping[str, str]) -> str:
+    """Print an expression; what is written of those that differ in names alone is made once."""
+    given: list[str] = []
+
+    def slot(found: re.Match[str]) -> str:
+        if (name := names.get(found[0])) is None:
+            return found[0]
+        given.append(name)
+        return f"n{len(given) - 1}"
+
+    first, *rest = _template(_WORD.sub(slot, text))
+    return first + "".join(given[int(place)] + after for place, after in zip(rest[::2], rest[1::2], strict=True))
+
+
+@lru_cache(maxsize=1 << 12)
+def _template(text: str) -> list[str]:
+    """How an expression is printed, split at its names; each is the place that it has in the text."""
+    return C.expression(text, {name: f"@{name[1:]}@" for name in _WORD.findall(text) if name[1:].isdigit()}).split("@")
+
+
 def function_body(definition: ast.FunctionDef, names: Mapping[str, str]) -> str:
     """Print the body of a routine; ``names`` says what its arguments and data are called in C.
 
@@ -265,15 +268,15 @@ def pieces(assignments: Sequence[Assignment]) -> list[list[str]]:
 
 def _statements(assignments: Sequence[Assignment]) -> Iterator[str]:
     for level in _levels(assignments):
-        groups: dict[str, list[Assignment]] = {}
+        groups: dict[Shape, list[Operands]] = {}
         for one in level:
-            groups.setdefault(_OPERAND.sub(_shape, f"{one.target} = {one.value};"), []).append(one)
-        for group in groups.values():
-            texts = [f"{one.target} = {one.value};" for one in group]
+            shape, operands = _split(f"{one.target} = {one.value};")
+            groups.setdefault(shape, []).append(operands)
+        for shape, group in groups.items():
             if len(group) >= LEAST_LIKE:
-                yield _loop(texts)
+                yield _loop(shape, group)
             else:
-                yield from (_OPERAND.sub(lambda found: _indexed(found, found[2] or found[3]), text) for text in texts)
+                yield from (_joined(shape, operands) for operands in group)
 
 
 def _levels(assignments: Sequence[Assignment]) -> list[list[Assignment]]:
@@ -288,34 +291,40 @@ def _levels(assignments: Sequence[Assignment]) -> list[list[Assignment]]:
     return levels
 
 
-def _shape(found: re.Match[str]) -> str:
-    return f"{found[1]}[]" if found[1] else "l" if found[3] else "number"
+Shape = tuple[tuple[str, ...], tuple[str | None, ...]]  # the text between operands, and what is indexed; no number is
+Operands = tuple[str, ...]  # indices, and numbers
 
 
-def _indexed(found: re.Match[str], index: str | None) -> str:
-    """An operand, with another index in the place of its own."""
-    if found[1]:
-        return f"{found[1]}[{index}]"
-    return _OWN.format(index) if found[3] else found[4]
+def _split(statement: str) -> tuple[Shape, Operands]:
+    parts = _OPERAND.split(statement)
+    numbers = parts[4::5]
+    kinds = (kind or (None if number else "") for kind, number in zip(parts[1::5], numbers, strict=True))
+    values = zip(parts[2::5], parts[3::5], numbers, strict=True)
+    return (tuple(parts[::5]), tuple(kinds)), tuple(index or line or number for index, line, number in values)
 
 
-def _loop(texts: Sequence[str]) -> str:
+def _joined(shape: Shape, operands: Operands) -> str:
+    """A statement with operands: of an array, of the lines of a tape, whose name is empty, or numbers."""
+    (first, *between), kinds = shape
+    found = [first]
+    for kind, operand, text in zip(kinds, operands, between, strict=True):
+        found += (operand if kind is None else f"{kind}[{operand}]" if kind else _OWN.format(operand), text)
+    return "".join(found)
+
+
+def _loop(shape: Shape, group: Sequence[Operands]) -> str:
     """Statements of one shape as a loop; what is the same in all of them, or goes up evenly, needs no table."""
-    matches = [list(_OPERAND.finditer(text)) for text in texts]
-    tables: dict[bool, list[list[str]]] = {False: [], True: []}  # of indices, of numbers
+    tables: dict[bool, list[Operands]] = {False: [], True: []}  # of indices, of numbers
     names: list[str] = []
-    for column in zip(*matches, strict=True):
-        index = column[0][4] is None
-        values = [found[2] or found[3] or found[4] for found in column]
-        plain = _plain(values) if index else values[0] if len(set(values)) == 1 else None
+    for kind, values in zip(shape[1], zip(*group, strict=True), strict=True):
+        is_number = kind is None
+        plain = _plain(values) if not is_number else values[0] if len(set(values)) == 1 else None
         if plain is None:
-            tables[not index].append(values)
-            plain = f"{'of' if index else 'number'}[i][{len(tables[not index]) - 1}]"
-        names.append(_indexed(column[0], plain) if index else plain)
-    iterator = iter(names)
-    body = _OPERAND.sub(lambda _: next(iterator), texts[0])
+            tables[is_number].append(values)
+            plain = f"{'number' if is_number else 'of'}[i][{len(tables[is_number]) - 1}]"
+        names.append(plain)
     declared = "".join(_table(kind, columns) for kind, columns in tables.items() if columns)
-    return f"{{ {declared}for (int i = 0; i < {len(texts)}; i++) {body} }}"
+    return f"{{ {declared}for (int i = 0; i < {len(group)}; i++) {_joined(shape, tuple(names))} }}"
 
 
 def _plain(indices: Sequence[str]) -> str | None:

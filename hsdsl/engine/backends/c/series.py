@@ -12,7 +12,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Se
 from dataclasses import dataclass
 from itertools import chain
 
-from hsdsl.engine.backends.c.routine import LARGE, Assignment, C, pieces
+from hsdsl.engine.backends.c.routine import LARGE, Assignment, expression, pieces
 from hsdsl.engine.backends.taylor import TapeLanguage, coefficient_of, value_of
 from hsdsl.mathematics.program import Tape
 
@@ -174,7 +174,7 @@ def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], 
         operation = tape.operations[i - first]
         names = {f"n{line}": name(line) for line in operation.lines}
         names[f"c{operation.constant}"] = f"c[{operation.constant}]"
-        found.append((i, C.expression(value_of(operation, language), names)))
+        found.append((i, expression(value_of(operation, language), names)))
     return found
 
 

@@ -8,21 +8,14 @@ from __future__ import annotations
 import ast
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from itertools import count
 from textwrap import dedent
 from typing import cast
 
 from hsdsl.base.graphs import Elimination, Variation
-from hsdsl.engine.backends.c.routine import (
-    LEAST_LIKE,
-    call_of_shape,
-    function_body,
-    routine_function,
-    shape_function,
-    shape_of,
-)
+from hsdsl.engine.backends.c.routine import LEAST_LIKE, function_body, routine_function, shape_function, shape_of
 from hsdsl.engine.backends.c.series import flow_lines, is_large, line_count, piecewise, read_by_surfaces, surface_lines
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program, Queue, Routines, Tape
 
@@ -208,13 +201,19 @@ class Writer:
         self._tables: dict[tuple[str, str], str] = {}
         self._count = count()
         texts = (text for mode in program.flows for _, text in DEFINITION.findall(mode.routines.source))
-        self._alike = Counter(shape_of(text, self.data)[0] for text in dict.fromkeys(texts))
+        few = dict.fromkeys(text for text in texts if text.startswith("(*given)"))
+        self._shapes = {text: shape_of(text, self.data) for text in few}
+        self._alike = Counter(shape for shape, _ in self._shapes.values())
         self.read: dict[object, set[int]] = {}  # by the operations of flows, the lines that surfaces read
         for tape in (mode.tape for mode in program.flows if mode.tape):
             self.read.setdefault(_flow_of(tape), set()).update(read_by_surfaces(tape))
 
     def mode(self, index: int, mode: ModeProgram) -> str:
-        routine = self.routines(mode.routines)
+        texts = dict[str, str](DEFINITION.findall(mode.routines.source))
+        routine = {
+            name: self.few(text) if text in self._shapes else self.function(text, name == "outputs")
+            for name, text in texts.items()
+        }
         if mode.ends and self.timed:
             ends = {name: _BESIDE.format(routine=routine[name]) for name in ("flow", "surfaces")}
             routine |= {name: self.shared("beside", text) for name, text in ends.items()}
@@ -225,13 +224,13 @@ class Writer:
             self.table(
                 "hs_sparse", "gradients", [self.sparse(routine[f"gradient_{k}"], mode.slopes[k]) for k in mode.surfaces]
             ),
-            self.pointers(routine[f"rate_{k}"] for k in mode.surfaces),
+            self.table("hs_local", "locals", [routine[f"rate_{k}"] for k in mode.surfaces]),
             self.table("hs_edge", f"edges_{index}", edges),
             *(self.series(mode.tape, len(mode.states), mode.derived > 0) if mode.tape else ("0", "0", "0")),
-            self.sparse(self.routines(mode.jacobian.routines)["jacobian"], mode.jacobian.places),
+            self.sparse(f"{{{self.only(mode.jacobian.routines, few=True)}, 0}}", mode.jacobian.places),
             self.pattern(mode.jacobian.elimination),
             str(int(mode.affine)),
-            self.routines(mode.terms)["terms"] if mode.terms else "0",
+            self.only(mode.terms) if mode.terms else "0",
             self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
             str(-1 if mode.held is None else mode.held),
             str(len(mode.measured)),
@@ -311,16 +310,13 @@ class Writer:
         parts = [routine[name] for name in mode.conditions[k]]
         numbers = (edge.target, len(edge.target_states), int(edge.conditional), edge.priority, len(parts))
         return (
-            f"{{{', '.join(map(str, numbers))}, {self.pointers(parts)}, "
+            f"{{{', '.join(map(str, numbers))}, {self.table('hs_local', 'locals', parts)}, "
             f"{routine[f'reset_{k}']}, {routine[f'spread_{k}']}, {len(edge.changes)}, "
             f"{self.table('int', 'places', list(map(str, edge.changes)))}, "
             f"{-1 if edge.contact is None else edge.contact}, {edge.push_order}, {len(edge.counts)}, "
             f"{self.table('int', 'places', list(map(str, edge.counts)))}, {int(edge.branched)}, "
             f"{int(bool(edge.of_event))}, {int(edge.strict)}, {-1 if edge.releases is None else edge.releases}}}"
         )
-
-    def pointers(self, names: Iterable[str]) -> str:
-        return self.table("hs_routine *", "routines", list(names))
 
     def table(self, kind: str, name: str, rows: Sequence[str]) -> str:
         """Write a constant array, once for each content; C has no empty ones."""
@@ -329,13 +325,13 @@ class Writer:
         key = kind, ",\n  ".join(rows)
         if key not in self._tables:
             self._tables[key] = f"{name}_{next(self._count)}"
-            kind = "hs_routine *const" if kind == "hs_routine *" else f"const {kind}"
-            self.tables.append(f"static {kind} {self._tables[key]}[] = {{\n  {key[1]}}};\n")
+            self.tables.append(f"static const {kind} {self._tables[key]}[] = {{\n  {key[1]}}};\n")
         return self._tables[key]
 
-    def routines(self, routines: Routines) -> dict[str, str]:
-        """Write a mode's routines; returns their names in C."""
-        return {name: self.function(text, name == "outputs") for name, text in DEFINITION.findall(routines.source)}
+    def only(self, routines: Routines, few: bool = False) -> str:
+        """Write the one routine that there is."""
+        ((_, text),) = DEFINITION.findall(routines.source)
+        return self.function(text, few=few)
 
     def shared(self, kind: str, text: str) -> str:
         """Write a function whose name is ``NAME`` in its text; equal texts are one function."""
@@ -344,20 +340,23 @@ class Writer:
             self.functions[text] = text.replace("NAME", self._names[text])
         return self._names[text]
 
-    def function(self, text: str, apart: bool = False) -> str:
-        key = f"{text} # apart" if apart else text
+    def function(self, text: str, apart: bool = False, few: bool = False) -> str:
+        """Write a routine; returns its name."""
+        key = f"{text} # {apart} {few}"
         if key not in self.functions:
             self._names[key] = name = f"routine_{len(self.functions)}"
-            self.functions[key] = self._like_others(name, text) or routine_function(name, text, self.data, apart)
+            self.functions[key] = routine_function(name, text, self.data, apart, few)
         return self._names[key]
 
-    def _like_others(self, name: str, text: str) -> str | None:
-        """A routine that calls the one of its shape with its own operands; None where few are alike."""
-        shape, operands = shape_of(text, self.data)
+    def few(self, text: str) -> str:
+        """Write a routine of few operands: the function, and where the operands are if many routines are alike."""
+        shape, operands = self._shapes[text]
         if not operands or self._alike[shape] < LEAST_LIKE:
-            return None
-        kind = self.shared("shape", shape_function(shape, operands))
-        return call_of_shape(name, kind, operands)
+            return f"{{{self.function(text, few=True)}, 0}}"
+        if shape not in self.functions:
+            self._names[shape] = name = f"shape_{len(self.functions)}"
+            self.functions[shape] = shape_function(name, shape, operands)
+        return f"{{{self._names[shape]}, {self.table('int', 'of', [operand[2:-1] for operand in operands])}}}"
 
 
 def _flow_of(tape: Tape) -> object:

@@ -14,7 +14,7 @@ static hs_real state_size(const hs_run *run, int s) { return hs_max(run->scales[
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope) {
   const int n = run->here.dimension;
   const hs_sparse *const rows = &run->here.table->jacobian;
-  if (rows->values(run->here.p, t, x, run->jacobian)) return RAISED;
+  if (hs_call(&rows->values, run->here.p, t, x, run->jacobian)) return RAISED;
   for (int i = 0; i < n; i++) run->flow_sizes[i] = fabs(slope[i]);
   for (int k = 0; k < rows->count; k++) {
     hs_real *const size = &run->flow_sizes[rows->place[k] / n];
@@ -44,7 +44,8 @@ static void start_sizes(hs_run *run, int mode, hs_time t) {
   const int n = table->dimension;
   const hs_real *const p = segment_data(run, segment_at(run->task->timeline, t));
   hs_real back = 0.0, all = 0.0, *const first = run->at, *const moved = run->near;
-  if (table->held < 0 || table->flow(p, t, run->x, first) || rows->values(p, t, run->x, run->jacobian)) return;
+  if (table->held < 0 || table->flow(p, t, run->x, first)) return;
+  if (hs_call(&rows->values, p, t, run->x, run->jacobian)) return;
   for (int i = 0; i < n; i++) moved[i] = 0.0;
   for (int e = 0; e < rows->count; e++) {
     const int i = rows->place[e] / n, k = rows->place[e] % n;
@@ -67,7 +68,7 @@ static int reset_but_counts(hs_run *run, int k, hs_time t, const hs_real *x, hs_
   const hs_mode *const own = run->here.table;
   const hs_edge *const edge = &own->edge[k];
   const hs_edge *const by = edge->branched ? &run->model->mode[own->held].edge[k] : edge;
-  if (hs_changed(by, by->reset, run->here.p, t, x, x, out)) return RAISED;
+  if (hs_changed(by, &by->reset, run->here.p, t, x, x, out)) return RAISED;
   for (int i = 0; i < edge->counts; i++) out[edge->count[i]] = x[edge->count[i]];
   return 0;
 }
@@ -181,7 +182,8 @@ static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
       if (!sized) sized = here->table->flow(here->p, t, x, run->end) || flow_sizes(run, t, x, run->end) ? -1 : 1;
       const hs_sparse *const row = &here->table->gradients[k];
       hs_real rate, size = 0.0;
-      if (sized < 0 || row->values(here->p, t, x, run->gradient) || here->table->rates[k](here->p, t, x, &rate)) continue;
+      if (sized < 0 || hs_call(&row->values, here->p, t, x, run->gradient)) continue;
+      if (hs_call(&here->table->rates[k], here->p, t, x, &rate)) continue;
       for (int i = 0; i < row->count; i++)
         size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
       if (!(fabs(rate) <= ZERO_UNITS * HS_UNIT * size)) continue; /* the flow is not tangent to it, to round-off */
@@ -567,7 +569,7 @@ static int is_near(hs_run *run) {
   for (int k = 0; k < own->edges; k++) {
     if (!run->tail[k]) continue;
     hs_real last = run->values[k];
-    if (own->edge[k].push_order == 2 && own->rates[k](run->here.p, t, run->x, &last)) return RAISED;
+    if (own->edge[k].push_order == 2 && hs_call(&own->rates[k], run->here.p, t, run->x, &last)) return RAISED;
     if (!(fabs(last) <= run->epsilon * run->magnitudes[k])) return 0;
   }
   return 1;

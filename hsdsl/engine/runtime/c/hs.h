@@ -34,6 +34,17 @@ typedef hs_real hs_number;
 
 typedef int hs_routine(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
 
+/* A routine of few operands. Parts that are alike have one function, and each says `of` which operands it is. */
+typedef int hs_shape(const int *of, const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
+typedef struct {
+  hs_shape *shape;
+  const int *of;
+} hs_local;
+
+static inline int hs_call(const hs_local *local, const hs_real *p, hs_real t, const hs_real *x, hs_real *out) {
+  return local->shape(local->of, p, t, x, out);
+}
+
 /* Taylor coefficients along the flow through (t, x), of all lines that it needs: coefficient m of line l goes to
    lines[l*(order + 2) + m]. Line 0 is time, lines 1 to n are the states, with coefficients 0 to order + 1; the others
    have those from 0 to order, where something reads them. No value where one of them has none. */
@@ -45,7 +56,7 @@ typedef int hs_surface_series(const hs_real *p, int order, hs_real *lines);
 
 /* Values that are not zero everywhere, and their places. */
 typedef struct {
-  hs_routine *values;
+  hs_local values;
   int count;
   const int *place;
 } hs_sparse;
@@ -83,9 +94,9 @@ typedef struct {
   int conditional;      /* whether it has an `if` */
   int priority;
   int parts; /* of the condition, which holds where all parts do */
-  hs_routine *const *condition;
-  hs_routine *reset; /* of the states that it changes: the others keep their values, where there are any */
-  hs_routine *spread;
+  const hs_local *condition;
+  hs_local reset; /* of the states that it changes: the others keep their values, where there are any */
+  hs_local spread;
   int changes;
   const int *change;
   int contact;    /* number of the motion along its guard; -1 for none */
@@ -117,7 +128,7 @@ typedef struct {
   hs_routine *magnitudes;
   hs_routine *outputs;
   const hs_sparse *gradients; /* by time, place 0, and the states */
-  hs_routine *const *rates;
+  const hs_local *rates;
   const hs_edge *edge;
   hs_series *series; /* 0 where the flow is kinked; then a mode has no other series */
   hs_surface_series *surface_series;
@@ -164,9 +175,9 @@ static inline void hs_spread_out(const hs_sparse *sparse, int size, hs_real *out
 }
 
 /* What an edge's routine, its reset or its spread, makes of the values `before` of the states, to `out`. */
-static inline int hs_changed(const hs_edge *edge, hs_routine *routine, const hs_real *p, hs_real t, const hs_real *x,
+static inline int hs_changed(const hs_edge *edge, const hs_local *routine, const hs_real *p, hs_real t, const hs_real *x,
                              const hs_real *before, hs_real *out) {
-  if (routine(p, t, x, out)) return 1;
+  if (hs_call(routine, p, t, x, out)) return 1;
   int i = edge->changes;
   if (i == edge->target_dimension) return 0;
   for (int k = edge->target_dimension; k-- > 0;)

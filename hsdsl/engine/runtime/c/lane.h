@@ -186,12 +186,18 @@ HS_INLINE hs_wide wide_sqrt(hs_wide x, int *bad) {
 typedef int hs_lane_routine(const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
 
 typedef struct {
-  hs_lane_routine *values;
+  int (*shape)(const int *of, const hs_real *p, hs_real t, const hs_real *x, hs_real *out);
+  const int *of;
+} hs_lane_local;
+
+typedef struct {
+  hs_lane_local values;
   int count;
   const int *place;
 } hs_lane_sparse;
 
 #define hs_routine hs_lane_routine
+#define hs_local hs_lane_local
 #define hs_sparse hs_lane_sparse
 
 typedef struct {
@@ -203,7 +209,7 @@ typedef struct {
   int edges;
   hs_lane_routine *magnitudes;
   const hs_lane_sparse *gradients;
-  hs_lane_routine *const *rates;
+  const hs_lane_local *rates;
 } hs_lane_mode;
 
 #endif

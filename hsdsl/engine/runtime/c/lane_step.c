@@ -72,7 +72,7 @@ static int bound_of(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real 
   const hs_lane_sparse *const row = &mode->gradients[k];
   const hs_mask standing = ((hs_real *)l->standing)[k] != 0;
   hs_real *const g = (hs_real *)l->gradient, total = magnitude, sum = t * 0;
-  if (row->values((hs_real *)l->p, t, x, g)) return 1;
+  if (row->values.shape(row->values.of, (hs_real *)l->p, t, x, g)) return 1;
   for (int i = 0; i < row->count; i++) {
     const int s = row->place[i] - 1;
     const hs_real size = s < 0 ? fabs(t) : hs_choose(standing, fabs(((hs_real *)l->scale)[s]), t * 0);
@@ -272,7 +272,7 @@ static hs_mask counts_alone(const hs_lane_mode *mode, const hs_lanes *l, const h
     if (k < mode->edges) alone &= ~other | ~(values[k] > 0);
     if (!hs_any(rises)) continue;
     if (bound_of(mode, l, k, time, q, weights[k], &noise)) return alone & ~alone;
-    if (mode->rates[k]((hs_real *)l->p, time, q, &rate)) return alone & ~alone;
+    if (mode->rates[k].shape(mode->rates[k].of, (hs_real *)l->p, time, q, &rate)) return alone & ~alone;
     alone &= ~rises | ((shares[k] > theta) & (values[k] < -hs_max(noise, fabs(rate) * (HS_TIE * fabs(time)))));
   }
   return alone;

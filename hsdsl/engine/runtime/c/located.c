@@ -324,7 +324,7 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
   if (!may_be_reached(run, k)) return 0;
   const hs_real slope = slope_of(c, n, 1.0);
   if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
-  if (run->here.table->rates[k](run->here.p, span->t1, run->z, &rate)) return RAISED;
+  if (hs_call(&run->here.table->rates[k], run->here.p, span->t1, run->z, &rate)) return RAISED;
   crossing->time = span->t1;
   copy(crossing->state, run->z, run->here.dimension);
   if (rate > 0) {
@@ -455,7 +455,7 @@ static int mark_behind(hs_run *run, const hs_crossing *first) {
                    magnitudes_at(run, first->time, first->state, run->magnitudes)))
       return RAISED;
     known = 1;
-    if (mode->rates[k](run->here.p, first->time, first->state, &rate)) continue;
+    if (hs_call(&mode->rates[k], run->here.p, first->time, first->state, &rate)) continue;
     const hs_real noise = bound_from(run, run->magnitudes, k, first->time, first->state, 0);
     run->beyond[k] = run->values[k] < -hs_max(noise, fabs(rate) * since);
   }

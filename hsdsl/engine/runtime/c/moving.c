@@ -39,7 +39,7 @@ static void move_crossing(hs_run *run) {
   const hs_formulas *const f = &moves_of(run)->formulas[here->mode];
   const int n = here->table->dimension;
   hs_real rate, *const q = crossing->state, *const slope = run->error;
-  if (here->table->rates[crossing->edge](here->p, crossing->time, q, &rate) || !(rate > 0)) return;
+  if (hs_call(&here->table->rates[crossing->edge], here->p, crossing->time, q, &rate) || !(rate > 0)) return;
   if (here->table->flow(here->p, crossing->time, q, slope)) return;
   hs_rounded *const v = bound_registers(run, 1);
   rounded_formula(f, &f->surfaces, n, run->model->data, crossing->time, q, v, 1);

@@ -64,7 +64,7 @@ static int terms_at(hs_run *run, hs_time t, const hs_real *x, const hs_real *siz
 }
 
 static int derivatives_at(hs_run *run, hs_time t, const hs_real *x, hs_real *rows) {
-  return run->here.table->jacobian.values(run->here.p, t, x, rows) ? RAISED : 0;
+  return hs_call(&run->here.table->jacobian.values, run->here.p, t, x, rows) ? RAISED : 0;
 }
 
 static int flow_between(hs_run *run, int k, hs_time t, const hs_real *x, hs_time t1, const hs_real *z, hs_real s,

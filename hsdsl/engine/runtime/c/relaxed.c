@@ -17,7 +17,7 @@ static hs_found failure(hs_step_failure kind, int surface) {
 static int norm_of(hs_run *run, hs_time t, const hs_real *x, int k, hs_real *norm) {
   hs_real total = 0.0;
   const hs_sparse *const row = &run->here.table->gradients[k];
-  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  if (hs_call(&row->values, run->here.p, t, x, run->gradient)) return RAISED;
   for (int i = 0; i < row->count; i++) total = total + run->gradient[i] * run->gradient[i];
   *norm = sqrt(total);
   return 0;
@@ -85,7 +85,7 @@ static int beyond_within(hs_run *run, hs_trial *trial, int k) {
 
 static int rate_along(hs_run *run, int k, hs_time t, const hs_real *x, const hs_real *flow, hs_real *rate) {
   const hs_sparse *const row = &run->here.table->gradients[k];
-  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  if (hs_call(&row->values, run->here.p, t, x, run->gradient)) return RAISED;
   *rate = 0.0;
   for (int i = 0; i < row->count; i++)
     *rate = *rate + run->gradient[i] * (row->place[i] ? flow[row->place[i] - 1] : 1.0);
@@ -160,7 +160,7 @@ static int crossed_on(hs_run *run, const hs_polynomial *piece, int k, hs_crossin
 /* How far the flow at a crossing would take surface k back inside over this step. */
 static int back_of(hs_run *run, int k, const hs_crossing *crossing, hs_real *back) {
   hs_real rate;
-  if (run->here.table->rates[k](run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
+  if (hs_call(&run->here.table->rates[k], run->here.p, crossing->time, crossing->state, &rate)) return RAISED;
   *back = -rate * run->trial.h;
   return 0;
 }

@@ -204,7 +204,7 @@ HS_INLINE int factor_correction(hs_view *v, const hs_shadow *c, int n) {
   const hs_sparse *const rows = &c->table->jacobian;
   const hs_elimination *const of = n > SMALL ? c->table->elimination : 0;
   double *const a = v->factors, *const unit = v->z, *const sizes = v->slope;
-  if (rows->values(c->p, c->t + c->h, x, v->derivatives)) return 1;
+  if (hs_call(&rows->values, c->p, c->t + c->h, x, v->derivatives)) return 1;
   const int size = of ? of->size : n * n;
   for (int i = 0; i < size; i++) a[i] = 0.0;
   for (int i = 0; i < rows->count; i++) a[of ? of->place[i] : rows->place[i]] = away * v->derivatives[i];
@@ -382,7 +382,8 @@ static int shadow_crosses(hs_view *v, hs_shadow *c, int k) {
   const double beyond = beyond_value(v->traced[v->f->surfaces.result[k]]);
   copy(c->y, c->x, c->table->dimension);
   for (int i = 0; i < MOST_CHANGES && fabs(change) > CLOSED_IN * tie; i++) {
-    if (c->table->values(c->p, c->t + s, c->y, v->values) || c->table->rates[k](c->p, c->t + s, c->y, &rate)) return 0;
+    if (c->table->values(c->p, c->t + s, c->y, v->values)) return 0;
+    if (hs_call(&c->table->rates[k], c->p, c->t + s, c->y, &rate)) return 0;
     if (!(rate > 0)) return 0;
     change = (v->values[k] + beyond) / rate;
     s -= change;

@@ -29,7 +29,7 @@ static int condition_of(const hs_edge *edge, const double *p, double t, const do
   int answer = 1;
   for (int i = 0; i < edge->parts; i++) {
     double holds;
-    if (edge->condition[i](p, t, x, &holds)) answer = -1;
+    if (hs_call(&edge->condition[i], p, t, x, &holds)) answer = -1;
     else if (holds == 0.0) return 0;
   }
   return answer;
@@ -47,7 +47,7 @@ static int goes_at_once(hs_view *v, const hs_mode *table, const double *p, doubl
     const hs_edge *const edge = &table->edge[k];
     double rate;
     v->row = &table->gradients[k];
-    if (v->row->values(p, t, x, v->gradient) || table->rates[k](p, t, x, &rate)) return -2;
+    if (hs_call(&v->row->values, p, t, x, v->gradient) || hs_call(&table->rates[k], p, t, x, &rate)) return -2;
     const double r = v->values[k], near = hs_max(surface_roundoff(v, v->magnitudes[k], t, x), fabs(rate) * since);
     if (!hs_finite(near)) return -2;
     if (r > near && !edge->conditional && is_first(table, k, beyond)) beyond = k;
@@ -77,7 +77,7 @@ static int land_after(hs_view *v, const hs_tied *tied, int k, hs_landed *landed)
   copy(landed->x, tied->x, table->dimension);
   for (int i = 0; i < LONGEST; i++) {
     const hs_edge *const edge = &table->edge[k];
-    if (hs_changed(edge, edge->reset, p, tied->t, landed->x, landed->x, v->x)) return 0;
+    if (hs_changed(edge, &edge->reset, p, tied->t, landed->x, landed->x, v->x)) return 0;
     if (needs_tail(table, &model->mode[edge->target], landed->x, v->x)) return 0;
     copy(landed->x, v->x, edge->target_dimension);
     landed->mode = edge->target, landed->dimension = edge->target_dimension;
@@ -129,7 +129,8 @@ static int ties_commute(hs_view *v, int64_t j) {
 /* Surface k at a point, of which `values` and `magnitudes` are known; not 0 where something has no value. */
 static int near_surface(hs_view *v, int k, double t, const double *x, hs_near_surface *found) {
   const hs_sparse *const row = v->row = &v->table->gradients[k];
-  if (row->values(v->p, t, x, v->gradient) || v->table->rates[k](v->p, t, x, &found->rate)) return 1;
+  if (hs_call(&row->values, v->p, t, x, v->gradient)) return 1;
+  if (hs_call(&v->table->rates[k], v->p, t, x, &found->rate)) return 1;
   found->value = v->values[k];
   found->roundoff = surface_roundoff(v, v->magnitudes[k], t, x);
   found->error = surface_error(v, t);
@@ -255,7 +256,7 @@ static int off_line(const hs_view *v, int mode, const double *here, const double
 static int reset_bends(hs_view *v, const hs_transition *made, const double *x) {
   const hs_edge *const edge = &v->table->edge[made->edge];
   if (!v->f->curved[made->edge] || v->s->model->mode[edge->target].final) return 0;
-  if (hs_changed(edge, edge->reset, v->p, made->time, x, x, v->y)) return 1;
+  if (hs_changed(edge, &edge->reset, v->p, made->time, x, x, v->y)) return 1;
   for (int i = -1; i < v->n; i++) {
     const double wide = SAFE * (i < 0 ? time_error_at(v, made->time) : v->mode_error[i]);
     double *const ends[] = {v->z, v->slope};
@@ -264,7 +265,7 @@ static int reset_bends(hs_view *v, const hs_transition *made, const double *x) {
       const double by = side ? wide : -wide;
       copy(v->x, x, v->n);
       if (i >= 0) v->x[i] = x[i] + by;
-      if (hs_changed(edge, edge->reset, v->p, i < 0 ? made->time + by : made->time, v->x, v->x, ends[side])) return 1;
+      if (hs_changed(edge, &edge->reset, v->p, i < 0 ? made->time + by : made->time, v->x, v->x, ends[side])) return 1;
     }
     if (off_line(v, edge->target, v->y, v->z, v->slope)) return 1;
   }
@@ -295,7 +296,7 @@ static double height_behind(hs_view *v, int k, double t, const double *x, double
     for (int i = 0; i < v->n; i++) v->z[i] = v->z[i] + late * v->slope[i];
     bind(v, v->mode, there + 1);
     t = end;
-    if (v->table->rates[k](v->p, t, v->z, &rate)) return 0.0;
+    if (hs_call(&v->table->rates[k], v->p, t, v->z, &rate)) return 0.0;
     if (!(rate > 0)) return height;
   }
   return INFINITY;
@@ -322,7 +323,7 @@ static void screen_crossing(hs_view *v, int64_t j, int flown) {
       const double begin = s->run.times[row], middle = begin + (s->run.times[v->last] - begin) / 2;
       bind(v, v->mode, segment_at(s->timeline, middle));
       along_step(v, &s->run, row, 0.5, v->z);
-      bad = v->table->rates[made->edge](v->p, middle, v->z, &rate);
+      bad = hs_call(&v->table->rates[made->edge], v->p, middle, v->z, &rate);
       if (!bad && t > middle) bend = fabs(found.rate - rate) / (t - middle);
     }
     if (!bad) height = height_behind(v, made->edge, t, x, found.rate, SAFE * found.error);

@@ -82,7 +82,7 @@ static int flow_hides(hs_view *v, int64_t row) {
 /* Rates of all surfaces at a point; not-a-number where there is none. */
 static void all_rates(hs_view *v, double t, const double *x, double *to) {
   for (int k = 0; k < v->table->surfaces; k++)
-    if (v->table->rates[k](v->p, t, x, &to[k])) to[k] = NAN;
+    if (hs_call(&v->table->rates[k], v->p, t, x, &to[k])) to[k] = NAN;
 }
 
 /* Whether the rate of a surface is not zero for round-off alone where a step begins, and is not above zero at its end. */
@@ -128,7 +128,7 @@ static void note_near_miss(hs_view *v, int64_t row) {
 static int rate_within(hs_view *v, const hs_near_miss *miss, double share, double *rate) {
   const double *const times = v->s->run.times + miss->row;
   along_step(v, &v->s->run, miss->row, share, v->z);
-  return v->table->rates[miss->surface](v->p, times[0] + share * (times[1] - times[0]), v->z, rate);
+  return hs_call(&v->table->rates[miss->surface], v->p, times[0] + share * (times[1] - times[0]), v->z, rate);
 }
 
 /* Close in on a turning point from both ends of its step (Illinois): the share of the step, or not-a-number. */

@@ -46,7 +46,7 @@ static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r) 
 /* The slopes of surface k by time and all states, to run->gradient. */
 static int gradient_of(hs_run *run, int k, hs_time t, const hs_real *x) {
   const hs_sparse *const row = &run->here.table->gradients[k];
-  if (row->values(run->here.p, t, x, run->gradient)) return RAISED;
+  if (hs_call(&row->values, run->here.p, t, x, run->gradient)) return RAISED;
   hs_spread_out(row, run->here.dimension + 1, run->gradient);
   return 0;
 }
@@ -62,7 +62,7 @@ static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time
   hs_real total = magnitudes[k];
   const hs_sparse *const row = &here->table->gradients[k];
   hs_real *const g = run->gradient;
-  if (!row->values(here->p, t, x, g) && hs_finite(sum_of(g, row->count))) {
+  if (!hs_call(&row->values, here->p, t, x, g) && hs_finite(sum_of(g, row->count))) {
     const int push = is_push(run, k), scaled = entry || run->active_surfaces[k];
     for (int i = 0; i < row->count; i++) {
       const int s = row->place[i] - 1;
@@ -110,12 +110,12 @@ static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_
     noise = hs_max(bound_from(run, run->magnitudes, k, t, run->x, 1), fabs(run->stood[k]));
     run->stood[k] = 0.0;
     if (since != 0 && fabs(values[k]) > noise) {
-      if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
+      if (hs_call(&run->here.table->rates[k], run->here.p, t, run->x, &rate)) return RAISED;
       noise = hs_max(noise, fabs(rate) * since);
     }
     if (values[k] > noise && !(then[k] > noise)) {
       run->active_surfaces[k] = 1, run->here.active++;
-      if (run->here.table->rates[k](run->here.p, t, run->x, &rate)) return RAISED;
+      if (hs_call(&run->here.table->rates[k], run->here.p, t, run->x, &rate)) return RAISED;
       if (rate < 0) run->emerging[k] = 1, run->here.emerging++;
     } else if (values[k] > noise || (inside && values[k] >= -noise))
       beyond[k] = 1;
@@ -152,7 +152,7 @@ static void leave(hs_run *run, hs_time t, const hs_real *x) {
   for (int k = 0; run->here.emerging && k < mode->surfaces; k++) {
     hs_real rate = 0.0;
     if (!run->emerging[k]) continue;
-    if (!(run->values[k] <= 0) && (run->here.table->rates[k](run->here.p, t, x, &rate) || rate < 0)) continue;
+    if (!(run->values[k] <= 0) && (hs_call(&run->here.table->rates[k], run->here.p, t, x, &rate) || rate < 0)) continue;
     run->emerging[k] = 0, run->here.emerging--;
   }
 }
@@ -163,7 +163,7 @@ static int condition(hs_run *run, int k, hs_time t, const hs_real *x) {
   int answer = 1;
   for (int i = 0; i < edge->parts; i++) {
     hs_real holds;
-    if (edge->condition[i](run->here.p, t, x, &holds))
+    if (hs_call(&edge->condition[i], run->here.p, t, x, &holds))
       answer = RAISED;
     else if (holds == 0.0)
       return 0;
@@ -176,7 +176,8 @@ static int points_out(hs_run *run, int k, hs_time t, const hs_real *x, hs_real r
   const hs_sparse *const row = &run->here.table->gradients[k];
   hs_real size = 0.0;
   if (!(rate > 0)) return 0;
-  if (row->values(run->here.p, t, x, run->gradient) || run->here.table->flow(run->here.p, t, x, run->near)) return 0;
+  if (hs_call(&row->values, run->here.p, t, x, run->gradient)) return 0;
+  if (run->here.table->flow(run->here.p, t, x, run->near)) return 0;
   for (int i = 0; i < row->count; i++)
     size = size + fabs(run->gradient[i]) * (row->place[i] ? fabs(run->near[row->place[i] - 1]) : 1.0);
   return rate > ROUNDOFF_UNITS * HS_UNIT * size;
@@ -188,7 +189,7 @@ static int turns_back(hs_run *run, int k, hs_time t, const hs_real *x, hs_real r
   hs_real later, bend;
   if (!(since > 0)) return 0;
   for (int s = 0; s < run->here.dimension; s++) run->nearby[s] = x[s] + since * run->near[s];
-  if (run->here.table->rates[k](run->here.p, t + since, run->nearby, &later)) return 0;
+  if (hs_call(&run->here.table->rates[k], run->here.p, t + since, run->nearby, &later)) return 0;
   bend = (rate - later) / since;
   return bend > 0 && rate * rate <= 2 * bend * room;
 }
@@ -209,7 +210,7 @@ static void standing(hs_run *run, hs_time t, const hs_real *x, hs_real since) {
     if (run->tied[k]) continue;
     if (!known && (mode->values(run->here.p, t, x, run->values) || magnitudes_at(run, t, x, run->magnitudes))) return;
     known = 1;
-    if (releases(run, k) || too_late(run, k, t, since) || mode->rates[k](run->here.p, t, x, &rate)) continue;
+    if (releases(run, k) || too_late(run, k, t, since) || hs_call(&mode->rates[k], run->here.p, t, x, &rate)) continue;
     const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
     const int near = fabs(run->values[k]) <= hs_max(noise, rate * since);
     if (!near || !points_out(run, k, t, x, rate)) continue;
@@ -427,7 +428,7 @@ static int affine_curves(hs_run *run, hs_real share) {
   for (int k = 0; k < mode->surfaces; k++) {
     hs_real *const c = coefficients_of(found, 0, k);
     const hs_sparse *const row = &mode->gradients[k];
-    if (row->values(run->here.p, span->t, run->x, run->gradient)) return RAISED;
+    if (hs_call(&row->values, run->here.p, span->t, run->x, run->gradient)) return RAISED;
     c[0] = run->values[k];
     const hs_real sizes =
         affine_curve(&span->piece, run->width, span->h, row, run->gradient, c, degree_of(found, 0, k));

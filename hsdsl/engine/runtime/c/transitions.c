@@ -45,12 +45,13 @@ static int reset(hs_run *run, const hs_real *scale) {
   const hs_edge *edge = &run->here.table->edge[crossing->edge];
   const int n = run->here.dimension, to = edge->target_dimension;
   hs_real *const sizes = run->error;
-  if (hs_changed(edge, edge->reset, run->here.p, crossing->time, crossing->state, crossing->state, run->after)) return 1;
+  const hs_real *const x = crossing->state;
+  if (hs_changed(edge, &edge->reset, run->here.p, crossing->time, x, x, run->after)) return 1;
   if (!all_finite(run->after, to)) return 1;
   HS_MOVE(run, move_reset(run));
   copy(run->both, crossing->state, n);
   copy(run->both + n, scale, n);
-  if (hs_changed(edge, edge->spread, run->here.p, crossing->time, run->both, scale, sizes) || !all_finite(sizes, to))
+  if (hs_changed(edge, &edge->spread, run->here.p, crossing->time, run->both, scale, sizes) || !all_finite(sizes, to))
     for (int s = 0; s < to; s++) sizes[s] = fabs(run->after[s]); /* where it is infinitely steep, no more is known */
   copy(run->both, sizes, to);
   return 0;

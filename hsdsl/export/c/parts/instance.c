@@ -189,7 +189,7 @@ const hs_real *hs_landing(const hs_instance *instance, const hs_transition_writt
   if (written->after) return written->after;
   while (k > 0 && made->time < timeline->start[k]) k--;
   const hs_real *p = timeline->data + k * PROBLEM_DATA, *before = written->before;
-  return hs_changed(edge, edge->reset, p, made->time, before, before, x) ? before : x;
+  return hs_changed(edge, &edge->reset, p, made->time, before, before, x) ? before : x;
 }
 
 /* Why no step leads on: where a state changes faster than time can tell, it grows beyond all numbers. */

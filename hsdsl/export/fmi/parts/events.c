@@ -40,7 +40,7 @@ void fmu_enter(fmu *unit, int mode, int edge, const double *after) {
 
 /* The state behind the reset of edge k. */
 static int reset_of(const hs_mode *mode, int k, const double *p, double t, const double *x, double *after) {
-  return hs_changed(&mode->edge[k], mode->edge[k].reset, p, t, x, x, after);
+  return hs_changed(&mode->edge[k], &mode->edge[k].reset, p, t, x, x, after);
 }
 
 /* The slope of surface k's rate along the flow: positive where the flow pushes the state out. */
@@ -56,7 +56,7 @@ static int push_of(const hs_mode *mode, int k, const double *p, double t, const 
 static int holds(const hs_mode *mode, int k, const double *p, double t, const double *x) {
   double answer;
   for (int i = 0; i < mode->edge[k].parts; i++)
-    if (mode->edge[k].condition[i](p, t, x, &answer) || answer == 0.0) return 0;
+    if (hs_call(&mode->edge[k].condition[i], p, t, x, &answer) || answer == 0.0) return 0;
   return 1;
 }
 

@@ -22,7 +22,7 @@
 
 /* The rate of a surface along the flow. */
 int fmu_rate_of(const hs_mode *mode, int k, const double *p, double t, const double *x, double *rate) {
-  return mode->rates[k](p, t, x, rate) || !hs_finite(*rate);
+  return hs_call(&mode->rates[k], p, t, x, rate) || !hs_finite(*rate);
 }
 
 const hs_mode *fmu_table(const fmu *unit) {
@@ -32,7 +32,7 @@ const hs_mode *fmu_table(const fmu *unit) {
 
 /* All slopes of surface k, by time and the states. */
 static int gradient_of(const hs_mode *mode, int k, const double *p, double t, const double *x, double *out) {
-  if (mode->gradients[k].values(p, t, x, out)) return 1;
+  if (hs_call(&mode->gradients[k].values, p, t, x, out)) return 1;
   hs_spread_out(&mode->gradients[k], mode->dimension + 1, out);
   return 0;
 }

@@ -43,6 +43,7 @@ class Board:
     parameters: dict[str, Meaning] = field(default_factory=dict)
     timed: dict[str, None] = field(default_factory=dict)
     _known: dict[tuple[Any, ...], Meaning] = field(default_factory=dict)
+    _indices: dict[tuple[str, int | None], int | Refusal] = field(default_factory=dict)
     _solved: dict[tuple[str, str], Meanings] = field(default_factory=dict)
     _solving: list[tuple[str, str]] = field(default_factory=list)
     _active: list[tuple[str, str]] = field(default_factory=list)
@@ -172,6 +173,12 @@ class Board:
 
     def _index(self, text: str, names: Names) -> int | Refusal:
         """The whole number that an index is."""
+        key = text, names.index
+        if key not in self._indices:
+            self._indices[key] = self._worked_out(text, names)
+        return self._indices[key]
+
+    def _worked_out(self, text: str, names: Names) -> int | Refusal:
         known: dict[str, Meaning] = {} if names.index is None else {"index": whole_value(names.index)}
         try:
             value = resolved_expression(text, Scope(known))
