@@ -363,7 +363,7 @@ def test_slices_of_more_names_than_axes(model, tmp_path, monkeypatch):
     assert of.values.tolist() == np.concatenate([*rows["before.v"]]).tolist()
     assert c.values[where].tolist() == np.repeat(rows.c, rows.transitions).tolist()
     for at, sentence in (
-        ({"h": 1}, "no grid varies 'h'"),
+        ({"h": 1}, "nothing varies 'h'"),
         ({"g": 11}, "expected 9 to 10"),
         (dict.fromkeys(vary, 8), "c: exp"),
     ):
@@ -372,6 +372,20 @@ def test_slices_of_more_names_than_axes(model, tmp_path, monkeypatch):
     with pytest.raises(UsageError, match=r"a map shows two varied names, got c, initial.v, g") as refusal:
         found.plot("p.svg", "final.x")
     assert refusal.value.hint == "draw a slice: --slice g=9"
+
+
+def test_a_slice_of_a_draw_has_the_nearest_tenth_of_the_rows(model, tmp_path, monkeypatch):
+    from hsdsl.analysis.plot import analyses
+
+    vary = ["c~uniform(0.5, 0.9)", "initial.v=4,6", "g=9,10"]
+    found, drawn = model.sweep(vary, tmp_path / "s", random=50, processes=1), []
+    monkeypatch.setattr(analyses, "plot_map", lambda path, *given: drawn.extend(given))
+    found.plot("p.svg", "final.x", at={"c": 0.7})
+    table = found.to_pandas()
+    off = (table.c - 0.7).abs()
+    rows = table[off <= off.nsmallest(20).max()]
+    assert len(rows) == 20 and sorted(drawn[2].values.tolist()) == sorted(rows["final.x"].tolist())
+    assert drawn[3] == "A ball that is thrown, c near 0.7"
 
 
 def test_the_worst_and_the_best_rows(model, tmp_path):

@@ -20,6 +20,7 @@ from hsdsl.analysis.plot.style import (
     heading,
     label,
     legend_below,
+    pale,
     time_label,
     to_file,
     whole_ticks,
@@ -239,6 +240,7 @@ def plot_family(curves: Sequence[tuple[Any, Any]], by: Axis, label: str, title: 
     known = by.values[np.isfinite(by.values)]
     low, high = (known.min(), known.max()) if len(known) else (0.0, 1.0)
     lines = LineCollection([np.column_stack(each) for each in curves], cmap="viridis", linewidths=0.9)
+    lines.set(alpha=pale(len(curves)))
     lines.set(array=by.values, norm="log" if by.logarithmic else None, clim=(low, high), rasterized=True)
     axes.add_collection(lines)
     axes.autoscale_view()
@@ -251,14 +253,14 @@ def plot_family(curves: Sequence[tuple[Any, Any]], by: Axis, label: str, title: 
 def plot_map(x: Axis, y: Axis, of: Quantity, title: str) -> Figure:
     """Draw a number or a word over two names: cells where both have grids, else dots; grey where there is none."""
     figure, axes = _empty()
-    axes.set_facecolor("#dddddd")
     shades: dict[str, Any] = {"cmap": "viridis"}
     values = of.values
     if of.words:
         values, shades = _by_words(of)
     if x.grid is None or y.grid is None:
-        drawn: Any = axes.scatter(x.values, y.values, c=values, s=6, linewidths=0, **shades)
+        drawn: Any = axes.scatter(x.values, y.values, c=values, s=12, linewidths=0, **shades)
     else:
+        axes.set_facecolor("#dddddd")
         drawn = axes.pcolormesh(*_cells(x, y, values), rasterized=True, **shades)
     _legend(figure, axes, drawn, of)
     axes.set_ylabel(y.label, parse_math=False)

@@ -121,7 +121,7 @@ def plot_residuals(
         axis.plot(times, column, ".", color=RUNS[1], markersize=max(3.0, 7.0 - len(times) / 50))
         for time in made.tolist():
             axis.axvline(time, color=FAINT, linewidth=0.9, linestyle="dotted")
-        often.hist(known, bins="auto", orientation="horizontal", color=RUNS[1])
+        often.hist(known, bins="auto", orientation="horizontal", color=RUNS[1], edgecolor="white")
         often.tick_params(labelleft=False)
         axis.set_ylabel("residual of " + label(name, units), parse_math=False)
     axes[-1, 0].set_xlabel(time_label(units), parse_math=False)

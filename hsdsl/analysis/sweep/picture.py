@@ -2,7 +2,8 @@
 """Pictures of a sweep: what one shows, checked before anything is run, and drawn from the dataset.
 
 A column of lists gives a bifurcation diagram over one name, samples give curves over time. A column of numbers or words
-gives a curve over one name, a map over two. Of more names a slice is drawn, where the others have one value each.
+gives a curve over one name, a map over two. Of more names a slice is drawn, where grids have one value each, and draws
+are near one.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from hsdsl.analysis.sweep.dataset import Sweep
 
 TIME, SAMPLED = "time", "sample.time"
+NEAR = 0.1  # of all rows, that a slice of a draw has
 TIMES = {"transition": "transition.time", "before": "transition.time", "after": "transition.time"}
 
 
@@ -58,26 +60,29 @@ class Picture:
             raise UsageError(f"--over {TIME}: '{column}' has no samples", "choose one with --of sample.NAME")
         if not self.over and len(free) > (1 if listed else 2):
             most = "a bifurcation diagram shows one varied name" if listed else "a map shows two varied names"
-            grids = [grid for grid in manifest.variation.grids if grid.name in free]
-            hint = f"draw a slice: --slice {grids[-1].name}={grids[-1].values[0]:g}" if grids else None
-            raise UsageError(f"{most}, got {', '.join(free)}", hint or "read the dataset with pandas, and draw a part")
+            values = {grid.name: f"{grid.values[0]:g}" for grid in manifest.variation.grids}
+            last = next((name for name in reversed(free) if name in values), free[-1])
+            hint = f"draw a slice: --slice {last}={values.get(last, 'VALUE')}"
+            raise UsageError(f"{most}, got {', '.join(free)}", hint)
 
     def _named(self, columns: list[str]) -> str | None:
         """The column, where it follows without the numbers of the dataset."""
         return self.of or (next((c for c in columns if _is_sampled(c)), "sample.x") if self.over else None)
 
     def slice(self, manifest: Manifest) -> dict[str, float]:
-        """The values of grids nearest to those given.
+        """The values of grids nearest to those given, and those of draws as they are.
 
-        Raises UsageError: a name without a grid, a value beyond its grid, or no name left.
+        Raises UsageError: a name that does not vary, a value beyond its grid, or no name left.
         """
         found: dict[str, float] = {}
         grids = {grid.name: grid.values for grid in manifest.variation.grids}
         for name, value in self.at.items():
+            if name not in manifest.variation.names:
+                hint = did_you_mean(name, manifest.variation.names)
+                raise UsageError(f"--slice: nothing varies '{shown(name)}'", hint)
             if name not in grids:
-                raise UsageError(
-                    f"--slice: no grid varies '{shown(name)}'", did_you_mean(name, grids) or "draws have none"
-                )
+                found[name] = value
+                continue
             values = np.array(grids[name])
             if not values.min() <= value <= values.max():
                 raise UsageError(f"--slice {name}: expected {values.min():g} to {values.max():g}, got {value:g}")
@@ -99,10 +104,12 @@ class Picture:
         column = self._named(sweep.columns) or telling(sweep)
         unit = sweep.manifest.units.get("t" if column.endswith(".time") else column.rpartition(".")[2])
         label = f"{column} [{unit}]" if unit else column
-        title = ", ".join(
-            [called(sweep.manifest.title, sweep.manifest.model), *(f"{n} = {v:g}" for n, v in fixed.items())]
-        )
-        rows = np.logical_and.reduce([sweep[n] == v for n, v in fixed.items()] or [np.ones(sweep.done, bool)])
+        drawn = {each.name for each in sweep.manifest.variation.draws}
+        at = [f"{name} {'near' if name in drawn else '='} {value:g}" for name, value in fixed.items()]
+        title = ", ".join([called(sweep.manifest.title, sweep.manifest.model), *at])
+        rows = np.ones(sweep.done, bool)
+        for name, value in fixed.items():
+            rows &= _nearest(sweep[name], value) if name in drawn else sweep[name] == value
         axes = [_axis(sweep, name, rows) for name in sweep.manifest.variation.names if name not in fixed]
         if self.over:
             curves = [each for each, kept in zip(_curves(sweep, column), rows, strict=True) if kept]
@@ -121,6 +128,12 @@ class Picture:
                 plots.plot_curve(path, axes[0], quantity, title)
             else:
                 plots.plot_map(path, axes[0], axes[1], quantity, title)
+
+
+def _nearest(values: Array, value: float) -> Array:
+    """Whether each number is in the tenth that is nearest to a value."""
+    off = np.abs(values - value)
+    return off <= np.quantile(off, NEAR)
 
 
 def telling(sweep: Sweep) -> str:

@@ -35,7 +35,7 @@ RECORD = "What to keep of each run: final, transitions, outputs:every=TIME, outp
 OF = "The column that --plot draws, such as final.x or transitions. before.v and sample.x give a bifurcation diagram."
 OVER = "Draw samples, such as --of sample.x, over time: one curve per row, coloured by what varies."
 CHUNK = "Rows per file. Default: hsdsl times a few runs and chooses."
-SLICE = "Draw only the rows where a grid has its value nearest to this. May be repeated."
+SLICE = "Draw only the rows where a grid has its value nearest to this, or the tenth of a draw's rows. May be repeated."
 WORST = "List the ten rows with the largest numbers of a column, such as final.v; --best lists the least."
 BEST = "List the ten rows with the least numbers of a column."
 TAIL = "The last share of each run, whose transitions and samples a bifurcation diagram shows. Default: 0.5."
