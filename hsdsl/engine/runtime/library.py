@@ -79,7 +79,7 @@ def ship(folder: Path) -> Path:
     """
     text, symbol = LOOP
     library = folder / _shipped(text).name
-    _compile(find_compiler(), [text], library, OF_LOOP)
+    _compile(find_compiler(), [text], library, OF_LOOP, [RUNTIME, print_scheme(folder)])
     _tried(find_compiler(), library, symbol)
     return library
 
@@ -167,7 +167,10 @@ def _made(
         with workshop() as folder:
             library = folder / "model.so"
             try:
-                _compile(compiler, texts, library, EFFORT if symbol == SYMBOL else OF_LOOP, further)
+                if symbol == SYMBOL:  # whose routines include nothing of the scheme
+                    _compile(compiler, texts, library, EFFORT, [RUNTIME], further)
+                else:
+                    _compile(compiler, texts, library, OF_LOOP, [RUNTIME, print_scheme(folder)], further)
             except TooSlow:
                 if not is_loop:  # which is compiled in seconds, unless much else runs
                     _give_up(key, allowed)
@@ -194,12 +197,17 @@ def _write(path: Path, text: str) -> None:
 
 
 def _compile(
-    compiler: Compiler, texts: Sequence[str], library: Path, effort: Effort, further: tuple[str, ...] = ()
+    compiler: Compiler,
+    texts: Sequence[str],
+    library: Path,
+    effort: Effort,
+    includes: Sequence[Path],
+    further: tuple[str, ...] = (),
 ) -> None:
     sources = [library.with_name(f"model{number or ''}.c") for number in range(len(texts))]
     for source, text in zip(sources, texts, strict=True):
         source.write_text(text)
-    compiler.build(sources, [RUNTIME, print_scheme(library.parent)], library, effort, (*FLAGS, *further))
+    compiler.build(sources, includes, library, effort, (*FLAGS, *further))
 
 
 def _tried(compiler: Compiler, library: Path, symbol: str) -> ctypes.CDLL:

@@ -215,11 +215,15 @@ class Surfaces:
         On the guard means to round-off, or within the time ``since``: sums of steps are no more exact than that.
         """
         found: list[int] = []
+        try:
+            values = self.kernel.surfaces(t, *x)
+        except DOMAIN_ERRORS:
+            return found
         for k in range(len(self.edges)):
             if k in known or self.releases(k) or self.too_late(k, t, since):
                 continue
             try:
-                r, rate = self.kernel.surfaces(t, *x)[k], self.kernel.rates[k](t, *x)[0]
+                r, rate = values[k], self.kernel.rates[k](t, *x)[0]
                 if not rate > 0:
                     continue
                 noise = self.roundoff_bound(k, t, x)

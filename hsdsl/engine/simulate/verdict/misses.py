@@ -11,15 +11,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Number
-from hsdsl.base.numbers.enclosures import Range
+from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, NOTHING, Number
+from hsdsl.base.numbers.enclosures import Range, Undecided
 from hsdsl.engine.execution import Arc
+from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import Remark, may_be_passed, of_edge, show, wall_of
+from hsdsl.engine.simulate.surfaces import ROUNDOFF_UNITS
 from hsdsl.engine.simulate.verdict.commutation import commute
 from hsdsl.engine.simulate.verdict.errors import SAFE, times
 from hsdsl.engine.simulate.verdict.resets import indifferent, jumps_near, leaves_along
@@ -28,6 +30,7 @@ from hsdsl.engine.simulate.verdict.steps import Parts, high, low, steps_of, unde
 
 HALVINGS = 20
 MOST_TURNING_POINTS = 256  # turning points, one by one
+CLOSEST = 2.0**-ROUNDS  # shares of a step that count as one
 SHARES = 9  # at one turning point
 TWICE = 2  # as long as it takes to reach a surface: reached together; as deep as a strip: beyond a surface
 
@@ -126,16 +129,33 @@ def _begun_beyond(run: RunView, steps: Parts) -> NDArray[np.bool_]:
 
     Where that is for round-off alone, and falls, it is left as the step begins.
     """
-    edges = run.problem.program.modes[steps.mode].edges
-    found = np.zeros((len(steps), len(edges)), dtype=bool)
-    if any(edge.conditional for edge in edges):
+    edges, n = run.problem.program.modes[steps.mode].edges, len(steps)
+    found = np.zeros((n, len(edges)), dtype=bool)
+    conditional = [k for k, edge in enumerate(edges) if edge.conditional]
+    if conditional:
+        kernel, first = steps.bound(run), steps.ends()[0]
         with np.errstate(all="ignore"):
-            values = steps.bound(run).surfaces(*steps.ends()[0])
-        for k, edge in enumerate(edges):
-            found[:, k] = edge.conditional & (low(values[k], len(steps)) > 0)
-            for i in np.flatnonzero(found[:, k]).tolist():
-                found[i, k] = _begins_beyond(run.at_row(run.arc_of(int(steps.row[i])), int(steps.row[i])), k)
+            values = kernel.surfaces(*first)
+            for k in conditional:
+                found[:, k] = low(values[k], n) > 0
+                sure = (low(kernel.rates[k](*first)[0], n) > 0) | (low(values[k], n) > _roundoff(kernel, k, first, n))
+                for i in np.flatnonzero(found[:, k] & ~sure).tolist():
+                    found[i, k] = _begins_beyond(run.at_row(run.arc_of(int(steps.row[i])), int(steps.row[i])), k)
     return found
+
+
+def _roundoff(kernel: ModeKernel, k: int, first: list[Range], n: int) -> NDArray[np.float64]:
+    """Twice a bound of the round-off of surface k where steps begin; infinite where it is not known."""
+
+    def size(value: Any) -> NDArray[np.float64]:
+        return np.maximum(np.abs(low(value, n)), np.abs(high(value, n)))
+
+    try:
+        slopes, total = kernel.gradients[k](*first), size(kernel.magnitudes(*first)[k])
+    except (Undecided, *DOMAIN_ERRORS):
+        return np.full(n, np.inf)
+    total = sum((size(slope) * size(x) for slope, x in zip(slopes, first, strict=True)), total)
+    return np.where(np.isfinite(total), 2 * ROUNDOFF_UNITS * FLOAT64.unit * total, np.inf)
 
 
 def _joined(parts: Parts, which: NDArray[np.int64], surface: int) -> list[Open]:
@@ -213,16 +233,19 @@ def _shares_between(start: float, end: float) -> list[float]:
 
 
 def rising_zero(along: Callable[[Number], Place], of: Callable[[Place], Number]) -> Place:
-    """Close in on where a function of the place rises through zero between the ends of a step (bisection)."""
-    a = 0.0
-    b, place = 1.0, along(1.0)
-    for _ in range(ROUNDS):
-        s = (a + b) / 2
+    """Close in on where a function of the place rises through zero between the ends of a step (secants, halves)."""
+    a, b, place = 0.0, 1.0, along(1.0)
+    below, above = of(along(0.0)), of(place)
+    for k in range(3 * ROUNDS):
+        if b - a <= CLOSEST:
+            break
+        share = below / (below - above) if k % 3 < 2 and below <= 0 < above else 0.5
+        s = min(max(a + (b - a) * float(share), a + CLOSEST / 2), b - CLOSEST / 2)
         found = along(s)
-        if of(found) <= 0:
-            a = s
+        if not (value := of(found)) > 0:
+            a, below = s, value
         else:
-            b, place = s, found
+            b, place, above = s, found, value
     return place
 
 
