@@ -113,8 +113,8 @@ def contact(mode: Mode, k: int, numbers: Collection[str] = (), moving: Slopes = 
         return None
     rows, projection, landing, at = constrained
     push, order = _push(near, at)
-    if order is None:
-        return None
+    if order is None or (edge.of_event and order == 1 and not _stays(near.guard, near, rows, at)):
+        return None  # a condition that stays true does not turn true again
     release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
                       reset=Altered(near.states, {}), reset_texts=mode.states)  # fmt: skip
     atoms = sorted(edge.condition.atoms(Relational), key=str) if edge.condition is not None else ()
@@ -220,10 +220,15 @@ def _push(near: Nearby, at: Point):
 
 def _is_kept(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], push: sp.Expr, at: Point) -> bool:
     """Whether a value is zero all along the guard, and rises where the flow presses: what it decides never ends."""
-    constrained = {near.states[i]: row for i, row in rows.items()}
-    stays = lie_derivative(value, {x: constrained[x] if x in constrained else near.flow(x) for x in near.among(value)})
     presses = value_at(near.along(value), at) * value_at(push, at) > 0
-    return presses and is_zero(value, at) and is_zero(stays, at)
+    return presses and is_zero(value, at) and _stays(value, near, rows, at)
+
+
+def _stays(value: sp.Expr, near: Nearby, rows: dict[int, sp.Expr], at: Point) -> bool:
+    """Whether a value does not change along the guard."""
+    constrained = {near.states[i]: row for i, row in rows.items()}
+    flow = {x: constrained[x] if x in constrained else near.flow(x) for x in near.among(value)}
+    return is_zero(lie_derivative(value, flow), at)
 
 
 def _falling(atom: Relational) -> sp.Expr:
