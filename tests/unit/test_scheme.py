@@ -146,6 +146,8 @@ OUTSIDE = {
     "numbers that are compared by identity": "    return x if x is x else x\n",
     "a default": "    return x\ndef g(x: Number = 0) -> Number:\n    return x\n",
     "another decorator": "    return x\n@cache\ndef g(x: Number) -> Number:\n    return x\n",
+    "a loop whose step varies": "    for k in range(9, 0, n):\n        x = x + k\n    return x\n",
+    "a vector in a sum": "    return v + x\n",
     "a name that nothing sets": "    return y\n",
     "too many results": "    return x, x\n",
     "a call of itself": "    return f(x, n, v, p)\n",

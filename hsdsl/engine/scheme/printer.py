@@ -317,7 +317,9 @@ class _Function:
         if set_inside & {name, *(place for bound in bounds for place in _places(bound, ast.Load))}:
             raise self.text.refused(part, "a loop whose variable or bounds change")
         self.kinds[name] = "int"
-        by = int(ast.literal_eval(step))
+        if not ast.unparse(step).lstrip("-").isdigit():
+            raise self.text.refused(part, "a loop whose step is no number")
+        by = int(ast.unparse(step))
         sign, how = ("<", "++" if by == 1 else f" += {by}") if by > 0 else (">", "--" if by == -1 else f" -= {-by}")
         return f"for (int {name} = {self.value(start)[0]}; {name} {sign} {self.value(stop)[0]}; {name}{how}) {{"
 
@@ -519,7 +521,7 @@ class _Function:
             return f"{one} {WHOLE[type(operator)]} {two}", wider
         if (
             type(operator) not in SIGNS
-            or wider not in PLAIN
+            or not {kind, another} <= PLAIN.keys()
             or (isinstance(operator, ast.Div) and wider in ("int", "Count"))
         ):
             raise self.text.refused(node, f"an operation of {kind} and {another}")
