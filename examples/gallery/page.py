@@ -21,22 +21,22 @@ HEAD = """<!-- Written by examples/gallery: edit the models and the code, not th
 
 # Where methods fail
 
-{count} small scenes, one phenomenon each, all with exact solutions. One command runs every one of them with every
-scheme, method and engine of ours and with the tools that are installed:
+This page has {count} small scenes. Each shows one phenomenon and has an exact solution. One command runs all of them
+with every scheme, method and engine of hsdsl, and with the other tools that you have installed:
 
 <!-- not run: takes an hour; tests/golden/test_gallery.py runs every scene -->
 ```console
 $ python examples/gallery
 ```
 
-It judges each run against the exact execution and writes this page, its pictures and `gallery.json`. The models are
-`models/gallery/*.yaml`; the exact executions lie next to them and come from `models/references`, in eighty digits and
-without the simulator.
+The command compares each run with the exact execution. It writes this page, its pictures and `gallery.json`. You find
+the models in `models/gallery/*.yaml` and the exact executions next to them. `models/references` computes these in
+eighty digits, without the simulator.
 
 ## Who is right
 
-Each cell counts outcomes: of ours over all methods and sizes and both engines, of other tools at tolerances of 1e-6 and
-1e-9.
+Each cell counts outcomes. The cells of hsdsl count all its methods, step sizes and engines; those of other tools count
+the tolerances 1e-6 and 1e-9.
 
 | word | meaning |
 | --- | --- |
@@ -52,20 +52,20 @@ Each cell counts outcomes: of ours over all methods and sizes and both engines, 
 
 {versions}
 
-Tools other than ours run as their documentation shows (`hsdsl/interface/chart/peers`), with events restarted after each
-transition; some have options that help in some scenes. `casadi` and `diffrax` do not take every model. Our runs have
-methods of every order, explicit ones on stiff scenes too, tolerances of 1e-6 and 1e-9, steps of a thousandth and a
-ten-thousandth of the run, and at most {most:,} transitions; fixed steps are estimated (`--estimate`). The Python
-engine, which agrees with the compiled one to the last bit, runs `paoli-schatzman`, and three methods in some scenes.
-A dash stands for a tool that has not been run.
+Other tools run as their documentation shows (`hsdsl/interface/chart/peers`); each restarts its events after a
+transition. Some have options that help in some scenes. `casadi` and `diffrax` do not take every model. hsdsl runs
+methods of every order, also explicit ones on stiff scenes, with tolerances of 1e-6 and 1e-9. Fixed steps are a
+thousandth and a ten-thousandth of the run, and `--estimate` checks them. A run has at most {most:,} transitions. The
+Python engine agrees with the compiled one to the last bit. It runs `paoli-schatzman`, and three methods in some scenes.
+A dash means that a tool has not been run.
 
 ## Which event other tools see
 
-`findings/events-of-peers.sh` installs these versions and shows each of these on x' = 1:
+`findings/events-of-peers.sh` installs these versions and shows each behaviour on x' = 1:
 
-- diffrax 0.7.2: of two guards crossed in one step, the first in its list ends the step, not the earlier one. This
-  decides no row: where diffrax is wrong here, no other guard was crossed before the one that ended an arc.
-- CasADi 3.8.2: an event is where `zero` falls through zero, and one that is zero at the start is none. This decides
+- diffrax 0.7.2: if a step crosses two guards, the first in the list ends it, not the earlier one. This decides no row:
+  where diffrax is wrong here, no other guard was crossed before the one that ended an arc.
+- CasADi 3.8.2: an event occurs where `zero` falls through zero, but not if `zero` is zero at the start. This decides
   [event-at-start](#event-at-start): with the ball 1e-12 higher, CasADi is right there.
 - CasADi 3.8.2: `rk` loses an event on an output time. This decides no row: the table has `rosenbrock`, which does not.
 - heyoka 7.13.2: an event with a direction passes a triple root, where the derivative is zero. This decides no row: the

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 from gallery.scenes import UNDECIDED, Entry
 from hsdsl.base.errors import UsageError
@@ -24,12 +24,19 @@ ENGINES = ("c", "python")
 SAMPLED = ("", "midpoint", "dopri5", "taylor")  # methods of the Python engine, which agrees with C to the last bit
 
 
-@dataclass(frozen=True)
-class Setting(Tool):
+class Setting(NamedTuple):
     """A tool with its settings; ``step`` is a share of the run, and peers have no step."""
 
+    name: str
+    scheme: str = ""
+    method: str = ""
     tolerance: float | None = None
     step: float | None = None
+
+    @property
+    def label(self) -> str:
+        """The tool, its scheme and its method."""
+        return Tool(self.name, self.scheme, self.method).label
 
     @property
     def size(self) -> str:
@@ -47,9 +54,9 @@ def own_settings(engines: tuple[str, ...] = ENGINES) -> Iterator[Setting]:
                     continue  # no compiled loop has the schemes with their own formula
                 sizes = slice(1) if engine == "python" and method else slice(None)
                 if method and METHODS[method].adaptive:
-                    yield from (replace(base, tolerance=value) for value in TOLERANCES[sizes])
+                    yield from (base._replace(tolerance=value) for value in TOLERANCES[sizes])
                 else:
-                    yield from (replace(base, step=value) for value in STEPS[sizes])
+                    yield from (base._replace(step=value) for value in STEPS[sizes])
 
 
 def peer_settings() -> Iterator[Setting]:
