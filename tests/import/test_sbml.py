@@ -329,6 +329,13 @@ def test_arguments_of_functions_may_have_the_names_of_parameters_and_functions()
     assert hsdsl.loads(of(text)).simulate(engine="python").final.state["x"] == pytest.approx(3 + 2 * exp(2))
 
 
+def test_what_a_file_assigns_and_nothing_uses_is_an_output() -> None:
+    names = parameter("x", 1) + parameter("half", 0) + parameter("total", 0)
+    text = of(model(Parameters=names, Rules=assigned("half", "x/2") + assigned("total", "half + 3") + rate("x", "x")))
+    run = hsdsl.loads(text).simulate(engine="python")
+    assert run.final.outputs == pytest.approx({"total": exp(2) / 2 + 3}) and "half: x/2" in text
+
+
 FORMULAS = {
     "((1)*R3 + (-1)*R4)": "R3 - R4",
     "((-1)*r)/c": "-r/c",

@@ -217,6 +217,9 @@ class Converter(Facts):
         functions = {self.spelled(name): self.function(known) for name, known in self.functions.items()}
         solve = {"solve": {"unknowns": list(map(self.spelled, self.unknowns)), "equations": equations}}
         mode = {"flow": flow | dict.fromkeys(chosen, "0"), "transitions": [*switches, *transitions]}
+        used = set(_NAME.findall(str((list(let.values()), mode, equations, parameters, initial, recorded))))
+        if not outputs:  # what only reports is an output
+            recorded = {name: let.pop(name) for name in [*let] if name not in used}
         assumptions = list(self.assumptions())
         if re.search(r"\bfactorial\(", str((parameters, functions, let, mode, equations, initial, recorded))):
             functions["factorial"] = FACTORIAL

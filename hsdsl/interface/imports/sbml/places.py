@@ -11,7 +11,13 @@ from hsdsl.language.source.xml import Element
 
 _KEY = re.compile(r"( *(?:- )?)\"?([A-Za-z_]\w*)\"?:(?: ([A-Za-z_]\w*)$)?")
 _STARTS = "initialAssignment"
-_FIRST = {"let": "assignmentRule", "flow": "rateRule", "initial": _STARTS, "parameters": _STARTS}
+_FIRST = {
+    "let": "assignmentRule",
+    "outputs": "assignmentRule",
+    "flow": "rateRule",
+    "initial": _STARTS,
+    "parameters": _STARTS,
+}
 
 
 def placed(error: ModelError, text: str, root: Element) -> ModelError:
