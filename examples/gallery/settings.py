@@ -72,7 +72,7 @@ def run(entry: Entry, setting: Setting) -> Outcome:
     except (Refused, UsageError) as refusal:
         return Outcome("refuses", str(refusal))
     if entry.name in UNDECIDED and found.word == "right" and found.verdict not in ("left", "unknown"):
-        return replace(found, word="wrong", why="gives one of two executions and does not say so")
+        return found._replace(word="wrong", why="gives one of two executions and does not say so")
     return found
 
 
