@@ -108,7 +108,7 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, ylabel: bool) -> None:
     axis.set_xlabel(measure)
     if ylabel:
         axis.set_ylabel("seconds, warm")
-    axis.set_title(title, loc="left", parse_math=False, fontsize=9.5)
+    axis.set_title(title, loc="left", parse_math=False, fontsize=10, fontweight="bold")
     silent = [label for label in labels if label not in {row.attempt.tool.label for row, _ in known}]
     if silent:
         text = "no answer: " + ", ".join(silent)

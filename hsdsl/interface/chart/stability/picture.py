@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.analysis.plot.analyses import edges
-from hsdsl.analysis.plot.style import to_file
+from hsdsl.analysis.plot.style import heading, to_file
 from hsdsl.interface.chart.stability import Axis, Panel, StabilityMap
 from hsdsl.interface.chart.stability.cells import CONVERGED, UNKNOWN, Cell
 
@@ -54,7 +54,7 @@ def plot_stability(found: StabilityMap) -> Figure:
         axes.set_xlabel(found.x.label, parse_math=False)
     for axes in grid[:, 0]:
         axes.set_ylabel(found.y.label, parse_math=False)
-    figure.suptitle(found.name, fontsize=10)
+    heading(figure, found.name)
     shown = f"{measure} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else ""
     _legend(figure, found, columns + (columns > 2), shown)
     return figure
