@@ -278,8 +278,8 @@ class ModeProgram:
 
     @property
     def ends(self) -> bool:
-        """Whether a routine has functions without a value beyond some number, such as a root."""
-        return ENDING.search(self.routines.source) is not None
+        """Whether the flow has functions without a value beyond some number, such as a root."""
+        return ENDING.search(self._flow_source) is not None
 
     @property
     def jumps(self) -> bool:

@@ -86,7 +86,7 @@ class PythonKernel:
         bound = dict(zip(routines.names, self._modes[mode](*data), strict=True))
         program = self._program.flows[mode]
         if program.ends and (self._program.inputs or self._program.switches):
-            bound |= {name: beside(bound[name], self.arithmetic.unit) for name in ENDS_WITH_TIME}
+            bound["flow"] = beside(bound["flow"], self.arithmetic.unit)
         n, zero = len(program.states), self.arithmetic.zero
         slopes = (spread_out(bound[f"gradient_{k}"], row, n + 1, zero) for k, row in enumerate(program.slopes))
         return ModeKernel(
@@ -179,7 +179,6 @@ def spread_out(routine: Routine, places: Sequence[int], size: int, zero: Number)
 
 
 PLAIN = ("flow", "surfaces", "magnitudes")
-ENDS_WITH_TIME = ("flow", "surfaces")
 UNITS_BESIDE = (2, 8, 32)
 
 

@@ -215,8 +215,7 @@ class Writer:
             for name, text in texts.items()
         }
         if mode.ends and self.timed:
-            ends = {name: _BESIDE.format(routine=routine[name]) for name in ("flow", "surfaces")}
-            routine |= {name: self.shared("beside", text) for name, text in ends.items()}
+            routine["flow"] = self.shared("beside", _BESIDE.format(routine=routine["flow"]))
         edges = [self.edge(k, edge, mode, routine) for k, edge in enumerate(mode.edges)]
         fields = [
             *map(str, (len(mode.states), len(mode.edges), len(mode.surfaces), int(mode.final))),
