@@ -415,7 +415,7 @@ static hs_time flown(const hs_run *run, hs_time t) {
   hs_time found = t - made_before(run, FREE - 1)->time;
   for (int i = FREE - 1; i >= 0; i--) {
     const hs_made *made = made_before(run, i);
-    found = found - (made->resumed == made->resumed ? made->resumed - made->time : 0);
+    if (made->resumed > made->time) found = found - (made->resumed - made->time);
   }
   return found;
 }

@@ -14,6 +14,7 @@ typedef struct {
   double tolerance; /* 0 for fixed steps */
   double most; /* steps within `brief` */
   const double *binomials; /* see hs_roots */
+  double *inverse;         /* 1 over each of them */
   /* what a run brings along, its columns: */
   double *t, *limit, *longest; /* where the step begins, what it does not pass, how long it may be, or is where it is fixed */
   double *made, *since, *brief; /* see hs_pace */

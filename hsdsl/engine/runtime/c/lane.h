@@ -71,10 +71,12 @@ HS_INLINE hs_wide wide_smaller(hs_wide least, hs_wide h) {
 
 /* root() in some lanes. */
 HS_INLINE hs_wide root_in(hs_mask lanes, hs_wide x, int m) {
-  hs_wide found = x;
-  for (int i = 0; i < HS_WIDTH; i++)
-    if (lanes[i]) found[i] = root(x[i], m);
-  return found;
+  double numbers[HS_WIDTH];
+  memcpy(numbers, &x, sizeof x);
+  for (uint32_t left = bits_of(lanes); left; left &= left - 1)
+    numbers[__builtin_ctz(left)] = root(numbers[__builtin_ctz(left)], m);
+  memcpy(&x, numbers, sizeof x);
+  return x;
 }
 
 /* from_zero() in some lanes; in the others there is none. */
@@ -94,29 +96,36 @@ HS_INLINE hs_wide wide_abs(hs_wide x, int *bad) { return (void)bad, wide_fabs(x)
 
 /* The last few arguments of a function, and what it gave: a step begins where the one before ended. */
 #define KEPT 4
+#define ALL_LANES ((1u << HS_WIDTH) - 1)
 typedef struct {
   hs_wide x[KEPT], y[KEPT];
   int count, next;
 } hs_known;
 
-#define OF_ONE(name)                                                                  \
-  static hs_wide wide_##name(hs_wide x, int *bad) {                                   \
-    static __thread hs_known known;                                                   \
-    hs_wide found = x;                                                                \
-    hs_mask left = ~((hs_mask)x & 0);                                                 \
-    int failed = 0;                                                                   \
-    for (int k = 0; k < known.count; k++) {                                           \
-      const hs_mask same = (hs_mask)known.x[k] == (hs_mask)x;                         \
-      found = hs_choose(same, known.y[k], found);                                     \
-      left &= ~same;                                                                  \
-    }                                                                                 \
-    if (!hs_any(left)) return found;                                                  \
-    for (int i = 0; i < HS_WIDTH; i++)                                                \
-      if (left[i]) found[i] = hs_##name(x[i], &failed);                     \
-    *bad |= failed;                                                                   \
-    if (!failed) known.x[known.next] = x, known.y[known.next] = found;                \
-    if (!failed) known.next = (known.next + 1) % KEPT, known.count += known.count < KEPT; \
-    return found;                                                                     \
+#define OF_ONE(name)                                                        \
+  static hs_wide wide_##name(hs_wide x, int *bad) {                         \
+    static __thread hs_known known;                                         \
+    hs_wide found = x;                                                      \
+    uint32_t left = ALL_LANES;                                              \
+    int failed = 0;                                                         \
+    for (int k = 0; k < known.count; k++) {                                 \
+      const hs_mask same = (hs_mask)known.x[k] == (hs_mask)x;               \
+      found = hs_choose(same, known.y[k], found);                           \
+      left &= ~bits_of(same);                                               \
+    }                                                                       \
+    if (!left) return found;                                                \
+    double of[HS_WIDTH], to[HS_WIDTH];                                      \
+    memcpy(of, &x, sizeof x), memcpy(to, &found, sizeof found);             \
+    for (; left; left &= left - 1) {                                        \
+      const int i = __builtin_ctz(left);                                    \
+      to[i] = hs_##name(of[i], &failed);                                    \
+    }                                                                       \
+    memcpy(&found, to, sizeof found);                                       \
+    *bad |= failed;                                                         \
+    if (failed) return found;                                               \
+    known.x[known.next] = x, known.y[known.next] = found;                   \
+    known.next = (known.next + 1) % KEPT, known.count += known.count < KEPT; \
+    return found;                                                           \
   }
 #define EACH(name)                                                          \
   static inline hs_wide wide_##name(hs_wide x, int *bad) {                  \

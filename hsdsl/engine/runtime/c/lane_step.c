@@ -15,7 +15,7 @@ static int degree_of_lanes(const hs_real *c, int n) {
 
 /* Whether a surface with this polynomial, and the value `end`, is passed by for certain: see is_passed_by() and
    reaches(). */
-static hs_mask passed_by(const double *binomials, const hs_real *c, int order, hs_mask standing, hs_real end,
+static hs_mask passed_by(const double *inverse, const hs_real *c, int order, hs_mask standing, hs_real end,
                          int adaptive) {
   const int n = degree_of_lanes(c, order);
   hs_real b[HS_MOST_ORDER + 1], from[HS_MOST_ORDER + 1];
@@ -28,7 +28,8 @@ static hs_mask passed_by(const double *binomials, const hs_real *c, int order, h
   hs_mask below = bound <= 0;
   const hs_mask ends = end <= 0;
   if (hs_any(ends & ~below)) {
-    fill_bernstein(binomials, from, n, b);
+    for (int k = 0; k <= n; k++) b[k] = from[k] * inverse[n * (n + 1) / 2 + k];
+    add_up(b, n); /* the last digits are others than those of fill_bernstein(): no rise is as low */
     below |= (largest_of(b, n) <= 0) & (c[n] != 0);
   }
   below &= ends;
@@ -104,9 +105,13 @@ static int leave_lanes(const hs_lane_mode *mode, const hs_lanes *l, hs_mask pass
 static void go_to_ends(const hs_lanes *l, int n, hs_mask passed) {
   hs_real *const x = (hs_real *)l->x, *const z = (hs_real *)l->z, *const scales = (hs_real *)l->scales;
   hs_real *const before = (hs_real *)l->before;
+  const hs_real *const c = (hs_real *)l->piece;
+  const int last = l->order - 1;
   *(hs_real *)l->t = hs_choose(passed, *(hs_real *)l->t1, *(hs_real *)l->t);
   for (int s = 0; s < n; s++) {
-    before[s] = hs_choose(passed, size_at(l, n, HS_ALL(1.0), s), before[s]);
+    hs_real size = fabs(c[last * n + s]); /* size_at() of 1 */
+    for (int m = last - 1; m >= 0; m--) size = fabs(c[m * n + s]) + size;
+    before[s] = hs_choose(passed, fabs(x[s]) + size, before[s]);
     x[s] = hs_choose(passed, z[s], x[s]);
     scales[s] = hs_choose(passed, hs_max(scales[s], fabs(z[s])), scales[s]);
   }
@@ -172,7 +177,7 @@ static int step_lanes(hs_lanes *l) {
   }
   for (int k = 0; k < mode->surfaces; k++) {
     const hs_real *const c = (hs_real *)l->curves + k * (order + 1);
-    const hs_mask passed = passed_by(l->binomials, c, order, standing[k] != 0, ends[k], adaptive);
+    const hs_mask passed = passed_by(l->inverse, c, order, standing[k] != 0, ends[k], adaptive);
     open[k] = hs_choose(passed, t * 0, HS_ALL(1.0));
     crossed |= ~passed;
   }

@@ -34,7 +34,7 @@ static void take_columns(hs_store *store, int64_t count, double **const *each) {
 
 static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_method *method, int64_t lanes,
                           hs_store *store) {
-  const int64_t n = model->width, m = model->surfaces, order = method->order, begun = store->used;
+  const int64_t n = model->width, m = model->surfaces, order = method->order, most = (order + 1) * (order + 2) / 2;
   const hs_row_of_lanes none = {0};
   *row = none;
   hs_lanes *const l = &row->l;
@@ -43,6 +43,7 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   double **const step[] = {&l->h, &l->t1, 0}, **const found[] = {&l->surface, &l->theta, &l->time, 0};
   double **const surfaces[] = {&l->starts, &l->ends, &l->open, 0}, **const noises[] = {&l->values, &l->weights, 0};
   double **const scratch[] = {&l->end, &l->q, &l->sizes, 0};
+  const int64_t begun = store->used;
   take_columns(store, lanes, one);
   l->p = numbers(store, (int64_t)model->data * lanes);
   take_columns(store, n * lanes, states);
@@ -60,6 +61,9 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   take_columns(store, n * lanes, scratch);
   take_columns(store, m * lanes, noises);
   take_columns(store, lanes, found);
+  l->inverse = numbers(store, (most + lanes - 1) / lanes * lanes);
+  if (store->numbers) fill_binomials(l->inverse, (int)order);
+  for (int64_t i = 0; store->numbers && i < most; i++) l->inverse[i] = 1 / l->inverse[i];
   l->order = method->order;
   l->most = MOST_SHORT;
   row->lanes = (int)lanes;
@@ -251,8 +255,33 @@ static void wait_for_crossing(hs_team *team, hs_row_of_lanes *row, int lane, hs_
   copy_lane(row, lane, waiting, waiting->count, row->columns);
   waiting->seat[waiting->count++] = row->seat[lane];
   row->seat[lane] = 0, row->count--;
-  team->crossed++;
   if (waiting->count == waiting->lanes) locate_together(team, waiting);
+}
+
+/* Whether the error of a lane's step, which is looked at here, forbids it. */
+static int is_wrong_in_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
+  const hs_lanes *const l = &row->l;
+  const int n = run->here.dimension;
+  run->here.t = l->t[lane];
+  gather(l->x, run->x, n, row->lanes, lane);
+  gather(l->z, run->z, n, row->lanes, lane);
+  gather(l->error, run->error, n, row->lanes, lane);
+  gather(l->scales, run->scales, n, row->lanes, lane);
+  return is_too_wrong(run, l->h[lane]);
+}
+
+/* Go on at the end of a step in one lane, which stands on no surface: see go_to_ends(). */
+static void pass_lane(const hs_row_of_lanes *row, int lane, int n) {
+  const hs_lanes *const l = &row->l;
+  const int lanes = row->lanes;
+  l->t[lane] = l->t1[lane];
+  for (int64_t i = lane; i < n * lanes; i += lanes) {
+    double size = 0.0;
+    for (int m = l->order - 1; m >= 0; m--) size = fabs(l->piece[m * n * lanes + i]) + size;
+    l->before[i] = fabs(l->x[i]) + size;
+    l->x[i] = l->z[i];
+    l->scales[i] = hs_max(l->scales[i], fabs(l->z[i]));
+  }
 }
 
 /* Go on behind the step of a lane. */
@@ -260,32 +289,29 @@ static void behind_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of
   const hs_lanes *const l = &row->l;
   hs_seat *const seat = row->seat[lane];
   hs_run *const run = &seat->run;
-  const int failed = l->failed >> lane & 1, crossed = l->crossed >> lane & 1, doubtful = l->doubtful >> lane & 1;
-  int outcome = GOES_ON;
+  const int n = run->here.dimension, failed = l->failed >> lane & 1, crossed = l->crossed >> lane & 1;
+  const int doubtful = l->doubtful >> lane & 1, wrong = doubtful && is_wrong_in_lane(row, lane, run);
+  int standing = 0, outcome = GOES_ON;
+  for (int k = 0; doubtful && k < run->here.table->surfaces; k++) standing |= l->standing[k * row->lanes + lane] != 0;
   team->lost[l->mode] += failed ? LOST : -1;
-  if (crossed && !doubtful) {
+  team->failed += failed, team->doubtful += doubtful, team->crossed += crossed;
+  if (crossed && !wrong) {
     wait_for_crossing(team, row, lane, waiting);
     return;
   }
-  if (!failed && !doubtful) {
+  if (!failed && !wrong && !(doubtful && standing)) {
     seat->unwritten = run->bare;
     if (!run->bare) step_of_lane(row, lane, run), pass(run);
+    if (doubtful) pass_lane(row, lane, n);
     if (l->t[lane] < seat->limit) return;
   }
   leave_lane(row, lane, seat, 1);
-  team->failed += failed, team->doubtful += doubtful;
   if (failed)
-    outcome = l->slow >> lane & 1 ? located_stuck(run, HS_SLOW) : one_step(run, run->here.dimension, seat->limit);
-  if (doubtful) {
-    step_of_lane(row, lane, run);
-    gather(l->error, run->error, run->here.dimension, row->lanes, lane);
-    if (is_too_wrong(run, run->span.h))
-      expands(run), outcome = behind(run, halved_series(run, run->here.dimension, seat->limit, run->span.h / 2, 1));
-    else if (crossed)
-      curves_of_lane(row, lane, run), outcome = behind_step(run);
-    else
-      outcome = pass(run);
-  }
+    outcome = l->slow >> lane & 1 ? located_stuck(run, HS_SLOW) : one_step(run, n, seat->limit);
+  else if (wrong)
+    expands(run), outcome = behind(run, halved_series(run, n, seat->limit, l->h[lane] / 2, 1));
+  else if (doubtful && run->here.t < l->t1[lane])
+    step_of_lane(row, lane, run), outcome = pass(run);
   go_ahead(team, seat, outcome, 1);
 }
 

@@ -13,9 +13,7 @@ static void fill_binomials(hs_number *row, int most) {
 
 /* Each number has the one before added to it n times, of which the first more stay each time. Two such passes are made
    in one. */
-HS_INLINE void fill_bernstein(const hs_number *binomials, const hs_real *c, int n, hs_real *b) {
-  const hs_number *choose = binomials + n * (n + 1) / 2;
-  HS_SIMD for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
+HS_INLINE void add_up(hs_real *b, int n) {
   for (int k = 1; k <= n; k += 2) {
     hs_real before = b[k], once = before + b[k - 1];
     b[k] = once;
@@ -25,6 +23,12 @@ HS_INLINE void fill_bernstein(const hs_number *binomials, const hs_real *c, int 
       before = own, once = sum;
     }
   }
+}
+
+HS_INLINE void fill_bernstein(const hs_number *binomials, const hs_real *c, int n, hs_real *b) {
+  const hs_number *choose = binomials + n * (n + 1) / 2;
+  HS_SIMD for (int k = 0; k <= n; k++) b[k] = c[k] / choose[k];
+  add_up(b, n);
 }
 
 HS_INLINE hs_real largest_of(const hs_real *b, int n) {

@@ -216,11 +216,10 @@ static void choose_entry(hs_run *run, const int *beyond, hs_time t) {
    that run->beyond marks was not reached before an input `jumped`: on it counts as beyond. */
 static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here, hs_real since, int jumped,
                  hs_time reset_at) {
-  hs_mode_state before = run->here;
   forget(&run->task->visited);
   for (;; from_here = 1, jumped = 0, reset_at = t) {
+    const hs_mode_state before = run->here;
     place(run, mode, dimension, t, from_here ? &before : 0);
-    before = run->here;
     const hs_mode *table = run->here.table;
     if (run->full_queue >= 0) {
       run->task->stop.edge = run->full_queue;
