@@ -31,15 +31,15 @@ typedef struct {
   /* scratch: */
   double *lines;            /* coefficients, as hs_series writes them */
   double *end, *error;      /* the flow at the end of the step, and the error there */
-  double *values, *weights, *gradient;
-  /* what is found on a step: the first crossing, of which surface, where, and the sizes that largest() makes there */
-  double *surface, *theta, *time, *q, *sizes;
+  double *values, *weights, *gradient, *shares, *slopes;
+  /* what is found on a step: where each surface is crossed that is still open, and the sizes of largest() at the first */
+  double *theta, *time, *q, *sizes;
   /* a bit for each lane; of lanes of none of these all that a run brings along is that behind the step */
   int32_t failed;   /* the step is not known to be what the loop for one run would make */
   int32_t slow;     /* no step: there were too many */
   int32_t doubtful; /* of the others: its error is to be looked at */
   int32_t crossed;  /* of the others: a surface may be crossed on it, or reached */
-  int32_t landed;   /* the first crossing is found */
+  int32_t landed;   /* the first crossings are found */
 } hs_lanes;
 
 typedef struct {

@@ -190,20 +190,13 @@ static int step_lanes(hs_lanes *l) {
   return 0;
 }
 
-/* The first rise of any surface in each lane: its share of the step and the slope there, and how many there are. */
-typedef struct {
-  hs_real surface, share, slope, count;
-  hs_mask plain;
-} rises_of_lanes;
-
-static int first_rises(const hs_lane_mode *mode, const hs_lanes *l, hs_real *shares, rises_of_lanes *first) {
+/* Find where each surface first rises that is not passed by: its share of the step, 2 for none, and its slope there. Not
+   0 where bounds have no value. The lanes are left that are plain. */
+static int first_rises(const hs_lane_mode *mode, const hs_lanes *l, hs_real *shares, hs_real *slopes, hs_mask *plain) {
   const hs_real *const p = (hs_real *)l->p, *const x = (hs_real *)l->x, *const z = (hs_real *)l->z;
   const hs_real t = *(hs_real *)l->t, t1 = *(hs_real *)l->t1, *const open = (hs_real *)l->open;
   hs_real *const begun = (hs_real *)l->values, *const ended = (hs_real *)l->weights, low, high;
   if (mode->magnitudes(p, t, x, begun) || mode->magnitudes(p, t1, z, ended)) return 1;
-  first->surface = first->count = first->slope = t * 0;
-  first->share = HS_ALL(2.0);
-  first->plain = t == t;
   for (int k = 0; k < mode->surfaces; k++) {
     const hs_mask on = open[k] != 0;
     shares[k] = HS_ALL(2.0);
@@ -213,23 +206,17 @@ static int first_rises(const hs_lane_mode *mode, const hs_lanes *l, hs_real *sha
     if (bound_of(mode, l, k, t, x, begun[k], &low) || bound_of(mode, l, k, t1, z, ended[k], &high)) return 1;
     c[0] = hs_choose(((hs_real *)l->standing)[k] != 0, c[0] * 0, c[0]);
     const hs_mask found = rise_in_lanes(l->binomials, c, n, on & (c[n] != 0) & ~(c[0] > low), hs_max(low, high), &root);
-    first->plain &= ~on | found;
+    slopes[k] = slope_of(c, n, root);
+    *plain &= ~on | (found & (slopes[k] != 0));
     shares[k] = hs_choose(on, root, shares[k]);
-    first->count = hs_choose(on, first->count + 1, first->count);
-    const hs_mask earlier = on & (root < first->share);
-    first->surface = hs_choose(earlier, t * 0 + k, first->surface);
-    first->slope = hs_choose(earlier, slope_of(c, n, root), first->slope);
-    first->share = hs_choose(earlier, root, first->share);
   }
-  first->plain &= (first->slope != 0) & (first->count > 0);
   return 0;
 }
 
-/* Surfaces and their magnitudes where each lane's crossing is, and the state there: see span_place(). */
-static int look_at(const hs_lane_mode *mode, const hs_lanes *l, hs_real share) {
+/* Surfaces and their magnitudes at a share of each lane's step, and the state there: see span_place(). */
+static int look_at(const hs_lane_mode *mode, const hs_lanes *l, hs_real share, hs_real *time, hs_real *q) {
   const hs_real *const c = (hs_real *)l->piece, *const x = (hs_real *)l->x, *const z = (hs_real *)l->z;
   const hs_real *const p = (hs_real *)l->p;
-  hs_real *const time = (hs_real *)l->time, *const q = (hs_real *)l->q;
   const int n = mode->dimension, last = l->order - 1;
   const hs_mask at_end = share == 1, at_start = ~(share > 0);
   *time = hs_choose(at_end, *(hs_real *)l->t1, *(hs_real *)l->t + share * *(hs_real *)l->h);
@@ -241,61 +228,67 @@ static int look_at(const hs_lane_mode *mode, const hs_lanes *l, hs_real share) {
   return mode->values(p, *time, q, (hs_real *)l->values) || mode->magnitudes(p, *time, q, (hs_real *)l->weights);
 }
 
-/* Correct each lane's crossing to round-off: see settled(). The lanes that were. */
-static hs_mask settle_lanes(const hs_lane_mode *mode, const hs_lanes *l, const rises_of_lanes *first) {
-  const hs_real *const values = (hs_real *)l->values, *const weights = (hs_real *)l->weights;
-  hs_real *const theta = (hs_real *)l->theta, least = HS_ALL(INFINITY), next = first->share;
-  hs_mask active = first->plain, done = active & ~active;
+/* Correct where surface k is crossed to round-off, in some lanes: see settled(). The lanes in which it is. */
+static hs_mask settle_lanes(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_mask lanes, hs_real next,
+                            hs_real slope) {
+  hs_real *const theta = (hs_real *)l->theta + k, *const time = (hs_real *)l->time + k;
+  hs_real *const q = (hs_real *)l->q + k * mode->dimension, least = HS_ALL(INFINITY), noise;
+  const hs_mask none = lanes & ~lanes;
+  hs_mask active = lanes, done = none;
   for (int i = 0; i < MOST_SETTLINGS && hs_any(active); i++) {
     *theta = next;
-    if (look_at(mode, l, next)) return done & ~done;
-    hs_real r = next, noise = next, bound;
-    for (int k = 0; k < mode->surfaces; k++) {
-      const hs_mask here = first->surface == k;
-      if (!hs_any(here & active)) continue;
-      if (bound_of(mode, l, k, *(hs_real *)l->time, (hs_real *)l->q, weights[k], &bound)) return done & ~done;
-      r = hs_choose(here, values[k], r);
-      noise = hs_choose(here, bound, noise);
-    }
+    if (look_at(mode, l, next, time, q)) return none;
+    const hs_real r = ((hs_real *)l->values)[k];
+    if (bound_of(mode, l, k, *time, q, ((hs_real *)l->weights)[k], &noise)) return none;
     active &= fabs(r) < least;
     least = fabs(r);
     done |= active & (least <= noise);
     active &= ~done;
-    next = hs_choose(active, hs_min(HS_ALL(1.0), hs_max(next * 0, next - r / first->slope)), next);
+    next = hs_choose(active, hs_min(HS_ALL(1.0), hs_max(next * 0, next - r / slope)), next);
   }
   return done;
 }
 
-/* The lanes in which no other surface counts beside the first one: see mark_behind() and with_unseen(). */
-static hs_mask counts_alone(const hs_lane_mode *mode, const hs_lanes *l, const hs_real *shares, hs_real surface) {
-  const hs_real *const values = (hs_real *)l->values, *const weights = (hs_real *)l->weights, *const q = (hs_real *)l->q;
-  const hs_real time = *(hs_real *)l->time, theta = *(hs_real *)l->theta;
-  hs_mask alone = time == time;
-  for (int k = 0; k < mode->surfaces; k++) {
-    const hs_mask other = surface != k, rises = other & (shares[k] < 2);
-    hs_real noise, rate;
-    if (k < mode->edges) alone &= ~other | ~(values[k] > 0);
-    if (!hs_any(rises)) continue;
-    if (bound_of(mode, l, k, time, q, weights[k], &noise)) return alone & ~alone;
-    if (mode->rates[k].shape(mode->rates[k].of, (hs_real *)l->p, time, q, &rate)) return alone & ~alone;
-    alone &= ~rises | ((shares[k] > theta) & (values[k] < -hs_max(noise, fabs(rate) * (HS_TIE * fabs(time)))));
-  }
-  return alone;
+/* The lanes in which surface k, beside the first one, is not crossed or is crossed with it: see mark_behind() and
+   with_unseen(). */
+static hs_mask agrees(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real share, hs_mask settled, hs_real theta,
+                      hs_real time, const hs_real *q) {
+  const hs_real r = ((hs_real *)l->values)[k], since = HS_TIE * fabs(time), own = ((hs_real *)l->time)[k];
+  hs_real *const open = (hs_real *)l->open + k, noise, rate;
+  const hs_mask rises = share < 2, tied = settled & (own >= time) & (own - time <= since);
+  const hs_mask below = k < mode->edges ? ~(r > 0) : rises | ~rises;
+  if (!hs_any(rises)) return below;
+  if (bound_of(mode, l, k, time, q, ((hs_real *)l->weights)[k], &noise)) return rises & ~rises;
+  if (mode->rates[k].shape(mode->rates[k].of, (hs_real *)l->p, time, q, &rate)) return rises & ~rises;
+  const hs_mask behind = rises & (share > theta) & (r < -hs_max(noise, fabs(rate) * since));
+  *open = hs_choose(behind, *open * 0, *open);
+  return (rises & ~behind & tied) | (~(rises & ~behind) & below);
 }
 
 static int locate_lanes(hs_lanes *l) {
   const hs_lane_mode *const mode = &lane_modes[l->mode];
-  hs_real *const sizes = (hs_real *)l->sizes, *const shares = (hs_real *)l->error;
-  rises_of_lanes first;
+  const int n = mode->dimension;
+  hs_real *const sizes = (hs_real *)l->sizes, *const shares = (hs_real *)l->shares, *const slopes = (hs_real *)l->slopes;
+  hs_real first = HS_ALL(-1.0), least = HS_ALL(2.0), theta = least, time = least, q[n];
+  hs_mask settled[mode->surfaces + 1], plain = first == first;
   l->landed = 0;
-  if (first_rises(mode, l, shares, &first) || !hs_any(first.plain)) return 0;
-  hs_mask landed = settle_lanes(mode, l, &first);
-  if (!hs_any(landed)) return 0;
-  landed &= counts_alone(mode, l, shares, first.surface) & (*(hs_real *)l->theta > 0);
-  *(hs_real *)l->surface = first.surface;
-  for (int s = 0; s < mode->dimension; s++)
-    sizes[s] = hs_max(((hs_real *)l->before)[s], size_at(l, mode->dimension, *(hs_real *)l->theta, s));
-  l->landed = (int32_t)bits_of(landed);
+  if (first_rises(mode, l, shares, slopes, &plain) || !hs_any(plain)) return 0;
+  for (int k = 0; k < mode->surfaces; k++) {
+    settled[k] = plain & (shares[k] < 2);
+    if (!hs_any(settled[k])) continue;
+    settled[k] = settle_lanes(mode, l, k, settled[k], shares[k], slopes[k]);
+    const hs_mask earlier = shares[k] < least;
+    first = hs_choose(earlier, least * 0 + k, first), least = hs_choose(earlier, shares[k], least);
+    theta = hs_choose(earlier, ((hs_real *)l->theta)[k], theta);
+    plain &= ~earlier | settled[k];
+  }
+  plain &= (first >= 0) & (theta > 0);
+  if (!hs_any(plain)) return 0;
+  if (mode->surfaces > 1 && look_at(mode, l, theta, &time, q)) return 0;
+  for (int k = 0; mode->surfaces > 1 && k < mode->surfaces; k++)
+    plain &= (first == k) | agrees(mode, l, k, shares[k], settled[k], theta, time, q);
+  for (int s = 0; s < n; s++) sizes[s] = hs_max(((hs_real *)l->before)[s], size_at(l, n, theta, s));
+  l->landed = (int32_t)bits_of(plain);
   return 0;
 }
 

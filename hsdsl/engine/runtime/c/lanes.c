@@ -40,9 +40,10 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   hs_lanes *const l = &row->l;
   double **const one[] = {&l->t, &l->limit, &l->longest, &l->made, &l->since, &l->brief, 0};
   double **const states[] = {&l->x, &l->scales, &l->scale, &l->before, 0};
-  double **const step[] = {&l->h, &l->t1, 0}, **const found[] = {&l->surface, &l->theta, &l->time, 0};
-  double **const surfaces[] = {&l->starts, &l->ends, &l->open, 0}, **const noises[] = {&l->values, &l->weights, 0};
-  double **const scratch[] = {&l->end, &l->q, &l->sizes, 0};
+  double **const step[] = {&l->h, &l->t1, 0};
+  double **const surfaces[] = {&l->starts, &l->ends, &l->open, 0};
+  double **const found[] = {&l->values, &l->weights, &l->shares, &l->slopes, &l->theta, &l->time, 0};
+  double **const scratch[] = {&l->end, &l->error, &l->sizes, 0};
   const int64_t begun = store->used;
   take_columns(store, lanes, one);
   l->p = numbers(store, (int64_t)model->data * lanes);
@@ -57,10 +58,9 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   row->columns = (store->used - begun) / lanes;
   l->lines = numbers(store, (int64_t)model->lines * (order + 2) * lanes);
   l->gradient = numbers(store, (n + 1) * lanes);
-  l->error = numbers(store, (n > m ? n : m) * lanes);
   take_columns(store, n * lanes, scratch);
-  take_columns(store, m * lanes, noises);
-  take_columns(store, lanes, found);
+  take_columns(store, m * lanes, found);
+  l->q = numbers(store, m * n * lanes);
   l->inverse = numbers(store, (most + lanes - 1) / lanes * lanes);
   if (store->numbers) fill_binomials(l->inverse, (int)order);
   for (int64_t i = 0; store->numbers && i < most; i++) l->inverse[i] = 1 / l->inverse[i];
@@ -204,35 +204,39 @@ static void go_ahead(hs_team *team, hs_seat *seat, int outcome, int flows) {
   *seat->mode = run->here.mode;
 }
 
+/* Put the crossings that were found in a lane where crossings_along() writes its own; 0 where one may not count. */
+static int crossings_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
+  const hs_lanes *const l = &row->l;
+  const hs_mode *const mode = run->here.table;
+  const int n = run->here.dimension, lanes = row->lanes;
+  for (int k = 0; k < mode->surfaces; k++) {
+    hs_crossing *const crossing = &run->crossings[k];
+    crossing->edge = -1;
+    if (l->open[k * lanes + lane] == 0) continue;
+    crossing->edge = k;
+    crossing->theta = l->theta[k * lanes + lane], crossing->time = l->time[k * lanes + lane], crossing->depth = 0.0;
+    gather(l->q + k * n * lanes, crossing->state, n, lanes, lane);
+    if (k >= mode->edges) continue;
+    if (mode->edge[k].strict || condition(run, k, crossing->time, crossing->state) != 1) return 0;
+  }
+  return 1;
+}
+
 /* What a crossing comes to that was found in a lane, or is found here. */
 static int behind_crossing(const hs_row_of_lanes *row, int lane, hs_seat *seat) {
   hs_run *const run = &seat->run;
   const hs_lanes *const l = &row->l;
-  const hs_mode *const mode = run->here.table;
-  const int landed = l->landed >> lane & 1, k = landed ? (int)l->surface[lane] : 0, n = run->here.dimension;
-  hs_crossing *const crossing = &run->crossings[k];
-  if (landed) {
-    crossing->edge = k;
-    crossing->theta = l->theta[lane], crossing->time = l->time[lane], crossing->depth = 0.0;
-    gather(l->q, crossing->state, n, row->lanes, lane);
-  }
-  if (landed && (k >= mode->edges || (!mode->edge[k].strict && condition(run, k, crossing->time, crossing->state) == 1))) {
-    if (run->bare)
-      begin_span(run, l->h[lane], l->t1[lane]);
-    else
-      step_of_lane(row, lane, run);
-    gather(l->sizes, run->span.largest, n, row->lanes, lane);
-    run->span.sized = 1;
-    for (int i = 0; i < mode->surfaces; i++)
-      if (i != k) run->crossings[i].edge = -1;
-    seat->unwritten = 0;
-    return behind_event(run, first_event(run));
-  }
-  if (seat->unwritten) append(run, run->here.t, run->x, 0);
+  const int landed = l->landed >> lane & 1 && crossings_of_lane(row, lane, run);
+  if (!landed && seat->unwritten) append(run, run->here.t, run->x, 0);
   seat->unwritten = 0;
-  step_of_lane(row, lane, run);
-  curves_of_lane(row, lane, run);
-  return behind_step(run);
+  if (!landed || !run->bare)
+    step_of_lane(row, lane, run);
+  else
+    begin_span(run, l->h[lane], l->t1[lane]);
+  if (!landed) return curves_of_lane(row, lane, run), behind_step(run);
+  gather(l->sizes, run->span.largest, run->here.dimension, row->lanes, lane);
+  run->span.sized = 1;
+  return behind_event(run, first_event(run));
 }
 
 /* Find the crossings of the runs that wait for it, and follow these on. */
