@@ -13,6 +13,7 @@ from shipped import MODELS
 
 import hsdsl
 from hsdsl.engine.backends.c.lanes import lane_source
+from hsdsl.engine.runtime import library
 from hsdsl.engine.runtime.library import vectors
 from hsdsl.engine.simulate import ensemble
 from hsdsl.engine.simulate.ensemble import BY_INSTANCE, CompiledEnsemble, Kept, ThreadWorkspace
@@ -57,6 +58,11 @@ class Together:
         """Steps that lanes have made."""
         return sum(team.team.stepped - team.team.failed for team in self.teams)
 
+    @property
+    def located(self) -> float:
+        """The share of crossings that lanes have found."""
+        return sum(team.team.located for team in self.teams) / sum(team.team.crossed for team in self.teams)
+
 
 @pytest.fixture
 def together(monkeypatch: pytest.MonkeyPatch) -> Together:
@@ -98,6 +104,21 @@ def test_fixed_steps(together: Together) -> None:
     model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
     together.compare(model, initial=varied(model), until=12, step=0.05)
     assert together.stepped > 1000
+
+
+@pytest.mark.parametrize(("name", "share"), [("oscillator-with-stop-1", 0.9), ("pronking-runner", 0.3)])
+def test_crossings_are_found_in_lanes(together: Together, name: str, share: float) -> None:
+    model = hsdsl.load(MODELS / f"{name}.yaml")  # the feet of the runner touch down one by one, or both at once
+    for seed in range(2):
+        together.compare(model, initial=varied(model, seed), samples=7 * seed or None, tolerance=1e-10)
+    assert together.located > share
+
+
+def test_four_lanes(together: Together, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library, "vectors", lambda: ("-mavx2",))
+    model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
+    together.compare(model, initial=varied(model), until=25)
+    assert together.teams[0].team.stepped <= 4 * together.teams[0].team.steps
 
 
 @pytest.mark.parametrize(
