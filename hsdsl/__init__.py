@@ -3,7 +3,7 @@
 Six storeys above a base; a module imports only from its own storey and those below::
 
     interface      Model, the command line, charts of methods, models of other tools         what people touch
-    export         a model as C, FMI, Rust, MATLAB, JAX, a web page
+    export         a model as C, FMI, Rust, MATLAB, JAX, a web page, a document
     analysis       questions about executions, and their answers as text, files, pictures
     engine         Program -> Kernel -> Execution: code, methods, the schemes, verdicts       no SymPy
     mathematics    HybridSystem -> Program: flows along guards, decisions, lowering

@@ -122,10 +122,10 @@ def make_radau(of: Blocks, tolerance: Number, soon: Number, arithmetic: Arithmet
         unit=unit, tolerance=tolerance,
         enough=enough_of(unit, tolerance, arithmetic.sqrt(tolerance)) if tolerance > 0 else zero,
         soon=soon, most=arithmetic.most_halvings,
-        derived=False, stepped=False, factored=False, aged=False, lifted=False,
-        derived_at=zero, factored_for=zero, start=zero, length=zero, rate=zero + 1, left=zero + 1,
+        has_jacobian=False, stepped=False, factored=False, stale=False, lifted=False,
+        jacobian_at=zero, factored_for=zero, start=zero, length=zero, rate=zero + 1, eta=zero + 1,
         rows=room(0), fresh=room(0), lasting=room(of.width), scales=(), least=room(of.width),
-        z=rooms(3), last=rooms(3), apart=rooms(3), change=rooms(3), slopes=rooms(3), right=rooms(3),
+        z=rooms(3), last=rooms(3), transformed=rooms(3), change=rooms(3), slopes=rooms(3), right=rooms(3),
         largest=room(of.width), error=room(of.width), at=room(of.width), factors=factors,
         resolved=make_resolved(of.width, tolerance, arithmetic),
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The equations of a step by Radau IIA, solved by Newton's method, and when its iterations stop: see radau."""
+"""Simplified Newton iterations for the equations of a Radau IIA step, and when they stop: see radau."""
 
 from __future__ import annotations
 
@@ -10,46 +10,49 @@ from hsdsl.engine.scheme.primitives import Collocation, flow_at, sum_of
 from hsdsl.engine.scheme.scales import Resolved, is_finite
 from hsdsl.engine.scheme.words import Here, Room, Time, Vector, each, inline, may_fail
 
-MOST_ITERATIONS = 7  # A step that has a tolerance iterates at most so often.
-RENEWED = 1e-3  # Derivatives are old where an iteration leaves more than this share of the one before.
-FEW = 2  # Old derivatives are renewed only where a step took more iterations than these.
+MOST_ITERATIONS = 7  # Largest number of iterations of a step that has a tolerance.
+RENEWED = 1e-3  # The Jacobian is stale if the convergence rate exceeds this.
+FEW = 2  # A stale Jacobian is renewed only if a step took more iterations than this.
 LEAST_LEFT = 1e-3  # Iterations of a step that has a tolerance may always leave this share of it.
 MOST_LEFT = 0.03  # They may never leave more than this share.
-DIVERGING = 0.99  # A step is too long where an iteration leaves more than this share of the one before.
-SLOW_RATE = 0.5  # The same limit holds for iterations that go on to round-off.
-NEWTON_NOISE = 1024  # A correction of at most so many units of round-off, relative to the scales, may be all noise.
-NEWTON_SHARE = 1e-2  # A badly conditioned step may be left with a correction of this share of the tolerance.
+DIVERGING = 0.99  # A step is too long if the convergence rate reaches this.
+SLOW_RATE = 0.5  # The same limit for iterations to round-off.
+NEWTON_NOISE = 1024  # A correction of at most this many units of round-off, relative to the scales, may be noise.
+NEWTON_SHARE = 1e-2  # Iterations to round-off of a badly conditioned step may end with this share of the tolerance.
 
 
 @dataclass
 class Radau:
-    """Steps along one stretch of flow, and what one leaves for the next; lists have an item for each of 3 stages."""
+    """Steps along one stretch of flow, and what one leaves for the next; lists have an item for each of 3 stages.
+
+    A stretch is flow in one mode and one input segment.
+    """
 
     unit: Number  # of round-off
     tolerance: Number  # of a step; 0 where steps are solved to round-off
-    enough: Number  # share of the tolerance that iterations may leave
-    soon: Number  # length that a run tries first
-    most: int  # iterations to round-off
-    derived: bool  # whether ``rows`` are of this stretch
+    enough: Number  # share of the tolerance that iterations may leave: kappa of Hairer and Wanner
+    soon: Number  # initial step size of the run
+    most: int  # largest number of iterations to round-off
+    has_jacobian: bool  # whether ``rows`` have a Jacobian of this stretch
     stepped: bool  # whether ``last`` is of this stretch
     factored: bool  # whether ``factors`` are those of ``rows`` for the length ``factored_for``
-    derived_at: Time  # of ``rows``
+    jacobian_at: Time  # when ``rows`` were evaluated
     factored_for: Number
     start: Time  # of the step whose increments are in ``last``
     length: Number  # of that step
-    rate: Number  # share of the one before that the last iteration left; 1 where it is not known
-    left: Number  # what all further iterations would have added, relative to the last one
-    aged: bool  # whether the next step renews the derivatives
-    lifted: bool  # whether round-off of the flow has lifted scales: none is below ``least`` then
-    rows: Room  # derivatives of the flow
-    fresh: Room  # room for the next derivatives
-    lasting: Room  # share of an error of each derivative of states that lasts over the next step
+    rate: Number  # convergence rate theta: the ratio of the last two changes; 1 where it is not known
+    eta: Number  # theta / (1 - theta): the sum of all further changes, relative to the last one
+    stale: bool  # whether the next step evaluates the Jacobian again
+    lifted: bool  # whether round-off of the flow has raised scales: none is below ``least`` then
+    rows: Room  # the Jacobian: its entries that are not zero everywhere, row by row
+    fresh: Room  # room for the next Jacobian
+    lasting: Room  # of each sensitivity: the share of an error that remains after the time ``soon``
     scales: Vector  # with which the last step was solved
     least: Room
     z: list[Room]  # increments Z
-    last: list[Room]  # Z of the last step that was solved
-    apart: list[Room]  # transformed increments, the inverse of T times Z
-    change: list[Room]  # what an iteration adds to ``apart``
+    last: list[Room]  # Z of the last solved step
+    transformed: list[Room]  # increments transformed by the inverse of T: W = T^-1 Z
+    change: list[Room]  # what an iteration adds to ``transformed``
     slopes: list[Room]  # the flow at the stages
     right: list[Room]  # right-hand sides of an iteration
     largest: Room  # largest size in ``change`` of each state
@@ -72,9 +75,10 @@ def enough_of(unit: Number, tolerance: Number, root: Number) -> Number:
 
 @inline
 def scaled(steps: Radau, of: Blocks, x: Vector) -> Number:
-    """Return the largest change relative to the scales; of a state that has been zero so far, to where it is now.
+    """Return the largest change relative to the scales.
 
-    A scale by the round-off of what made that zero, no more than the tolerance times where it is now, is none.
+    A state that has been zero so far has no scale: its largest size at the stages counts instead. It also counts
+    instead of a scale from round-off alone that is at most the tolerance times this size.
     """
     size: Number = 0
     u, v, w = steps.z[0], steps.z[1], steps.z[2]
@@ -90,7 +94,7 @@ def scaled(steps: Radau, of: Blocks, x: Vector) -> Number:
 
 @inline
 def followers(steps: Radau, of: Blocks, x: Vector) -> int:
-    """Count the states that have been zero so far and no longer are: each may follow another, an iteration later."""
+    """Count the states that have been zero so far and no longer are: each may make another so, an iteration later."""
     count = 0
     for s in range(of.n):
         if not steps.scales[s] > 0:
@@ -104,7 +108,7 @@ def followers(steps: Radau, of: Blocks, x: Vector) -> int:
 @inline
 @may_fail
 def iterate(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector) -> bool:
-    """Iterate once by Newton's method on Z = h A f(x + Z), in the coordinates that take A apart.
+    """Make one simplified Newton iteration for Z = h A f(x + Z), transformed by T to one real and one complex system.
 
     Return whether the increments after it, and the largest change of each state, are finite.
     """
@@ -114,7 +118,7 @@ def iterate(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h
         for s in each(n):
             at[s] = x[s] + moved[s]
         flow_at(here, t + known.node[i] * h, at, steps.slopes[i])
-    u, v, w = steps.apart[0], steps.apart[1], steps.apart[2]
+    u, v, w = steps.transformed[0], steps.transformed[1], steps.transformed[2]
     e, f, g = steps.slopes[0], steps.slopes[1], steps.slopes[2]
     p, q, r = steps.right[0], steps.right[1], steps.right[2]
     gamma, alpha, beta = known.gamma, known.alpha, known.beta
@@ -143,13 +147,13 @@ def iterate(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h
 @inline
 @may_fail
 def to_tolerance(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector) -> bool:
-    """Iterate until what is left is a small share of the tolerance.
+    """Iterate until all further changes are a small share of the tolerance.
 
-    False where it will not be, within the iterations that a step may take.
+    Return False where MOST_ITERATIONS are too few for that.
     """
     noise = NEWTON_NOISE * steps.unit / steps.tolerance
     # the first iteration has no rate: eta_0 = max(eta of the step before, unit)**0.8 (Hairer and Wanner 1996, IV.8)
-    left = max(steps.left, steps.unit) ** ((steps.unit * 0 + 4) / 5)
+    eta = max(steps.eta, steps.unit) ** ((steps.unit * 0 + 4) / 5)
     before: Number = 0
     for count in range(1, MOST_ITERATIONS + 1):
         goes_on = iterate(here, of, known, steps, t, h, x)
@@ -164,11 +168,11 @@ def to_tolerance(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Ti
                     return True
                 break
             steps.rate = rate
-            left = rate / (1 - rate)
-        steps.aged = count > FEW and steps.rate > RENEWED
-        ahead = left * size
+            eta = rate / (1 - rate)
+        steps.stale = count > FEW and steps.rate > RENEWED
+        ahead = eta * size
         if size == 0 or ahead <= steps.enough:
-            steps.left = left
+            steps.eta = eta
             return True
         if rated:
             for _next in range(count, MOST_ITERATIONS):
@@ -177,8 +181,8 @@ def to_tolerance(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Ti
                 break
         before = size
     steps.rate = 1
-    steps.left = 1
-    steps.aged = True
+    steps.eta = 1
+    steps.stale = True
     return False
 
 
@@ -196,9 +200,9 @@ def is_below_digits(steps: Radau, of: Blocks, x: Vector, rate: Number) -> bool:
 @inline
 @may_fail
 def to_roundoff(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector) -> bool:
-    """Iterate until the next correction would be below the last digit, or they are all noise.
+    """Iterate until the next correction would be below the last digit, or corrections are noise.
 
-    False where they become no smaller before that.
+    Return False where they stop shrinking before that.
     """
     allowed = max(NEWTON_NOISE * steps.unit, NEWTON_SHARE * steps.tolerance)
     before: Number = 0
@@ -210,13 +214,13 @@ def to_roundoff(here: Here, of: Blocks, known: Collocation, steps: Radau, t: Tim
         rate = SLOW_RATE if before == 0 else size / before
         if size == 0 or (rate < SLOW_RATE and is_below_digits(steps, of, x, rate)):
             steps.rate = rate
-            steps.aged = rate > RENEWED
+            steps.stale = rate > RENEWED
             return True
         if before != 0 and rate >= SLOW_RATE and count > 1 + followers(steps, of, x):
             if size <= allowed:
                 return True
             steps.rate = 1
-            steps.aged = True
+            steps.stale = True
             return False
         before = size
     return True

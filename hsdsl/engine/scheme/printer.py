@@ -1,9 +1,12 @@
 """The text of the scheme as C99: the same operations in the same order, each with its own parentheses.
 
 The text is Python, and a small part of it: `docs/scheme.md` defines which. Modules of this folder are read by Python's
-parser; whatever is not of the subset is refused, with file and line. What a name is follows from what it is first set
-to: a number, an instant, an integer, a truth, a vector, or a record. A function without a result for some arguments
-returns in C whether it has one, and one that may fail whether it has failed.
+parser; whatever is not of the subset is refused, with file and line. The first assignment to a name fixes its kind, its
+type in C: a number, an instant, an integer, a truth, a vector, or a record. In C a function whose result may be absent
+returns whether it has one, and one that may fail whether it has failed; their results go to pointers.
+
+`Scheme` collects the records and signatures of all modules; `_Function` prints one function. What prints an expression
+returns its text in C and its kind.
 """
 
 from __future__ import annotations
@@ -49,7 +52,7 @@ class Refused(ValueError):
 
 @dataclass(frozen=True)
 class Signature:
-    """What a caller knows of a function."""
+    """What a caller knows of a function; ``results`` are kinds, ``optional`` says whether they may be absent."""
 
     arguments: Mapping[str, str]
     results: Sequence[str]
@@ -202,11 +205,13 @@ class _Function:
 
     def __init__(self, scheme: Scheme, text: Text, arguments: Mapping[str, str]) -> None:
         self.scheme, self.text = scheme, text
-        self.kinds, self.optional = dict(arguments), set[str]()
-        self.late: dict[str, str] = {}  # declared at the function's beginning
-        self.places: dict[str, tuple[int, ...]] = {}
+        self.kinds = dict(arguments)  # of all names set so far
+        self.optional = set[str]()  # names whose value may be absent
+        self.late: dict[str, str] = {}  # names by kind that C declares at the function's beginning
+        self.innermost: dict[str, tuple[int, ...]] = {}  # for each name the path to the block that has all its uses
         self.known = Signature({}, (), False, False)
-        self.failed, self.before = "", set[str]()
+        self.failed = ""  # the statement in C where a call has failed
+        self.before = set[str]()  # functions that stand before this one
         self.commented = 0  # line of the last comment
 
     def printed(self, definition: ast.FunctionDef) -> str:
@@ -215,7 +220,7 @@ class _Function:
         self.before = {*takewhile(lambda name: name != definition.name, self.scheme.functions)}
         if self.known.fails:
             self.failed = "return RAISED;"
-        self._place(definition.body, ())
+        self._find_innermost(definition.body, ())
         body = [part for part in definition.body if not _is_docstring(part)]
         lines = self.block(body, ())
         if (self.known.fails and not self.known.results) or (
@@ -227,18 +232,18 @@ class _Function:
         text = indent("\n".join([*declared, *lines]), "  ")
         return f"{about}{self.scheme.head(definition.name, 'inline' in _decorators(definition))} {{\n{text}\n}}\n"
 
-    def _place(self, body: Sequence[ast.stmt], path: tuple[int, ...]) -> None:
+    def _find_innermost(self, body: Sequence[ast.stmt], path: tuple[int, ...]) -> None:
         """Find for each name the innermost block that has all its uses."""
         for part in body:
             inner = [getattr(part, name) for name in ("body", "orelse") if isinstance(getattr(part, name, None), list)]
             within = {id(node) for block in inner for statement in block for node in ast.walk(statement)}
             for node in ast.walk(part):
                 if isinstance(node, ast.Name) and id(node) not in within:
-                    before = self.places.get(node.id, path)
+                    before = self.innermost.get(node.id, path)
                     shared = [a for a, b in zip(before, path, strict=False) if a == b]
-                    self.places[node.id] = tuple(shared)
+                    self.innermost[node.id] = tuple(shared)
             for block in inner:
-                self._place(block, (*path, id(block)))
+                self._find_innermost(block, (*path, id(block)))
 
     def block(self, body: Sequence[ast.stmt], path: tuple[int, ...]) -> list[str]:
         """Print statements, with the comments before them and beside them."""
@@ -300,7 +305,7 @@ class _Function:
                 self.failed = before
                 return lines
             case ast.Expr(value=ast.Call() as call):
-                return [self.called(call, [])]
+                return [self.call_statement(call, [])]
             case _:
                 raise self.text.refused(part, "the statement")
 
@@ -360,7 +365,7 @@ class _Function:
                     lines.append(f"{self.scheme.c_type(result)}{one.id};")
                 if isinstance(one, ast.Name) and known.optional:
                     self.optional.add(one.id)
-            return [*lines, *self.taken(value, known, targets, path)]
+            return [*lines, *self.assigned_call(value, known, targets, path)]
         if isinstance(value, ast.Constant) and value.value is None and isinstance(target, ast.Name):
             return [f"has_{target.id} = 0;"]
         text, found = self.value(value, outer=True)
@@ -377,23 +382,25 @@ class _Function:
         if kind in ("int", "Count", "bool") and _wider(kind, found) != kind:
             raise self.text.refused(part, f"{kind} that is set to {found}")
 
-    def taken(self, call: ast.Call, known: Signature, targets: Sequence[ast.expr], path: tuple[int, ...]) -> list[str]:
-        """Print a call whose results go to targets."""
+    def assigned_call(
+        self, call: ast.Call, known: Signature, targets: Sequence[ast.expr], path: tuple[int, ...]
+    ) -> list[str]:
+        """Print an assignment from a call that may fail, may have no result, or has several."""
         texts = [self.value(one)[0] for one in targets]
         if known.fails:
-            return [self.called(call, texts)]
+            return [self.call_statement(call, texts)]
         if not known.optional:
             return [f"{texts[0]} = {self.call(call, texts[1:])};"]
         name = texts[0]
-        place = self.new(f"has_{name}", "bool", path, self.places.get(name, ()))
+        place = self.new(f"has_{name}", "bool", path, self.innermost.get(name, ()))
         return [f"{'int ' if place else ''}has_{name} = {self.call(call, texts)};"]
 
     def new(self, name: str, kind: str, path: tuple[int, ...], within: tuple[int, ...] | None = None) -> bool:
-        """Learn what a name is; whether it is declared here, where it is first set."""
+        """Fix the kind of a new name; return whether C declares it in the statement that sets it first."""
         if name in self.kinds:
             return False
         self.kinds[name] = kind
-        place = self.places.get(name, ()) if within is None else within
+        place = self.innermost.get(name, ()) if within is None else within
         if place == path:
             return True
         self.late[name] = kind
@@ -419,7 +426,7 @@ class _Function:
         given += [one if one == "result" else f"&{one}" for one in out]
         return f"{ast.unparse(call.func)}({', '.join(given)})"
 
-    def called(self, call: ast.Call, out: Sequence[str]) -> str:
+    def call_statement(self, call: ast.Call, out: Sequence[str]) -> str:
         """Print a call as a statement, with what happens where it fails."""
         if not self.signature(call).fails:
             return f"{self.call(call, out)};"
@@ -435,7 +442,7 @@ class _Function:
         return text
 
     def value(self, node: ast.expr, outer: bool = False) -> tuple[str, str]:
-        """Print an expression; also what it is. The outermost needs no parentheses."""
+        """Print an expression, and find its kind; the outermost one needs no parentheses."""
         text, kind = self.bare(node)
         nested = isinstance(node, (ast.BinOp, ast.BoolOp, ast.Compare, ast.IfExp))
         return (f"({text})" if nested and not outer else text), kind
@@ -565,7 +572,7 @@ class _Function:
 
 
 def _wider(kind: str, another: str) -> str:
-    """What an operation of two kinds gives."""
+    """The kind of an operation on two kinds."""
     return next((one for one in ("Time", "Number", "Count", "int") if one in (kind, another)), kind)
 
 

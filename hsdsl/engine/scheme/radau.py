@@ -2,14 +2,16 @@
 
 A step is collocation at the nodes (4 - sqrt 6)/10, (4 + sqrt 6)/10 and 1: the polynomial u of degree 3 from the step's
 start that has the flow's slope at these three times. It is L-stable: what decays fast is gone after one step, however
-long. The unknowns are the increments Z_i = u(t + c_i h) - x, with Z = h A f(x + Z). A similarity T takes the inverse of
-A to one real number and a block of two, so that a Newton iteration solves one real and one complex system instead of
-one of three times the size.
+long. The unknowns are the increments Z_i = u(t + c_i h) - x, with Z = h A f(x + Z). A similarity T (``mix``) makes the
+inverse of A block diagonal, with one real eigenvalue and one complex pair. So a simplified Newton iteration for
+W = T^-1 Z solves one real and one complex system instead of one of three times the size.
 
-What a step must know is expensive: derivatives of the flow, factors of two matrices, a first guess. So what one step
-leaves is kept for the next: the derivatives as long as the iterations converge fast, the factors as long as the step
-keeps its length too, and the guess is the last polynomial, gone on with. The iterations converge linearly, by a factor
-that the last two changes tell; what the next ones would still add follows from it.
+The Jacobian and the factors of two matrices are expensive, so steps share them. The Jacobian J is kept while the
+iterations converge fast; the factors are kept while the step size also stays the same. Starting values extrapolate the
+last step's polynomial. The iterations converge linearly. The last two changes show their rate, and the sum of all
+further changes follows from it.
+
+Sensitivities are states that are derivatives of others (`linear.Blocks`): the variational equation.
 
 E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, Springer 1996, IV.5 and IV.8
 (doi:10.1007/978-3-642-05221-7).
@@ -35,25 +37,25 @@ from hsdsl.engine.scheme.words import Here, Indices, Room, Time, Vector, each, i
 
 
 def begin_stretch(steps: Radau, of: Blocks) -> None:
-    """Begin another stretch of flow."""
+    """Begin another stretch of flow: nothing that earlier steps left is valid there."""
     for s in range(of.n, of.width):  # these do not flow
         steps.largest[s] = 0
         steps.error[s] = 0
         for i in range(3):
             steps.z[i][s] = 0
             steps.last[i][s] = 0
-    steps.derived = False
+    steps.has_jacobian = False
     steps.factored = False
     steps.stepped = False
     steps.rate = 1
-    steps.left = 1
-    steps.aged = False
+    steps.eta = 1
+    steps.stale = False
     steps.lifted = False
 
 
 @inline
 def fill_diagonal(of: Blocks, rows: Vector, diagonal: Room) -> None:
-    """Find the derivative of each state's flow with respect to that state."""
+    """Find the diagonal of the Jacobian, with its zeros."""
     at = 0
     for s in range(of.width):
         diagonal[s] = 0
@@ -64,9 +66,9 @@ def fill_diagonal(of: Blocks, rows: Vector, diagonal: Room) -> None:
 
 
 @may_fail
-def derive(here: Here, of: Blocks, steps: Radau, t: Time, x: Vector) -> None:
-    """Take the derivatives of the flow, and which share of an error of a varied state lasts over the next step."""
-    # into `fresh` first, then exchanged: where this fails, `rows` still has the earlier derivatives
+def evaluate_jacobian(here: Here, of: Blocks, steps: Radau, t: Time, x: Vector) -> None:
+    """Evaluate the Jacobian, and of sensitivities the share of an error that remains after the time ``soon``."""
+    # into `fresh` first, then exchanged: where this fails, `rows` still has the earlier Jacobian
     derivatives_at(here, t, x, steps.fresh)
     rows = steps.fresh
     steps.fresh = steps.rows
@@ -75,13 +77,13 @@ def derive(here: Here, of: Blocks, steps: Radau, t: Time, x: Vector) -> None:
         fill_diagonal(of, rows, steps.lasting)
         for s in range(of.own, of.n):
             steps.lasting[s] = 1 / (1 + steps.soon * abs(steps.lasting[s]))
-    steps.derived = True
-    steps.derived_at = t
+    steps.has_jacobian = True
+    steps.jacobian_at = t
     steps.factored = False
 
 
 def factor_sparse(of: Blocks, pattern: Elimination, known: Collocation, steps: Radau, h: Number) -> bool:
-    """Factor gamma - h J and alpha - i beta - h J in the pattern of a sparse elimination, as `factor_dense` does."""
+    """Factor the same matrices as `factor_dense`, in the pattern of a sparse elimination."""
     by = steps.factors
     for i in range(pattern.size):
         by.real[i] = 0
@@ -102,7 +104,7 @@ def factor_sparse(of: Blocks, pattern: Elimination, known: Collocation, steps: R
 
 @inline
 def factor_dense(of: Blocks, known: Collocation, steps: Radau, h: Number, scales: Vector) -> bool:
-    """Factor gamma - h J and alpha - i beta - h J as dense matrices; return whether they have inverses."""
+    """Factor gamma I - h J and (alpha - i beta) I - h J as dense matrices; return whether they have inverses."""
     n, by = of.own, steps.factors
     for i in range(n * n):
         by.real[i] = 0
@@ -123,7 +125,7 @@ def factor_dense(of: Blocks, known: Collocation, steps: Radau, h: Number, scales
 
 @inline
 def factor_all(of: Blocks, known: Collocation, steps: Radau, h: Number, scales: Vector) -> bool:
-    """Factor gamma - h J and alpha - i beta - h J, unless that is done; return whether they have inverses."""
+    """Factor gamma I - h J and (alpha - i beta) I - h J, unless that is done; return whether they have inverses."""
     if not (steps.factored and steps.factored_for == h):
         v, pattern = of.varied, of.pattern
         if v is not None:
@@ -138,11 +140,11 @@ def factor_all(of: Blocks, known: Collocation, steps: Radau, h: Number, scales: 
 
 
 @inline
-def guess(of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number) -> None:
-    """Go on with the last step's polynomial: behind its end, or inside it where it was tried from here."""
+def starting_values(of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number) -> None:
+    """Extrapolate the last step's polynomial, or interpolate it where it began here; else start from zero."""
     # x, y, z are increments, not states; u, v, w are the transformed ones
     x, y, z = steps.z[0], steps.z[1], steps.z[2]
-    u, v, w = steps.apart[0], steps.apart[1], steps.apart[2]
+    u, v, w = steps.transformed[0], steps.transformed[1], steps.transformed[2]
     behind = steps.stepped and t == steps.start + steps.length
     if behind or (steps.stepped and t == steps.start):
         e, f, g = steps.last[0], steps.last[1], steps.last[2]
@@ -173,7 +175,7 @@ def guess(of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number) -> N
 
 
 def look_closer(here: Here, of: Blocks, steps: Radau, t: Time, h: Number, x: Vector, scales: Vector) -> None:
-    """Look at the terms of the flow for the scales of the states over a step, and over those that follow."""
+    """Raise the scales of the states by the round-off of the terms of the flow, for this step and those that follow."""
     fill_diagonal(of, steps.rows, steps.resolved.diagonal)
     try:
         resolve(here, steps.resolved, of.width, t, h, x, scales, True)
@@ -192,11 +194,11 @@ def solve_step(
     here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector, scales: Vector,
     exactly: bool,
 ) -> bool:  # fmt: skip
-    """Solve Z = h A f(x + Z), with derivatives from an earlier step if they still do; return whether it is solved."""
-    if not steps.derived or (steps.aged and steps.derived_at != t):
-        derive(here, of, steps, t, x)
+    """Solve Z = h A f(x + Z), first with the Jacobian of an earlier step; return whether it is solved."""
+    if not steps.has_jacobian or (steps.stale and steps.jacobian_at != t):
+        evaluate_jacobian(here, of, steps, t, x)
     closer = False
-    # at most three tries: with the derivatives at hand; with those at t; with these, and scales by a closer look
+    # at most three tries: with the Jacobian at hand; with that at t; with that and scales by a closer look
     while True:
         steps.scales = scales
         if steps.lifted:
@@ -205,16 +207,16 @@ def solve_step(
             steps.scales = steps.resolved.found
         if closer:
             look_closer(here, of, steps, t, h, x, scales)
-        guess(of, known, steps, t, h)
+        starting_values(of, known, steps, t, h)
         done = factor_all(of, known, steps, h, scales)
         if done and exactly:
             done = to_roundoff(here, of, known, steps, t, h, x)
         elif done:
             done = to_tolerance(here, of, known, steps, t, h, x)
-        if done or (closer and steps.derived_at == t):
+        if done or (closer and steps.jacobian_at == t):
             return done
-        if steps.derived_at != t:
-            derive(here, of, steps, t, x)
+        if steps.jacobian_at != t:
+            evaluate_jacobian(here, of, steps, t, x)
         else:
             closer = True
 
@@ -230,16 +232,16 @@ def larger(a: Number, b: Number) -> Number:
 def estimate(
     here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector, slope: Vector
 ) -> None:
-    """Estimate the error of a step's end and of the curve inside it, for each state the larger of the two.
+    """Estimate the errors of a step's end and of its dense output; for each state the larger one counts.
 
-    Both are (gamma - h J)^-1 times a defect. That of Hairer and Wanner (IV.8.19), from the flow at the start, is the
-    embedded method's; over a decay that the step is too long to show it stays as large as what decays. For stiff states
-    that follow a slow motion it is far too small for the curve, so the flow is compared with the polynomial at one more
-    point, where the polynomial's slope is farthest off.
+    Both are (gamma I - h J)^-1 times a defect. The first defect is that of the embedded method, from the flow at the
+    start (Hairer and Wanner, IV.8.19). It stays as large as a decay that the step is too long to resolve. For stiff
+    states that follow a slow motion it is far too small for the dense output. The second defect therefore compares the
+    flow with the polynomial at one more point, where the polynomial's slope is farthest off.
 
-    Where steps show a decay the first is 2.7 times the second, and that 1.5 times the largest error of the curve. The
-    end is off by far less, and a derivative that decays soon forgets it. No crossing depends on derivatives: of these
-    the first defect counts by the share of an error that lasts.
+    Where steps resolve a decay, the first estimate is 2.7 times the second, and that is 1.5 times the largest error of
+    the dense output. The end is off by far less, and a sensitivity that decays soon forgets it. No crossing depends on
+    sensitivities: their first defect counts only by the share ``lasting``.
     """
     n, at, error = of.n, steps.at, steps.error
     u, v, w = steps.z[0], steps.z[1], steps.z[2]
@@ -314,7 +316,7 @@ def radau_landing(
     here: Here, of: Blocks, known: Collocation, steps: Radau, t: Time, h: Number, x: Vector, scales: Vector,
     measures: int, measured: Indices, z: Room,
 ) -> bool:  # fmt: skip
-    """Make a part of the last step, solved to round-off: its end z is a smooth function of its length."""
+    """Step to a point inside the last step, solved to round-off: its end z is a smooth function of the step size."""
     if of.n == 0:
         return True
     solved = solve_step(here, of, known, steps, t, h, x, scales, True)
@@ -327,7 +329,7 @@ def radau_landing(
 
 
 def fill_piece(of: Blocks, known: Collocation, steps: Radau, room: int, piece: Room) -> None:
-    """Write the polynomial through the increments: coefficient m of the step's share at m ``room``."""
+    """Write the step's polynomial in its fraction s: the coefficients of s**(m + 1) begin at m ``room``."""
     for m in range(3):
         for s in range(of.width):
             piece[m * room + s] = weighted(known.power[m], steps.z[0][s], steps.z[1][s], steps.z[2][s])

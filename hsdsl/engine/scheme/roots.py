@@ -1,4 +1,7 @@
-"""Where polynomials rise through zero, by their Bernstein form: see hsdsl/engine/simulate/surfaces.py."""
+"""Root isolation: where polynomials rise through zero, as hsdsl/engine/simulate/surfaces.py asks.
+
+An interval is halved until the signs of the Bernstein coefficients show one root or none (Descartes' rule of signs).
+"""
 
 from __future__ import annotations
 
@@ -64,7 +67,7 @@ def bernstein_of(roots: Roots, c: Vector, n: int) -> Vector:
 def stays_below(roots: Roots, c: Vector, n: int, level: Number) -> bool:
     """Whether bounds prove that the polynomial is nowhere above a level on [0, 1]; if not, that proves nothing.
 
-    Its values are mixtures of the sums of its first coefficients, and so are its Bernstein coefficients.
+    Its values are convex combinations of the partial sums of its coefficients, and so are its Bernstein coefficients.
     """
     total = c[0]
     bound = c[0]
@@ -76,7 +79,7 @@ def stays_below(roots: Roots, c: Vector, n: int, level: Number) -> bool:
 
 
 def changes(b: Vector, n: int) -> int:
-    """Count the changes of sign, zeros left out; not-a-number counts as negative."""
+    """Count the sign changes of Bernstein coefficients, without zeros; not-a-number counts as negative."""
     count = 0
     before = 0
     for i in range(n + 1):
@@ -179,7 +182,7 @@ def last_root(roots: Roots, c: Vector, n: int, taken: int, start: Number, end: N
     """Find the last point in [start, end] where P rises through 0, knowing that it is positive at the end.
 
     None where it is positive all the way. The polynomial c is P or, with 1 taken, P times s: then its Bernstein
-    coefficients behind the first, times n / k, are those of P, and have their signs.
+    coefficients after the first, times n / k, are those of P, and have their signs.
     """
     whole = bernstein_of(roots, c, n)
     own, p, m = whole[taken:], c[taken:], n - taken

@@ -103,7 +103,8 @@ static hs_real **vectors(hs_store *store, int count, int64_t length) {
 static void lay_out_radau(hs_radau *radau, int w, int factors, int varied, hs_store *store) {
   hs_factors *const by = &radau->factors;
   hs_real **const matrices[] = {&radau->rows, &radau->fresh, &by->real, &by->re, &by->im};
-  hs_real ***const threes[] = {&radau->z, &radau->last, &radau->apart, &radau->change, &radau->slopes, &radau->right};
+  hs_real ***const threes[] = {&radau->z,      &radau->last,   &radau->transformed,
+                               &radau->change, &radau->slopes, &radau->right};
   hs_real **const states[] = {&radau->largest, &radau->error, &radau->least, &radau->resolved.diagonal};
   for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, factors);
   for (int i = 0; i < 6; i++) *threes[i] = vectors(store, 3, w);

@@ -430,7 +430,8 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
   return reaches(run, k, crossing);
 }
 
-/* Keep the crossing of surface k where one was `found` that counts, else mark that it has none; return the first one. */
+/* Keep the crossing of surface k where one was `found` that counts, else mark that it has none; return the first one.
+   The Python twin is `keep` in `crossings_along`. */
 static const hs_crossing *kept_crossing(hs_run *run, const hs_crossing *first, int k, int found) {
   hs_crossing *const crossing = &run->crossings[k];
   if (!found || (k < run->here.table->edges && too_late(run, k, crossing->time, tie(crossing->time)))) {
@@ -441,7 +442,7 @@ static const hs_crossing *kept_crossing(hs_run *run, const hs_crossing *first, i
 }
 
 /* Mark in run->beyond the surfaces that rise behind the first crossing: there they are inside, beyond round-off and by
-   more than they rise while crossings are tied. */
+   more than they rise while crossings are tied. The Python twin is `is_behind`, of one surface. */
 static int mark_behind(hs_run *run, const hs_crossing *first) {
   const hs_mode *mode = run->here.table;
   const hs_real since = tie(first->time);
@@ -525,7 +526,7 @@ static int largest(hs_run *run) {
   return 0;
 }
 
-/* Record the part of the step that leads to a crossing. */
+/* Record the part of the step that leads to a crossing; `write` in Python. */
 static void write_crossing(hs_run *run, const hs_crossing *crossing) {
   if (!(crossing->theta > 0)) return;
   if (run->method->degree > 0 && !run->bare) span_cut(run, crossing->theta, &run->cubic);
@@ -778,7 +779,8 @@ static int along_guards(hs_run *run, hs_time limit) {
   }
 }
 
-/* Flow until a surface is crossed or to the segment's end; along guards that hold the state until one lets go. */
+/* Flow until a surface is crossed or to the segment's end; along guards that hold the state until one lets go. The
+   Python twin is `flow`. */
 static int located_flow(hs_run *run) {
   const hs_time limit = segment_end(run), from = run->here.t;
   const hs_mode *const own = run->here.table;
