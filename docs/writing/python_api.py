@@ -13,14 +13,14 @@ from writing.markdown import code, table
 
 HEAD = """# Python
 
-`import hsdsl` gives what is on this page, or returns it. A run from a file is two lines; the
-[tutorial](../tutorial.md#from-python) has them, and [many runs](../how-to/many-and-long.md),
-[derivatives](../how-to/sensitivities.md), [orbits](../how-to/orbits.md) and [fits](../how-to/fitting.md) have a page
-each.
+`import hsdsl` provides the functions and classes on this page, or its functions return them. Two lines run a model
+file: see the [tutorial](../tutorial.md#from-python). [Many runs](../how-to/many-and-long.md),
+[derivatives](../how-to/sensitivities.md), [orbits](../how-to/orbits.md) and [fits](../how-to/fitting.md) have their own
+pages.
 
-Times and states are in the units of the model, and nothing is converted. What counts as a number may be an expression
-of the model's parameters as well, such as `"40*pi"`. Errors are [`ModelError`](#hsdslmodelerror), of a model, and
-[`UsageError`](#hsdslusageerror), of a request; their sentences are those of the command line.
+Times and states are in the units of the model, and hsdsl converts nothing. You can write a number as an expression of
+the model's parameters, such as `"40*pi"`. A model with errors raises [`ModelError`](#hsdslmodelerror), and a wrong
+request raises [`UsageError`](#hsdslusageerror). Their messages are those of the command line.
 
 """
 RUN = "hsdsl.engine.execution.records."

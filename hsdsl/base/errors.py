@@ -101,7 +101,7 @@ class ModelError(Exception):
 
 
 class UsageError(Exception):
-    """The request is wrong, or a file cannot be read (exit code 2). The message is a sentence for a person.
+    """The request is wrong, or a file cannot be read (exit code 2). The message is a sentence for the user.
 
     Attributes
     ----------

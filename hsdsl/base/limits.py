@@ -31,7 +31,7 @@ def uncollected() -> Generator[None]:
 @checks_methods
 @dataclass(frozen=True)
 class Limits:
-    """Caps on a model file; each is checked before the bounded work begins.
+    """Caps on a model file; hsdsl checks each cap before the bounded work begins.
 
     Attributes
     ----------

@@ -100,7 +100,7 @@ def register(table: str, name: str, value: object) -> None:
     table : {"methods", "rules", "targets", "peers", "metrics"}
         What is added.
     name : str
-        The name for options and arguments; of a rule its code.
+        The name for options and arguments; for a rule, its code.
     value : object
         A `ButcherTableau`; a `Rule`; a function ``files(source)``; a function ``prepare(scene)``; a function of two
         executions.

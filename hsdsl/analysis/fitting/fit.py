@@ -47,7 +47,7 @@ class Fit:
         The units that the model gives.
     level, intervals : float or None, dict of (float, float)
         Intervals of this level by profile likelihood, if requested: the values up to which the other values can
-        make up for a change. An end is the bound of the file, or infinite, where the measurements do not end it.
+        compensate for a change. If the measurements do not limit an end, it is the bound of the file, or infinite.
     bounds : mapping
         The least and the largest value that the file allows.
     """
@@ -136,7 +136,7 @@ class Fit:
         return f"; {100 * (self.level or 0):.4g} %: {ends[0]} to {ends[1]}"
 
     def plot_residuals(self, path: str | os.PathLike[str]) -> None:
-        """Draw the residuals to a .png or .svg file: the measurements minus the run over time, and how often."""
+        """Draw the residuals, measurements minus run, to a .png or .svg file: over time, and as a histogram."""
         from hsdsl.analysis.plot.ensembles import plot_residuals
 
         heading = f"{counted(self.measured.count, 'measurement')} minus the run; dotted: transitions"

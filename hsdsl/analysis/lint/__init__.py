@@ -92,10 +92,10 @@ def _findings(subject: Subject, code: str, seconds: float) -> list[Diagnostic]:
     except OutOfTime:
         problem = "takes too long"
     except Exception as error:  # SymPy may raise anything on a rare expression: the other rules go on
-        problem = f"came to {type(error).__name__}"
+        problem = f"raised {type(error).__name__}"
     diagnostics = [_diagnostic(subject, code, finding) for finding in found]
     if problem:
-        message = f"whether {code} ({RULES[code].name}) finds something here is not known: it {problem}"
+        message = f"{code} ({RULES[code].name}) is undecided for this model: the rule {problem}"
         diagnostics.append(_diagnostic(subject, UNDECIDED, Finding(subject.root.place.span, message)))
     return diagnostics
 

@@ -92,7 +92,7 @@ def _checked(file: Path, table: Any) -> dict[str, list[str]]:
         raise UsageError(f"{file}: the lint configuration is a table with `select` and `ignore`")
     for key, value in cast("dict[str, Any]", table).items():
         if key not in _KEYS:
-            raise UsageError(f"{file}: there is no setting '{key}' of lint", did_you_mean(key, _KEYS))
+            raise UsageError(f"{file}: lint has no setting '{key}'", did_you_mean(key, _KEYS))
         texts = cast("list[Any]", value) if isinstance(value, list) else [None]
         if not all(isinstance(text, str) for text in texts):
             raise UsageError(f"{file}: `{key}` is a list of texts", f'such as {key} = ["HS401"]')

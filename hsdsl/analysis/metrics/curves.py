@@ -51,7 +51,7 @@ class CurveDistance:
 
     @property
     def status(self) -> str:
-        """What the interval rests on, see :class:`Interval`."""
+        """The kind of proof of the interval (see :class:`Interval`)."""
         return self.interval.status
 
     @property

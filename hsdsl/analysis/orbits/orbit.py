@@ -75,7 +75,7 @@ class Orbit:
         return self.sensitivity.execution
 
     def as_json(self) -> dict[str, Any]:
-        """The object of `orbit --json`; a complex number is its real and its imaginary part."""
+        """Return the object of `orbit --json`; a complex number is its real and its imaginary part."""
         result = named(self, "section laps mode state phase period drift residual verdict reasons")
         result |= {"state": seen(self.state), "multipliers": _pairs(self.multipliers)}
         result |= {"kept": self.kept} if self.kept else {}

@@ -23,8 +23,8 @@ from hsdsl.engine.execution.run import Execution
 class Failure:
     """An instance that did not reach its end.
 
-    ``reason`` is one of `execution.REASONS`, or ``refused`` if it could not be started. ``message`` is a
-    sentence for a person.
+    ``reason`` is one of `execution.REASONS`, or ``refused`` if it could not be started. ``message`` is the reason as a
+    sentence.
     """
 
     index: tuple[int, ...]
@@ -142,7 +142,7 @@ class Ensemble:
         ----------
         path : path
         columns : sequence of str, optional
-            States and outputs; left out, all of :attr:`samples`.
+            States and outputs; by default all of :attr:`samples`.
         shares : sequence of float
             Shares between 0 and 1. A band of the share 0.9 is between the quantiles 0.05 and 0.95 of those runs that
             have a number at the time.
@@ -157,11 +157,10 @@ class Ensemble:
         Parameters
         ----------
         what : {"runs", "samples", "transitions"}
-            ``runs``: what was varied, ``stop``, ``time``, ``mode``, final states and outputs, ``transitions``,
-            ``warnings``, and ``transition_0``, ... where times were kept. ``samples``: what was varied, ``time``, and
-            values then.
-            ``transitions``: what was varied, ``time``, ``edge``, and ``before.NAME`` and ``after.NAME`` of each state.
-            A state or output of the name of another column is ``state.NAME`` or ``output.NAME``.
+            ``runs``: the varied values, ``stop``, ``time``, ``mode``, final states and outputs, ``transitions``,
+            ``warnings``, and ``transition_0``, ... where times were kept. ``samples``: the varied values, ``time``, and
+            values then. ``transitions``: the varied values, ``time``, ``edge``, and ``before.NAME`` and ``after.NAME``
+            of each state. A state or output of the name of another column is ``state.NAME`` or ``output.NAME``.
 
         Returns
         -------

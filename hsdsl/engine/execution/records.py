@@ -227,9 +227,9 @@ class Stop:
         ``until`` or ``final``; ``left_domain`` or ``zeno``, at which the execution itself ends; ``transition_limit``,
         ``waiting_limit``, ``memory_limit``, ``not_finite``, ``step_underflow`` or ``interrupted``.
     time : number
-        When.
+        The time of the end.
     message : str
-        A sentence for a person.
+        The reason as a sentence.
     """
 
     reason: str
@@ -261,7 +261,7 @@ class RunWarning(Deferred):
     edge : str or None
         The transition that it is about.
     message : str
-        A sentence for a person.
+        The reason as a sentence.
     """
 
     code: str

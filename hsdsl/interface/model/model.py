@@ -43,7 +43,7 @@ def load(path: str | os.PathLike[str], limits: Limits | None = None, *, text: by
     ``text`` is the file's content if it does not come from ``path``; ``limits`` replace the default caps on the file
     and the folders of its data.
 
-    Raises ModelError: the model has errors; all of them are carried.
+    Raises ModelError: the model has errors; the exception has all of them.
     Raises UsageError: the file cannot be read.
     """
     return Model(pipeline_of(path, limits, text))
@@ -55,7 +55,7 @@ def loads(text: str, folder: str | os.PathLike[str] | None = None, limits: Limit
 
     ``limits`` are as for :func:`load`.
 
-    Raises ModelError: the model has errors; all of them are carried.
+    Raises ModelError: the model has errors; the exception has all of them.
     """
     return Model(pipeline_of(Path(folder or "") / NO_FILE, limits, text.encode("utf-8", errors="surrogatepass")))
 
@@ -110,11 +110,11 @@ class Model(Runs):
             The period of the forcing; by default that of the sines and cosines of time in the model.
         keep : str, optional
             A quantity that flows and resets keep, such as an energy: an expression of states and parameters, or an
-            output. The orbit has the value of the run, and its stability is that within this level.
+            output. The orbit has the run's value of this quantity, and its stability is that within this level set.
         progress : callable, optional
             Called before every run with its number, and the value of the continuation parameter, if any.
         **arguments
-            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
+            Arguments of :meth:`simulate`, except ``step``, ``scheme``, ``samples`` and ``precision``.
 
         Raises UsageError: no such transition, an unknown argument, or no orbit near the run.
         """
@@ -184,7 +184,7 @@ class Model(Runs):
         progress : callable, optional
             Called after each run with the number of finished runs and their total number.
         **arguments
-            Arguments of :meth:`simulate`, but ``step``, ``scheme``, ``samples`` and ``precision``.
+            Arguments of :meth:`simulate`, except ``step``, ``scheme``, ``samples`` and ``precision``.
 
         Raises UsageError: an unknown name, or radii that do not decrease.
         """
@@ -219,12 +219,12 @@ class Model(Runs):
         sigma : mapping or number, optional
             The standard deviation of each column, or of a single column.
         weights : mapping or number, optional
-            Weights of columns instead; by default one over the largest size of each.
+            The weight of each column, in place of ``sigma``; by default one over the column's largest size.
         intervals : float, optional
             The level, such as 0.95, of intervals by profile likelihood: many further runs.
         starts : int, optional
-            How many first guesses: the given one, and others drawn within the bounds of the file, or by a factor of up
-            to 4 where there are none. The best fit is kept.
+            The number of initial guesses: the given one, and others drawn within the bounds of the file, or by a factor
+            of up to 4 without bounds. The best fit is kept.
         progress : callable, optional
             Called after every run with the number of runs, the values, and the weighted sum of squares.
         **arguments
@@ -257,7 +257,7 @@ class Model(Runs):
         path : path
             A name ending in .csv.
         every : int
-            k.
+            The k above.
         columns : names, optional
             States and outputs in the file; by default all.
         watch : callable, optional
@@ -308,7 +308,7 @@ class Model(Runs):
         every_transition : bool
             Whether to keep every transition, with the states before and after it: `Ensemble.transition_table`.
         threads : int, optional
-            How many; left out, as many as there are cores for this process.
+            The number of threads; by default the number of cores for this process.
         progress : callable, optional
             Called from time to time with the number of finished instances and their total number.
         **arguments
@@ -346,9 +346,10 @@ class Model(Runs):
         Parameters
         ----------
         vary : sequence of str or mapping
-            Texts such as ``"c=0.5:0.95:101"`` and ``"c~normal(0.9, 0.02)"`` (`sweep.variation`), or by name what
-            follows the name, or an array of values. Names are parameters, and initial states as ``initial.NAME``.
-            A state with a range under `initial` is drawn from it, where it is neither named here nor given.
+            Texts such as ``"c=0.5:0.95:101"`` and ``"c~normal(0.9, 0.02)"`` (`sweep.variation`), or a mapping from each
+            name to the text after it or to an array of values. Names are parameters, and initial states as
+            ``initial.NAME``. If a state has a range under `initial` and is neither named here nor given, the sweep
+            draws it from this range.
         out : path
             The folder of the dataset: a new one, or that of the same sweep.
         random : int, optional
@@ -368,7 +369,7 @@ class Model(Runs):
         progress : callable, optional
             Called after each chunk with the number of finished rows and their total number.
         check : callable, optional
-            Called with what is planned, before the first run; it may raise UsageError.
+            Called with the plan before the first run; it may raise UsageError.
         **arguments
             Further arguments of :meth:`simulate` for every run, except ``precision``, ``samples`` and ``watch``.
 

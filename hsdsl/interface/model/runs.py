@@ -138,7 +138,7 @@ class Runs:
     ) -> Execution:
         """Run the model from t = 0.
 
-        A number may be given as an expression of the model's parameters, such as ``"40*pi"``.
+        You may give a number as an expression of the model's parameters, such as ``"40*pi"``.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class Runs:
         scheme : str, optional
             A name of `simulate.SCHEMES`.
         method : str or ButcherTableau, optional
-            A name of `integrators.METHODS`, or ``auto``; a table counts as a method of its name from then on.
+            A name of `integrators.METHODS`, or ``auto``; a table is then a method under its name.
         step, tolerance : number or str, optional
             Fixed step, or bound on the local error relative to the largest size each state has had; they exclude each
             other.
@@ -165,9 +165,10 @@ class Runs:
         parameters, initial : mapping, optional
             Overrides by name; ``initial`` may name ``mode``. Derived parameters are computed again.
         settings : mapping, optional
-            Settings as of ``--set experiment.NAME``: the arguments above override them, and they override the file's.
+            Settings, as in ``--set experiment.NAME``. They override those of the file; the arguments above override
+            them.
         engine : {"auto", "c", "python"}
-            What runs it: compiled code, or the readable loop; ``auto`` is ``c`` where there is a compiler.
+            The implementation: compiled code, or the readable loop; ``auto`` is ``c`` if there is a compiler.
         precision : int, optional
             Decimal digits (mpmath numbers) instead of float64.
         outputs : sequence of str, optional

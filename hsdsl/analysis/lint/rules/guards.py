@@ -157,7 +157,7 @@ def overlapping_guards(subject: Subject) -> Iterator[Finding]:
             if not any(subject.dynamics.ask(part.mode, overlap).somewhere for overlap in overlaps):
                 continue
             if not left:
-                message = f"more than {MOST_PAIRS} pairs of guards of this model overlap: from here on none is followed"
+                message = f"more than {MOST_PAIRS} pairs of guards of this model overlap: the rule follows no more"
                 yield from (*alike, Finding(second.document.when.place.span, message, severity="note"))
                 return
             left -= 1
@@ -347,7 +347,7 @@ def zero_time_cycle(subject: Subject) -> Iterator[Finding]:
             message = (
                 f"once '{edge.edge.name}' has fired, it fires again at once, for ever: its reset leaves all as it was"
             )
-            hint = "write event: instead of when: to make it once each time, or reset a state that ends it"
+            hint = "write event: instead of when: so that it fires once each time, or reset a state that ends it"
             yield Finding(edge.target_span, message, hint)
             continue
         for answer in _followed_at_once(subject.dynamics, part.mode, edge.edge):
