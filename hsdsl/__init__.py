@@ -11,8 +11,9 @@ Six storeys above a base; a module imports only from its own storey and those be
     base           numbers, errors, names, cache, processes
 
 A run reads: `language.source`, `language.schema`, `language.elaborate`, `mathematics.lower`, `engine.backends`,
-`engine.simulate`. `engine.preparation.pipeline` calls them in this order; `engine.simulate.relaxed` is the algorithm of
-Burden, Gonzalez, Vasudevan, Bajcsy, Sastry, *Metrization and Simulation of Controlled Hybrid Systems* (2013).
+`engine.simulate`. `engine.preparation.pipeline` calls them in this order. `engine.simulate.located` is the execution of
+Burden, Gonzalez, Vasudevan, Bajcsy, Sastry, *Metrization and Simulation of Controlled Hybrid Systems* (2013, Fig. 8);
+`relaxed` beside it is their simulation of relaxed executions (Fig. 12).
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ def integrator_page() -> str:
         for name, m in methods.items()
     ] + [(f"[`{taylor.name}`](#{taylor.name})", "by the tolerance", "", "adaptive")]
     summary.append((f"[`{radau.name}`](#{radau.name})", str(radau.order), "3, implicit", "adaptive"))
-    parts = [INTEGRATORS.format(auto=integrators.AUTO), table(("method", "order", "stages", "steps"), summary)]
+    parts = [INTEGRATORS.format(auto=integrators.FALLBACK), table(("method", "order", "stages", "steps"), summary)]
     for name, method in methods.items():
         between = INTERPOLANTS[method.interpolant].format(order=method.dense_order)
         error = f"; embedded method of order {method.estimated_order}" if method.adaptive else ""

@@ -22,7 +22,7 @@ from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import numbered
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.execution import Execution
-from hsdsl.engine.integrators import AUTO, INTEGRATORS, ButcherTableau
+from hsdsl.engine.integrators import FALLBACK, INTEGRATORS, ButcherTableau
 from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.simulate import Problem
 from hsdsl.language.system import HybridSystem, started
@@ -279,7 +279,7 @@ def filled(text: str, **values: object) -> str:
 
 
 def explicit(source: Source, target: str) -> tuple[Source, ButcherTableau]:
-    """The source with an explicit method, and its table: where `auto` is Taylor's method, `AUTO` in its place.
+    """The source with an explicit method, and its table: where `auto` is Taylor's method, `FALLBACK` in its place.
 
     Raises UsageError: the target cannot keep the scheme or the method.
     """
@@ -290,9 +290,9 @@ def explicit(source: Source, target: str) -> tuple[Source, ButcherTableau]:
     known = ", ".join(INTEGRATORS)
     if method.implicit:
         stiff = "the model is stiff: an explicit one takes many small steps, if you want it with "
-        hint = f"{'' if settings.method_chosen is None else stiff}--method {AUTO}"
+        hint = f"{'' if settings.method_chosen is None else stiff}--method {FALLBACK}"
         raise UsageError(f"{target} has explicit methods ({known}), not {method.name}", hint)
     if method.kind != "table" and settings.method_chosen is None:
-        raise UsageError(f"{target} has the methods {known}, not {method.name}", f"--method {AUTO}")
-    table = method if method.kind == "table" else INTEGRATORS[AUTO]
+        raise UsageError(f"{target} has the methods {known}, not {method.name}", f"--method {FALLBACK}")
+    table = method if method.kind == "table" else INTEGRATORS[FALLBACK]
     return replace(source, problem=source.problem.with_settings(replace(settings, method=table))), table

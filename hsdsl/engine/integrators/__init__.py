@@ -32,9 +32,9 @@ def _none(_name: str, _value: Any) -> str:
 
 # A table checks itself when its module is imported, so that is done at first use.
 INTEGRATORS = Table[ButcherTableau]("own methods", _EXPLICIT, _none)
-_SERIES = {"taylor": f"{_HERE}taylor:TAYLOR", "radau": f"{_HERE}stepper:RADAU"}
-METHODS = Table[Method]("methods", {**_EXPLICIT, **_SERIES}, _fault)
-AUTO = "dopri5"  # what `method: auto` is where nothing is known of a flow but its values
+_OTHERS = {"taylor": f"{_HERE}taylor:TAYLOR", "radau": f"{_HERE}stepper:RADAU"}
+METHODS = Table[Method]("methods", {**_EXPLICIT, **_OTHERS}, _fault)
+FALLBACK = "dopri5"  # what `method: auto` is where nothing is known of a flow but its values
 
 
 def method_name(method: str | ButcherTableau) -> str:
@@ -52,4 +52,4 @@ def method_name(method: str | ButcherTableau) -> str:
     return method.name
 
 
-__all__ = ["AUTO", "INTEGRATORS", "METHODS", "RADAU", "ButcherTableau", "Method", "RadauMethod", "TaylorMethod"]
+__all__ = ["FALLBACK", "INTEGRATORS", "METHODS", "RADAU", "ButcherTableau", "Method", "RadauMethod", "TaylorMethod"]

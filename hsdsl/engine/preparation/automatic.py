@@ -40,7 +40,7 @@ import numpy as np
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Array, Execution
-from hsdsl.engine.integrators import AUTO, METHODS, ButcherTableau, Method
+from hsdsl.engine.integrators import FALLBACK, METHODS, ButcherTableau, Method
 from hsdsl.engine.integrators.taylor import NoSeries, terms
 from hsdsl.engine.kernel import Kernel
 from hsdsl.engine.simulate import Prepared, Settings
@@ -65,7 +65,7 @@ def chosen(
     settings: Settings, program: Program, kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]
 ) -> Settings:
     """The settings with the method that `auto` is for them, and the reason."""
-    method, why = METHODS[AUTO], "the step is fixed"
+    method, why = METHODS[FALLBACK], "the step is fixed"
     if settings.tolerance is not None:
         method, why = _adaptive(float(settings.until), program, kernel, timeline, mode, x)
     method = method.for_tolerance(settings.tolerance, kernel.arithmetic)
@@ -82,18 +82,18 @@ def _adaptive(
             return METHODS["radau"], stiff
     if mode in near and not _has_derivatives(kernel, timeline, mode, x):
         without = f"the flow of {program.modes[mode].name} has no derivatives at the start"
-        if _begins(METHODS[AUTO], kernel, timeline, mode, x, until):
-            return METHODS[AUTO], without
+        if _begins(METHODS[FALLBACK], kernel, timeline, mode, x, until):
+            return METHODS[FALLBACK], without
         other = METHODS[OTHER_STAGES]
         if _begins(other, kernel, timeline, mode, x, until):
-            return other, f"{without}, and a stage of {AUTO} no value"
-        return METHODS[AUTO], without
+            return other, f"{without}, and a stage of {FALLBACK} no value"
+        return METHODS[FALLBACK], without
     kinked = next((each.name for each in program.flows if each.tape is None), None)
     if kinked is not None:
-        return METHODS[AUTO], f"the flow of {kinked} has abs, sign, min, max, floor or select of a state"
+        return METHODS[FALLBACK], f"the flow of {kinked} has abs, sign, min, max, floor or select of a state"
     missing = next(_without_series(program, kernel, timeline, near, mode), None)
     if missing is not None:
-        return METHODS[AUTO], missing
+        return METHODS[FALLBACK], missing
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 

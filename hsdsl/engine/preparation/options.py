@@ -17,7 +17,7 @@ from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import closest, did_you_mean
 from hsdsl.base.numbers import decimals
 from hsdsl.base.parts import for_all, numbered
-from hsdsl.engine.integrators import AUTO, METHODS, Method, method_name
+from hsdsl.engine.integrators import FALLBACK, METHODS, Method, method_name
 from hsdsl.mathematics.program import Program
 
 KEYS = tuple(SETTINGS)
@@ -125,7 +125,7 @@ def resolve(sources: Mapping[str, Mapping[str, Any]], states: Sequence[str] = ()
         _own_formula(scheme, values)
         return Options(scheme, None, size, values)
     method = _method(values["method"], size, values[size].origin)
-    return Options(scheme, method or METHODS[AUTO], size, values, automatic=method is None)
+    return Options(scheme, method or METHODS[FALLBACK], size, values, automatic=method is None)
 
 
 def _with_scales(origin: str, source: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:

@@ -27,7 +27,7 @@ from hsdsl.base.numbers.columns import COLUMNS, Column, each, varies
 from hsdsl.base.parts import meant, numbers_of, of_all
 from hsdsl.engine.backends.python import PythonKernel, compile_routines
 from hsdsl.engine.execution import Array
-from hsdsl.engine.integrators import AUTO, Method
+from hsdsl.engine.integrators import FALLBACK, Method
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.preparation.options import DEFAULT, FILE, KEYS, SCALE, Options, names_of
 from hsdsl.engine.simulate import Settings
@@ -477,14 +477,14 @@ def check_method(method: Method | None, program: Program, arithmetic: Arithmetic
         raise UsageError(
             f"the coefficients of method '{method.name}' are known to {method.digits} digits, too few for a precision "
             f"of {arithmetic.digits}",
-            f"use method '{AUTO}', whose coefficients are exact",
+            f"use method '{FALLBACK}', whose coefficients are exact",
         )
     kinked = next((mode.name for mode in program.flows if mode.tape is None), None)
     if method is not None and method.is_series and kinked is not None:
         raise UsageError(
             f"method '{method.name}' needs smooth flows; that of mode {kinked} has abs, sign, min, max, "
             "floor or select of a state",
-            f"use method '{AUTO}'",
+            f"use method '{FALLBACK}'",
         )
 
 

@@ -1,11 +1,11 @@
-"""From a program to an execution. `relaxed` is the paper's algorithm; `SCHEMES` is what a model may name.
+"""From a program to an execution. `located` is the default scheme; `SCHEMES` is what a model may name.
 
 ======================  ==========================================================================================
 `settings`, `problem`   the settings of a run; an initial value problem with them
 `plan`                  a problem ready to run; the two engines
 `run`                   a problem under way, and the state of its mode
-`relaxed`               the loop: step, strip, reset (Fig. 12)
-`located`               the other loop: step, first crossing, reset (Fig. 8)
+`located`               the loop: step, first crossing, reset (Fig. 8 of the paper)
+`relaxed`               the other loop: step, strip, reset (Fig. 12, the paper's algorithm)
 `surfaces`              a mode's surfaces at a point, as polynomials along a step, and where these rise through zero
 `transitions`           which crossing goes, its reset, the mode entered, cascades, executions that wait
 `contact`               guards that hold the state, motion along them, and Zeno tails that end in it (M11)

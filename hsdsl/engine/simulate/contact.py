@@ -284,7 +284,7 @@ LEAST_FLIGHTS = 3
 
 
 def contraction(made: Sequence[Transition], of_flow: bool = False) -> tuple[Number, Number] | None:
-    """The same of the last few flights, of rounds or of the last edge."""
+    """Return the last flight and the largest ratio of two in a row, of rounds or of one edge, if they shrink."""
     return shrinking(round_flights(made) or last_flights(made, of_flow))
 
 

@@ -16,7 +16,7 @@ from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.base.parts import Part, present
 from hsdsl.engine.execution import Execution
-from hsdsl.engine.integrators import AUTO, METHODS
+from hsdsl.engine.integrators import FALLBACK, METHODS
 from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
@@ -122,7 +122,7 @@ class Differentiator:
         allowed = tolerance = settings.tolerance
         assert settings.method is not None and allowed is not None and tolerance is not None
         method = settings.method.name
-        if method == AUTO and settings.method_chosen is not None and arithmetic.digits is None:
+        if method == FALLBACK and settings.method_chosen is not None and arithmetic.digits is None:
             method = FINE
         if method in (SERIES, FINE) and not ready.exact:
             tolerance = max(min(tolerance, FINEST), 4 * arithmetic.unit)
