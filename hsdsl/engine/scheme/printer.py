@@ -144,7 +144,7 @@ class Scheme:
                 self.constants[name] = (
                     "int" if isinstance(value, ast.Constant) and type(value.value) is int else "Number"
                 )
-            case ast.Import() | ast.ImportFrom() | ast.Expr(value=ast.Constant()) | ast.If():
+            case ast.Import() | ast.ImportFrom() | ast.Expr(value=ast.Constant()):
                 pass
             case _:
                 raise text.refused(part)
@@ -272,8 +272,10 @@ class _Function:
             case ast.AnnAssign(target=target, annotation=annotation, value=ast.expr() as value):
                 return self.assignment(part, target, value, ast.unparse(annotation), path)
             case ast.AugAssign(target=target, op=operator, value=value) if type(operator) in SIGNS:
-                self.fits(part, self.value(target)[1], self.operation(part, target, operator, value)[1])
-                return [f"{self.value(target)[0]} {SIGNS[type(operator)]}= {self.value(value, outer=True)[0]};"]
+                place, kind = self.value(target)
+                kind = "bool" if isinstance(operator, ast.BitOr) else kind  # of integers it would join bits
+                self.fits(part, kind, self.operation(part, target, operator, value)[1])
+                return [f"{place} {SIGNS[type(operator)]}= {self.value(value, outer=True)[0]};"]
             case ast.If(test=test, body=body, orelse=other):
                 lines = [f"if ({self.truth(test)}) {{", *self.inner(body, path)]
                 if other:
@@ -340,7 +342,10 @@ class _Function:
             raise self.text.refused(part, f"{len(values)} results in place of {len(known.results)}")
         if known.optional and isinstance(value, ast.Call) and self.signature(value).optional:
             return [f"return {self.call(value, ['result'])};"]
-        texts = [self.value(each, outer=True)[0] for each in values]
+        found = [self.value(each, outer=True) for each in values]
+        for kind, (_, one) in zip(known.results, found, strict=True):
+            self.fits(part, kind, one)
+        texts = [text for text, _ in found]
         first = 0 if known.status else 1
         lines = [f"*result{k or ''} = {text};" for k, text in enumerate(texts) if k >= first]
         if known.optional and isinstance(value, ast.Name) and value.id in self.optional:
@@ -379,7 +384,8 @@ class _Function:
 
     def fits(self, part: ast.stmt, kind: str, found: str) -> None:
         """Refuse a value that a name or a place of another kind cannot have: Python would change what it is."""
-        if kind in ("int", "Count", "bool") and _wider(kind, found) != kind:
+        narrower = kind in ("int", "Count", "bool") and _wider(kind, found) != kind
+        if narrower or (kind in PLAIN) != (found in PLAIN) or (kind in VECTORS) != (found in VECTORS):
             raise self.text.refused(part, f"{kind} that is set to {found}")
 
     def assigned_call(
