@@ -29,7 +29,7 @@ from hsdsl.engine.simulate.verdict.run_view import ROUNDS, Finding, Place, RunVi
 from hsdsl.engine.simulate.verdict.steps import Parts, high, low, steps_of, undecided
 
 HALVINGS = 20
-MOST_TURNING_POINTS = 256  # turning points, one by one
+MOST_TURNING_POINTS = 1024  # of a mode, one by one: each takes milliseconds
 CLOSEST = 2.0**-ROUNDS  # shares of a step that count as one
 SHARES = 9  # at one turning point
 TWICE = 2  # as long as it takes to reach a surface: reached together; as deep as a strip: beyond a surface
@@ -58,7 +58,9 @@ def misses(run: RunView) -> tuple[list[Finding], list[str]]:
         turning = _turning(run, steps)
         found += filter(None, (_turned(run, each, passed) for each in turning[:MOST_TURNING_POINTS]))
         if len(turning) > MOST_TURNING_POINTS:
-            more = f"{len(turning) - MOST_TURNING_POINTS} more turning points close to surfaces were not checked"
+            left, mode = turning[MOST_TURNING_POINTS:], run.problem.program.modes[steps.mode].name
+            since = f"from t = {show(run.times[left[0].row])} on were not checked"
+            more = f"{len(left)} turning points close to surfaces of {mode} {since}"
             found.append(Finding("misses", "unknown", more))
     passing, near = run.undecided("transparent"), run.undecided("nearest")
     for steps in steps_of(run) if passing or near else ():
