@@ -39,7 +39,7 @@ FULL = ("run MODEL --engine python", "run MODEL --json --engine python", "valida
 def test_a_full_disk_is_said(words, tmp_path):
     code, _, errors = shell(f"hsdsl {words.replace('MODEL', str(BALL))} > /dev/full", tmp_path)
     assert code == 2
-    assert "hsdsl: the answer cannot be written: No space left on device" in errors
+    assert "hsdsl: cannot write the output: No space left on device" in errors
 
 
 @pytest.mark.parametrize("closed", [">&-", "2>&-", ">&- 2>&-"])

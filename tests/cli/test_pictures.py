@@ -104,7 +104,7 @@ def test_outputs_of_saved_runs_are_drawn_as_those_of_runs(command, model, tmp_pa
     assert read["columns"] == live["columns"] and len(live["columns"][-1]) > 300
     file.write_text(file.read_text() + "# edited", encoding="utf-8")
     straight = command("plot", saved, "--out", tmp_path / "straight.html")
-    assert straight.code == 0 and "outputs are drawn straight from row to row" in straight.err
+    assert straight.code == 0 and "outputs are straight lines between rows" in straight.err
     assert "straight" not in command("plot", saved, "--outputs", "x", "--out", tmp_path / "x.html").err
 
 

@@ -58,9 +58,9 @@ PLOTTED = ["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--plot", "p.svg"]
         (["MODEL", "--vary", "rate=1:x:3", "--out", "OUT"], "--vary rate"),
         (["MODEL", "--vary", "rate=1", "--out", "OUT", "--record", "all"], "--record"),
         (["MODEL", "--vary", "rate=1", "--out", "OUT", "--plot", "p.pdf"], "the name must end in .png or .svg"),
-        (["MODEL", "--show", "OUT"], "takes no MODEL"),
-        (["--show", "OUT", "--until", "3", "--set", "rate=2"], "takes no --set, --until"),
-        (["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--of", "final.x"], "--of is of a picture"),
+        (["MODEL", "--show", "OUT"], "does not take MODEL"),
+        (["--show", "OUT", "--until", "3", "--set", "rate=2"], "does not take --set, --until"),
+        (["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--of", "final.x"], "--of applies to a picture"),
         (["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--cluster", "a", "--processes", "2"], "leave one out"),
         (["MODEL", "--vary", "rate=1,2", "--out", "OUT", "--seed", "2"], "--seed: nothing is drawn"),
         ([*PLOTTED, "--of", "final.y"], "no column 'final.y' to draw"),
@@ -116,7 +116,7 @@ def test_ctrl_c_says_how_far_it_is_and_how_to_go_on(command, model, tmp_path, mo
     monkeypatch.setattr(Pace, "note", interrupted)
     words = ["--vary", "rate=0.1:1:8", "--out", tmp_path / "s", "--processes", 1, "--chunk", 2]
     answer = command("sweep", model(DECAY), *words)
-    assert answer.code == 130 and "4 of 8 rows are in" in answer.err and "the same command goes on" in answer.err
+    assert answer.code == 130 and "4 of 8 rows are in" in answer.err and "the same command continues" in answer.err
     monkeypatch.setattr(Pace, "note", note)
     assert command("sweep", model(DECAY), *words).code == 0
 

@@ -173,5 +173,5 @@ def test_only_one_file_of_text_is_printed() -> None:
     assert only_text({"a.mmd": "é".encode()}, "mermaid") == ("a.mmd", "é")
     with pytest.raises(UsageError, match="c has 2 files: expected --out"):
         only_text({"a": b"", "b": b""}, "c")
-    with pytest.raises(UsageError, match=r"a\.fmu is no text: expected --out"):
+    with pytest.raises(UsageError, match=r"a\.fmu is not a text file: expected --out"):
         only_text({"a.fmu": b"PK\xf8"}, "fmi3")

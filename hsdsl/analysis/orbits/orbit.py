@@ -65,7 +65,7 @@ class Orbit:
 
     @property
     def kept(self) -> dict[str, float]:
-        """The quantity that the orbit's family keeps, with its value here; stability is that within its level."""
+        """The quantity that the orbit's family keeps, with its value here; stability is that within its level set."""
         level = self.closed.level
         return {} if level is None else {level.text: level.value}
 

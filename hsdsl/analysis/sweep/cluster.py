@@ -61,7 +61,7 @@ def connected(address: str) -> Iterator[Run]:
         yield partial(_run, client)
     except (OSError, TimeoutError, asyncio.CancelledError, futures.CancelledError) as error:
         reason = f"the cluster at {address} is lost ({type(error).__name__}); what was done is kept"
-        raise UsageError(reason, "the same command goes on") from None
+        raise UsageError(reason, "the same command continues") from None
     finally:
         client.close()
 

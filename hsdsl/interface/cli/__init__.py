@@ -36,10 +36,10 @@ def main() -> None:
     except OSError as error:
         code = WRONG_USAGE
         _drop_output()
-        print(f"hsdsl: the answer cannot be written: {error.strerror or error}", file=sys.stderr)
+        print(f"hsdsl: cannot write the output: {error.strerror or error}", file=sys.stderr)
     except MemoryError:
         code = WRONG_USAGE
-        print("hsdsl: there is not enough memory for this", file=sys.stderr)
+        print("hsdsl: not enough memory for this request", file=sys.stderr)
     except KeyboardInterrupt:
         code = interrupts.INTERRUPTED
     sys.exit(code)

@@ -92,7 +92,7 @@ def chart(
                 rows, remarks = work_precision(scene, **options, watch=lambda what, name=name: watch(f"{name}: {what}"))
                 charted.append((name, rows))
                 for remark in remarks if not answer.quiet else ():
-                    say(f"left out: {remark}")
+                    say(f"skipped: {remark}")
         _report(charted, out, plot, answer)
 
 

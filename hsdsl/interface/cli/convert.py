@@ -84,7 +84,7 @@ def only_text(files: Mapping[str, bytes], to: str) -> tuple[str, str]:
     try:
         return name, content.decode()
     except UnicodeDecodeError:
-        raise UsageError(f"{name} is no text: expected --out DIR") from None
+        raise UsageError(f"{name} is not a text file: expected --out DIR") from None
 
 
 FILE = "A model of SpaceEx or SBML (.xml)."
@@ -115,7 +115,7 @@ def import_(
     with answering(json, None, limit):
         check_target(out, "--out", (".yaml", ".yml"))
         if out is not None and out.exists() and not force:
-            raise UsageError(f"--out {out}: the file is there already", "--force replaces it")
+            raise UsageError(f"--out {out}: the file already exists", "--force replaces it")
         from hsdsl.base.atomic import replacing
 
         text, system = _imported(file, cfg, until, urgent, at or [])
@@ -145,7 +145,7 @@ def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool, at:
         return text, loads(text).system
     given = [name for name, value in (("--cfg", cfg), ("--urgent", urgent), ("--at", at)) if value]
     if given:
-        raise UsageError(f"{given[0]} is for models of SpaceEx, and {file} is one of SBML")
+        raise UsageError(f"{given[0]} applies to SpaceEx models, and {file} is an SBML model")
     try:
         text = sbml.imported(root, until or "1")  # any end, so that errors of the file are found without one as well
         try:

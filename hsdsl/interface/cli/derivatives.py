@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 AT = "Print only the derivatives of the end, of transition times, or of states and outputs at the run's samples."
-STABILITY = "Also start runs nearby, and say whether the execution is orbitally stable as far as they show."
+STABILITY = "Also run from nearby points, and say whether these runs show orbital stability."
 At = Literal["final", "transitions", "outputs"]
 
 
@@ -42,7 +42,7 @@ def sensitivity(
     with answer.reporting():
         check_target(plot, "--plot")
         if plot is not None and not stability:
-            raise UsageError("--plot draws the distances of runs from nearby", "add --stability")
+            raise UsageError("--plot draws the distances of nearby runs", "add --stability")
         from hsdsl.analysis.sensitivity.result import ALWAYS, as_json, summary
 
         call = located.settings(overrides, until=until, precision=precision)
@@ -64,12 +64,12 @@ def _nearby(model: Any, wrt: str, call: dict[str, Any], hidden: bool) -> Orbital
 
         def tell(done: int, total: int) -> None:
             if show:
-                show(lambda: f"{done} of {total} runs from nearby")
+                show(lambda: f"{done} of {total} nearby runs")
 
         return model.orbital_stability(wrt, progress=tell, **call)
 
 
-SECTION = "The name of the transition at which the orbit is cut."
+SECTION = "The name of the transition that is the section of the orbit."
 LAPS = "Number of transitions of the section after which the orbit closes."
 FOLLOW = "Follow the orbit in a parameter from A to B, and mark folds, flips and grazing."
 PERIOD = "The period of the forcing, an expression of parameters. Default: that of the sines and cosines of t."
@@ -85,7 +85,7 @@ def orbit(
     keep: Annotated[str | None, option("ENERGY", KEEP)] = None,
     follow: Annotated[str | None, option("PARAM=A:B", FOLLOW, "--continue")] = None,
     overrides: Annotated[list[str] | None, overriding(AS_RUN)] = None,
-    until: Annotated[str | None, option("T", "End of the run that gives the first guess.")] = None,
+    until: Annotated[str | None, option("T", "End of the run that gives the initial guess.")] = None,
     located: Located,
     plot: Annotated[Path | None, option("FILE", "Draw the orbit: .png or .svg.")] = None,
     answer: Answer,
@@ -117,11 +117,11 @@ def _range(text: str) -> tuple[str, str, str]:
 
 
 SET_OF_FITS = (
-    "Override a parameter, an initial value or a setting, as `hsdsl run` does; for a name in --wrt the first guess."
+    "Override a parameter, an initial value or a setting, as `hsdsl run` does. For names in --wrt: the initial guess."
 )
 SIGMA = "The standard deviation of a column's measurements. Give all or none; may be repeated."
 WEIGHT = "The weight of a column. Default: one over its largest size. May be repeated."
-STARTS = "Begin from N first guesses, and keep the best: the given one, and others within the bounds."
+STARTS = "Fit from N initial guesses, and keep the best: the given one, and others within the bounds."
 INTERVALS = "Find intervals of this level, such as 0.95, by profile likelihood: many further runs."
 Data = Annotated[Path, Argument(metavar="DATA", help="A CSV file with columns t or time, states and outputs.")]
 

@@ -171,7 +171,7 @@ Formatted = Annotated[Format, Option("--format", metavar="|".join(Format.__args_
 Json = Annotated[bool, Option("--json", help="Print one JSON object on standard output.")]
 Quiet = Annotated[bool, Option("--quiet", "-q", help="Print no summary and no progress.")]
 FOLDER = "Let models also read data files from this folder. May be repeated."
-LIMIT = f"Raise a limit of what a model may use: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated."
+LIMIT = f"Raise a limit on the resources of a model: {', '.join(NUMBERS[:-1])} or {NUMBERS[-1]}. May be repeated."
 SET = (
     "Override a parameter (c=0.8), an initial value (initial.v=20), the initial mode or a setting"
     " (experiment.step=1e-3). May be repeated; values are expressions of parameters."

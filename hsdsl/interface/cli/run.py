@@ -82,9 +82,9 @@ def run(
         shown = {"columns": names, "phases": pairs_of(phase, loaded.columns)}
         pairs = shown["phases"]
         if pairs is not None and plot is None:
-            raise UsageError("--phase is for a picture: give --plot FILE too")
+            raise UsageError("--phase applies to a picture: give --plot FILE too")
         if speed is not None and animate is None:
-            raise UsageError("--speed is of a film: give --animate FILE too")
+            raise UsageError("--speed applies to a film: give --animate FILE too")
         if animate is not None:
             from hsdsl.analysis.plot.animation import check
 

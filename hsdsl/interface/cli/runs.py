@@ -238,5 +238,5 @@ def drawn(path: Path, model: Model | None, columns: list[str] | None) -> Executi
         return (model or hsdsl.load(other if isinstance(other, Path) else run.model)).with_outputs(run)
     except (UsageError, ModelError) as error:
         first = str(error).splitlines()[0]
-        say(f"hsdsl: {path}: outputs are drawn straight from row to row: {first}; give its model with --model")
+        say(f"hsdsl: {path}: outputs are straight lines between rows: {first}; give the model with --model")
         return run

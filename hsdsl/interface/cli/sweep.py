@@ -36,8 +36,8 @@ OF = "The column that --plot draws, such as final.x or transitions. before.v and
 OVER = "Draw samples, such as --of sample.x, over time: one curve per row, coloured by what varies."
 CHUNK = "Rows per file. Default: hsdsl times a few runs and chooses."
 SLICE = "Draw only the rows where a grid has its value nearest to this, or the tenth of a draw's rows. May be repeated."
-WORST = "List the ten rows with the largest numbers of a column, such as final.v; --best lists the least."
-BEST = "List the ten rows with the least numbers of a column."
+WORST = "List the ten rows with the largest numbers of a column, such as final.v; --best lists the smallest."
+BEST = "List the ten rows with the smallest numbers of a column."
 TAIL = "The last share of each run, whose transitions and samples a bifurcation diagram shows. Default: 0.5."
 
 
@@ -117,15 +117,15 @@ def _check(
     """Refuse options that are for something else."""
     if show is not None and (model or running):
         names = ", ".join([*["MODEL"] * bool(model), *(f"--{OPTIONS.get(name, name)}" for name in running)])
-        raise UsageError(f"--show shows a dataset that is there, and takes no {names}")
+        raise UsageError(f"--show displays an existing dataset; it does not take {names}")
     if show is None and model is None:
         raise UsageError("expected a model, or --show DIR", "hsdsl sweep MODEL --vary c=0.5:0.9:101 --out DIR")
     if show is None and out is None:
         raise UsageError("expected --out DIR, the folder of the dataset", "for example --out sweep")
     if show is None and plot is None and drawing:
-        raise UsageError(f"--{next(iter(drawing))} is of a picture, and there is none", "give --plot FILE")
+        raise UsageError(f"--{next(iter(drawing))} applies to a picture, and there is none", "give --plot FILE")
     if "cluster" in running and "processes" in running:
-        raise UsageError("--processes counts those here, and --cluster uses none of them", "leave one out")
+        raise UsageError("--processes applies to this machine, and --cluster uses others", "leave one out")
 
 
 def _numbers_of(texts: list[str] | None) -> dict[str, float]:
@@ -166,7 +166,7 @@ def _run(model: Path, vary: list[str], out: Path, settings: dict[str, Any], quie
             return hsdsl.load(model).sweep(vary, out, progress=watch, **settings)
         except KeyboardInterrupt:
             rows = f"{pace.done:,} of {pace.rows:,} rows are in {out}" if pace.rows else "nothing was run"
-    say(f"interrupted: {rows}; the same command goes on")
+    say(f"interrupted: {rows}; the same command continues")
     raise Exit(INTERRUPTED)
 
 
