@@ -49,7 +49,7 @@ _GENERATED_C = re.compile(
     r"Generated|from|a|model|see|h|for|what|the|tables|mean|include|static|extern|const|restrict|int|double|void|return"
     r"|[ptx]|out|bad|hs|hs_\w+|HS_\w+|(?:routine|routines|edges|modes|walls|inputs|state|[a-z])_?\d+(?:_\d+)?|NAN|INFINITY"
     r"|(?:series|surface_series|flow_lines|surface_lines|surface_line|line|jacobian|gradients)_\d+"
-    r"|(?:places|pattern|elimination)_\d+|lines_\d+(?:_(?:values|states|coefficients)_\d+)?|number|of|v|i|place|order|lines|length|size_t|[ck]|for|if|else"
+    r"|(?:places|pattern|elimination|locals|of)_\d+|lines_\d+(?:_(?:values|states|coefficients)_\d+)?|number|of|v|i|place|order|lines|length|size_t|[ck]|for|if|else"
 )
 _HEXADECIMAL = re.compile(r"\b0x[0-9a-f.]+p[-+]\d+")
 _WORD = re.compile(r"[^\W\d]\w*")

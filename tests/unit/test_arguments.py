@@ -111,6 +111,7 @@ experiment: {until: 4}
 sys.path.insert(0, str(Path(__file__).parents[2] / "docs"))
 RUN = hsdsl.load(BALL).simulate(until=0.1)
 HANDED_ON = {  # functions with `**arguments`; of orbits, fits and sweeps see their own tests
+    "Model.simulate": hsdsl.load(BALL).simulate,
     "Model.ensemble": hsdsl.load(BALL).ensemble,
     "Model.stream": lambda **unknown: hsdsl.load(BALL).stream("run.csv", **unknown),
     "Model.plot": lambda **unknown: hsdsl.load(BALL).plot(RUN, "picture.png", **unknown),
