@@ -410,13 +410,92 @@ def test_an_interval_ends_where_a_dose_is_skipped() -> None:
     assert "`--starts`" in found.nonsmooth[0]
 
 
-def test_starts_find_the_order_of_transitions() -> None:
+def test_starts_find_the_order_of_transitions(monkeypatch: pytest.MonkeyPatch) -> None:
     model, late = hsdsl.loads(SKIPPED), DOSES > 1
     data = {"t": DOSES[late], "A": dosed(0.3)[late]}
+    assert model.fit(data, "k").values["k"] == pytest.approx(0.3, abs=1e-9)  # values around the first lead there
+    monkeypatch.setattr("hsdsl.analysis.fitting.jumps.HALVINGS", 0)
     wrong, right = (model.fit(data, "k", starts=starts) for starts in (1, 6))
     assert wrong.deviation > 0.1 and right.values["k"] == pytest.approx(0.3, abs=1e-9)
     with pytest.raises(UsageError, match="starts: expected at least 1, got 0"):
         model.fit(data, "k", starts=0)
+
+
+@pytest.mark.parametrize("first", [0.02, 0.2, 0.5, 0.52, 0.95])
+@pytest.mark.parametrize("true", [0.3, 0.7])
+def test_a_fit_finds_the_lower_side_of_a_jump(true: float, first: float) -> None:
+    """The minimum is that of the exact sum on a grid, on whichever side of the jump the fit begins."""
+    x = dosed(true) + 0.05 * np.array([1, -1, 0.5, -0.5, 1, -1])
+    grid = np.linspace(0.01, 1, 100_001)
+    best = min(grid, key=lambda k: float(np.sum((dosed(k) - x) ** 2)))
+    found = hsdsl.loads(SKIPPED).fit({"t": DOSES, "A": x}, "k", parameters={"k": first})
+    assert found.values["k"] == pytest.approx(best, abs=1e-5)
+    assert "beside a jump" not in found.summary
+
+
+def test_a_fit_that_ends_beside_a_jump_says_so() -> None:
+    """Its decay is that of k = 0.45, where no dose would be taken: the sum falls down to the jump at 0.51."""
+    x = 2 * np.exp(-0.45 * DOSES) + (DOSES > 1) * 3 * np.exp(-0.45 * (DOSES - 1))
+    found = hsdsl.loads(SKIPPED).fit({"t": DOSES, "A": x}, "k")
+    assert found.values["k"] == pytest.approx(np.log(2 / 1.2), abs=1e-9)
+    assert "the fit ended beside a jump of the sum of squares" in found.summary
+
+
+def profiled(k: float, x: Any) -> float:
+    """The least sum of squares with k: the first amount is that of a linear fit, or at the end of its side."""
+    fades, dose = np.exp(-k * DOSES), (DOSES > 1) * 3 * np.exp(-k * (DOSES - 1))
+    sums: list[float] = []
+    for taken in (True, False):
+        rest = x - dose if taken else x
+        amount = (min if taken else max)(float(rest @ fades / (fades @ fades)), 1.2 * np.exp(k))
+        sums.append(float(np.sum((rest - amount * fades) ** 2)))
+    return min(sums)
+
+
+def test_an_interval_follows_the_sum_along_a_jump() -> None:
+    """The dose is taken while the first amount is at most 1.2 exp(k): the others follow that line to a low k."""
+    x = dosed(0.53) + 0.1 * np.array([1, -1, 0.5, -0.5, 0.3, -0.3])
+    found = hsdsl.loads(SKIPPED).fit({"t": DOSES, "A": x}, "k,initial.A", sigma=0.1, intervals=0.95)
+    grid = np.linspace(0.2, 0.9, 70_001)
+    sums = np.array([profiled(k, x) for k in grid])
+    inside = sums <= sums.min() + 0.01 * chi2.ppf(0.95, 1)
+    best = int(np.argmin(sums))
+    assert found.values["k"] == pytest.approx(grid[best], abs=2e-5)
+    low, high = (int(np.flatnonzero(~inside[side])[0]) for side in (slice(best, None, -1), slice(best, None)))
+    assert found.intervals["k"] == pytest.approx((grid[best - low], grid[best + high]), abs=1e-4)
+    assert grid[best - low] < np.log(2 / 1.2) and not any("interval of k" in reason for reason in found.nonsmooth)
+
+
+@pytest.mark.parametrize(("sigma", "explained"), [(0.1, True), (0.03, False)])
+def test_residuals_that_deviations_do_not_allow_are_warned_of(sigma: float, explained: bool) -> None:
+    t = np.linspace(0.5, 4, 8)
+    off = 0.1 * np.array([1, -1, 1, 0, -1, 1, 0.5, -1.5])
+    model = hsdsl.loads(LINE + "experiment: {until: 4}\n")
+    found = model.fit({"t": t, "x": 2 * t + off}, "a", sigma=sigma)
+    left = 2 * t + off - t * float(t @ (2 * t + off) / (t @ t))
+    assert found.chance == pytest.approx(chi2.sf(float(left @ left) / sigma**2, 7), rel=1e-6)
+    assert found.as_json()["chance"] == found.chance and bool(found.as_json()["warnings"]) != explained
+    assert ("the model does not explain the data: chi2 = " in found.summary) != explained
+    assert "7 degrees of freedom" in found.summary or explained
+    assert model.fit({"t": t, "x": 2 * t + off}, "a").chance is None
+
+
+@pytest.mark.parametrize(("rate", "named"), [("p", False), ("1.5*p", True)])
+def test_a_transition_that_changes_nothing_measured_is_not_named(rate: str, named: bool) -> None:
+    """It passes x = 1 near the measurement at t = 1; the next mode grows at the same rate, or faster."""
+    text = f"""
+hsdsl: 1
+parameters: {{p: 0.9}}
+modes:
+  before: {{flow: {{x: p}}, transitions: [{{name: passed, when: x >= 1, to: after}}]}}
+  after: {{flow: {{x: {rate}}}}}
+initial: {{mode: before, x: 0}}
+experiment: {{until: 2}}
+"""
+    times = np.array([0.25, 0.5, 1.0, 1.25])
+    x = times + (0.5 * (times - 1) * (times > 1) if named else 0) + 0.02 * np.array([1, -1, 1, -1])
+    found = hsdsl.loads(text).fit({"t": times, "x": x}, "p", sigma=0.02)
+    assert any("within its uncertainty" in reason for reason in found.nonsmooth) == named
 
 
 @pytest.mark.parametrize("level", [None, 0.95])

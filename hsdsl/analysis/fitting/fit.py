@@ -50,6 +50,8 @@ class Fit:
         compensate for a change. If the measurements do not limit an end, it is the bound of the file, or infinite.
     bounds : mapping
         The least and the largest value that the file allows.
+    chance : float or None
+        If standard deviations were given: the probability that chance alone makes residuals at least this large.
     """
 
     values: dict[str, float]
@@ -67,6 +69,7 @@ class Fit:
     level: float | None = None
     intervals: dict[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]])
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict[str, tuple[float, float]], repr=False)
+    chance: float | None = None
 
     def __repr__(self) -> str:
         values = ", ".join(f"{name} {number(value, 6)}" for name, value in self.values.items())
@@ -92,7 +95,20 @@ class Fit:
         """Return the object of `fit --json`; values that are not determined are null."""
         known = named(self, "values deviations covariance deviation success message evaluations at_bound")
         known |= {"intervals": self.intervals, "level": self.level} if self.level else {}
+        known |= {"chance": self.chance, "warnings": self.warnings} if self.chance is not None else {}
         return plain(known | {"measurements": self.measured.count, "nonsmooth": self.nonsmooth})
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What makes the deviations and intervals mean little: residuals far larger than standard deviations allow."""
+        if self.chance is None or self.chance >= UNLIKELY:
+            return ()
+        free = self.measured.count - len(self.values)
+        squares = f"chi2 = {number(free * self.deviation**2, 4)} with {counted(free, 'degree')} of freedom"
+        return (
+            f"the model does not explain the data: {squares} (probability below {UNLIKELY:g}); "
+            "deviations and intervals mean little",
+        )
 
     @property
     def summary(self) -> str:
@@ -114,6 +130,7 @@ class Fit:
             yield f"{name} is at its {which}: a fit without this bound would be closer to the measurements"
         yield f"residual: {number(self.deviation, 4)} (weighted root mean square)"
         yield f"{'converged' if self.success else 'did not converge'}: {self.message}"
+        yield from (f"warning: {reason}" for reason in self.warnings)
         yield from (f"not smooth: {reason}" for reason in condensed(self.nonsmooth))
 
     def _rounded(self, name: str, x: float) -> str:
@@ -161,6 +178,7 @@ def _digits(x: float, digits: int) -> str:
     return f"{x:#.{digits}g}".replace(".e", "e")
 
 
+UNLIKELY = 1e-3  # the probability of residuals below which the model is said not to explain the data
 MOST_DIGITS = 12
 FIXED_DIGITS = 6  # before the point; longer numbers have an exponent
 TIMES = ("t", "time")

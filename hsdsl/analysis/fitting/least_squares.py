@@ -6,29 +6,42 @@ is moved over it, and the fit goes on from there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, cast
 
 import numpy as np
 from scipy.optimize import least_squares  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
+from scipy.special import chdtrc  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
 from hsdsl.analysis.fitting.fit import Fit, Measurements
+from hsdsl.analysis.fitting.jumps import (
+    MOST_SIDES,
+    UNKNOWN,
+    around,
+    beside_jump,
+    close_transitions,
+    lowest,
+    same_order,
+    steps_across,
+    wrong_sides,
+)
+from hsdsl.analysis.report.words import number
 from hsdsl.analysis.sensitivity.result import SampleSlopes, Sensitivity
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
-from hsdsl.base.numbers.arithmetic import TIE
-from hsdsl.engine.execution import Array, Execution
+from hsdsl.engine.execution import Array
 from hsdsl.engine.simulate.stops import show
 
 SHARES = (0.25, 0.5)  # of the time: fits of the beginning of the measurements, from which the whole is tried as well
 PRECISE = 1e-15  # changes of values and of the sum that end a fit
 LARGEST = 1e100  # the weighted size of a column: its residuals have squares
-MOST_NAMED = 3
 AT_BOUND = 1e-12  # of a value: how near it comes to the bound that keeps it
 MOST_CROSSED = 32  # measurements that transitions pass
 FACTOR = 4.0  # by which first guesses of values without bounds differ at most from the given one
 SEED = 20260101  # of first guesses
+FEW = 2  # values of which each fit tries others further off
+MOST_ROUNDS = 4  # of such tries
 ENDS = (  # by SciPy's status
     "the number of runs is at its limit",
     "the sum of squares is level",
@@ -74,7 +87,9 @@ def fitted(
     guesses = _guesses(first, bounds, scales, starts - 1)
     results += [_solved(objective, guess, bounds, scales) for guess in guesses]
     best = min(results, key=lambda result: result.cost)
-    found = _fit(objective, best, bounds, sigma)
+    if len(first) <= FEW or _leaves_order(objective, objective.order(best.x)):
+        best = _further(objective, best, first, bounds, scales)
+    found = _fit(objective, best, bounds, sigma, scales)
     if level is None:
         return replace(found, nonsmooth=(*_other_order(objective, found), *found.nonsmooth))
     from hsdsl.analysis.fitting.profile import Profile, rise_of
@@ -85,7 +100,10 @@ def fitted(
     known = profile.intervals([*found.values], found.covariance, rise)
     ends = {name: [f"{end:.4g}" for k, end in profile.jumps if k == i] for i, name in enumerate(known)}
     jumps = (f"the interval of {name} ends at a jump of the sum: {', '.join(at)}" for name, at in ends.items() if at)
-    reasons = (*_other_order(objective, found), *jumps, *found.nonsmooth)
+    lower = sorted(profile.lower, key=lambda each: each[0])[:1]
+    begin = [", ".join(f"{a} = {number(b, 6)}" for a, b in objective.named(x).items()) for _, x in lower]
+    better = (f"the search for intervals met a lower sum: begin with {values}" for values in begin)
+    reasons = (*_other_order(objective, found), *better, *jumps, *found.nonsmooth)
     return replace(found, level=level, intervals=known, evaluations=objective.evaluations, nonsmooth=reasons)
 
 
@@ -105,7 +123,35 @@ def _guesses(first: Array, bounds: Mapping[str, tuple[float, float]], scales: Ma
 def _other_order(objective: Objective, found: Fit) -> Sequence[str]:
     """What to say if runs of the search made other transitions; one more or less at the end makes no other order."""
     best = tuple(made.edge for made in found.execution.transitions)
-    return [OTHERS] if any(a[: len(best)] != best[: len(a)] for a in objective.orders) else []
+    return [OTHERS] if _leaves_order(objective, best) else []
+
+
+def _leaves_order(objective: Objective, best: tuple[str, ...] | None) -> bool:
+    return best is None or not all(same_order(best, each) for each in objective.orders)
+
+
+def _further(
+    objective: Objective, best: Any, first: Array, bounds: Mapping[str, tuple[float, float]], scales: Any
+) -> Any:
+    """The best fit from values further off, where the sum is lower or the run makes other transitions."""
+    sizes, limits = np.array([scales[name] for name in objective.start]), np.array([*bounds.values()], float)
+    centres = [best.x, first] if _leaves_order(objective, objective.order(best.x)) else [best.x]
+    for _ in range(MOST_ROUNDS):
+        points = [x for centre in centres for x in around(centre, limits, sizes)]
+        order, total = objective.order(best.x), 2 * best.cost
+        firsts = [x for x, here, sum_ in lowest(objective, points) if sum_ < total or not same_order(here, order)]
+        before = best
+        for x in firsts[:MOST_SIDES]:
+            seen = objective.seen
+            tried = _solved(objective, x, bounds, scales)
+            if tried.cost < (1 - PRECISE) * best.cost:
+                best = tried
+            else:
+                objective.seen = seen
+        if best is before:
+            break
+        centres = [best.x]
+    return best
 
 
 def _solved(
@@ -188,9 +234,17 @@ def _column(table: SampleSlopes, name: str) -> Array:
     return np.asarray(table.values.get(name, np.full(len(table.times), np.nan)), float)
 
 
-def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, float]], sigma: bool) -> Fit:
+def _fit(
+    objective: Objective,
+    result: Any,
+    bounds: Mapping[str, tuple[float, float]],
+    sigma: bool,
+    scales: Mapping[str, float],
+) -> Fit:
     x: Array = np.asarray(result.x, float)
     residuals, slopes, found = objective.residuals(x), objective.slopes(x), objective.run(x)
+    sizes, limits = np.array([scales[name] for name in objective.start]), np.array([*bounds.values()], float)
+    beside = beside_jump(objective, x, limits, sizes)
     free = max(1, len(residuals) - len(x))
     variance = float(np.sum(residuals**2)) / free
     covariance = _covariance(slopes) * (1.0 if sigma else variance)
@@ -214,13 +268,15 @@ def _fit(objective: Objective, result: Any, bounds: Mapping[str, tuple[float, fl
         objective.evaluations,
         at,
         (
-            *_close_transitions(found, objective.measured, covariance),
+            *beside,
+            *close_transitions(found, objective.measured, covariance),
             *(each.sentence for each in wrong_sides(objective, x)[:MOST_SIDES]),
             *objective.bumps,
         ),
         objective.measured,
         found.run,
         bounds=bounds,
+        chance=float(cast(Any, chdtrc)(free, free * variance)) if sigma and len(residuals) > len(x) else None,
     )
 
 
@@ -239,25 +295,6 @@ def _covariance(slopes: Array) -> Array:
         covariance[k, :] = covariance[:, k] = 0.0
         covariance[k, k] = np.inf
     return covariance
-
-
-def _close_transitions(found: Sensitivity, measured: Measurements, covariance: Array) -> Sequence[str]:
-    """The transitions that the uncertainty of the values carries over a measurement."""
-    close: list[str] = []
-    spread, end = np.where(np.isfinite(covariance), covariance, 0.0), float(measured.times.max())
-    for made, moves in zip(found.execution.transitions, found.as_made().transitions, strict=True):
-        slope = np.array([moves.time[by] for by in found.wrt], float)
-        reach = 2 * float(max(0.0, slope @ spread @ slope)) ** 0.5
-        if reach <= TIE * max(abs(float(made.time)), end):
-            continue  # its time depends on no value
-        near = measured.times[np.abs(measured.times - made.time) <= reach]
-        if len(near):
-            where = f"t = {show(near[0])}" + (f" and {len(near) - 1} more" if len(near) > 1 else "")
-            close.append(
-                f"{made.edge} at t = {show(made.time)} is within its uncertainty of the measurement at {where}"
-            )
-    more = [f"and {len(close) - MOST_NAMED} more transitions so"] if len(close) > MOST_NAMED else []
-    return [*close[:MOST_NAMED], *more]
 
 
 Numbers = Callable[[Array], Array]
@@ -284,6 +321,15 @@ class Objective:
     orders: set[tuple[str, ...]] = field(default_factory=set[tuple[str, ...]])
     _last: tuple[bytes, Array, Array, Sensitivity | None] | None = None
 
+    @property
+    def seen(self) -> tuple[list[str], set[tuple[str, ...]]]:
+        """What the search has met so far, to return to it."""
+        return [*self.bumps], {*self.orders}
+
+    @seen.setter
+    def seen(self, met: tuple[list[str], set[tuple[str, ...]]]) -> None:
+        self.bumps, self.orders = met
+
     def residuals(self, x: Array) -> Array:
         """The run with these values minus the measurements, weighted, one behind the other."""
         return self._at(x)[1]
@@ -291,6 +337,13 @@ class Objective:
     def slopes(self, x: Array) -> Array:
         """Their derivatives, (number of residuals, number of values)."""
         return self._at(x)[2]
+
+    def order(self, x: Array) -> tuple[str, ...] | None:
+        """The transitions of the run, or None if it does not reach the last measurement."""
+        found = self._at(x)[3]
+        if found is None or float(found.execution.times[-1]) < float(self.measured.times.max()):
+            return None
+        return tuple(made.edge for made in found.execution.transitions)
 
     def run(self, x: Array) -> Sensitivity:
         return self._at(x)[3] or self.evaluate(self.named(x), float(self.measured.times.max()))
@@ -347,74 +400,3 @@ class Objective:
             residuals.append(off[known])
             slopes.append(moves[known])
         return np.concatenate(residuals), np.concatenate(slopes), found
-
-
-MOST_SIDES = 3  # that are tried, and named
-UNKNOWN = 1e-12  # singular values below this share of the largest are of values that nothing determines
-JUMP = 1e-8  # of the size of a column: less is no jump
-LONGER = 1.25  # of the time of measurements
-FURTHER, NARROW = 1.1, 1e-6  # so many times as far, and by this share of the time, transitions are moved over them
-
-
-class WrongSide(NamedTuple):
-    """A measurement that agrees better with the other side of the transition next to it.
-
-    ``gain`` is what the sum of squares would lose there, ``late`` how much later than the transition it is, and
-    ``slope`` has the derivatives of the transition's time.
-    """
-
-    gain: float
-    late: float
-    slope: Array
-    sentence: str
-
-
-def wrong_sides(objective: Objective, x: Array) -> list[WrongSide]:
-    """Those of a run with these values, the largest gains first: no derivative shows them.
-
-    The run goes on for a while, since its next transition may be one that was measured.
-    """
-    measured, there = objective.measured, list[WrongSide]()
-    found = objective.tried(x, LONGER * float(measured.times.max()))
-    if found is None:
-        return there
-    end = float(found.execution.times[-1])
-    for made, moves in zip(found.execution.transitions, found.as_made().transitions, strict=True):
-        slope, time = np.array([moves.time[by] for by in found.wrt], float), float(made.time)
-        near = TIE * max(time, end)
-        if not np.isfinite(slope).all() or not np.any(slope) or not near < time < end - near:
-            continue
-        later = measured.times > time
-        for rows in (np.flatnonzero(~later)[-1:], np.flatnonzero(later & (measured.times <= end))[:1]):
-            for at in measured.times[rows].tolist():
-                gain = _gain(objective, found.execution, at, [time - near, time + near][:: -1 if at > time else 1])
-                if gain > 0:
-                    sentence = f"the measurement at t = {show(at)} agrees better with the other side of {made.edge} at "
-                    there.append(WrongSide(gain, at - time, slope, f"{sentence}t = {show(time)}"))
-    return sorted(there, key=lambda each: -each.gain)
-
-
-def _gain(objective: Objective, run: Execution, at: float, sides: Sequence[float]) -> float:
-    """What squares at a time lose where the run is on the other side of a transition, from the first of two times."""
-    own, table, gain = run.sample([at]), run.sample(sorted(sides)), 0.0
-    order = np.argsort(np.argsort(sides))
-    for name, column in objective.measured.columns.items():
-        jump = float(np.diff(np.asarray(table[name], float)[order])[0])
-        if not abs(jump) > JUMP * objective.size(name) / objective.weights[name]:
-            continue
-        for y in column[objective.measured.times == at].tolist():
-            off = float(own[name][0]) - y
-            change = off**2 - (off + jump) ** 2
-            gain += objective.weights[name] ** 2 * change if np.isfinite(change) else 0.0  # was not measured
-    return gain
-
-
-def steps_across(objective: Objective, x: Array, sizes: Array) -> Iterator[Array]:
-    """Steps by which a transition passes a measurement on its wrong side, those that change the others least."""
-    end, slopes = float(objective.measured.times.max()), objective.slopes(x) * sizes
-    shape = np.linalg.pinv(slopes.T @ slopes, rcond=UNKNOWN)
-    for each in wrong_sides(objective, x)[:MOST_SIDES]:
-        way = shape @ (each.slope * sizes)
-        rate = float(each.slope * sizes @ way)
-        if rate > 0:
-            yield sizes * way * (FURTHER * each.late + np.copysign(NARROW * end, each.late)) / rate
