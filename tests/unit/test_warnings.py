@@ -111,6 +111,83 @@ def test_several_passes_of_one_transition_are_one_warning(engine, settings):
     assert f"passed {sum(np.arange(7) * 2 * np.pi + np.pi / 6 < 40)} times, first at t = 0.52" in warning.message
 
 
+# A jump enters `air` at the height `start`, below the floor at 1; there h = start + v t - t**2.
+JUMPER = """
+hsdsl: 1
+parameters: {start: 0.75, speed: 0.5, last: 3}
+modes:
+  ground: {flow: {h: 0, v: 1, n: 0}, transitions: [{name: jump, when: v >= 1, to: air, reset: {h: start, v: speed}}]}
+  air:
+    flow: {h: v, v: -2, n: 0}
+    transitions:
+      - {name: touch, when: h <= 1, if: n < last, to: ground, reset: {v: 0, n: n + 1}}
+      - {name: again, when: v <= -3, to: ground, reset: {v: 0}}
+initial: {mode: ground, h: 1, v: 0, n: 0}
+experiment: {until: 7}
+"""
+MANNERS = [
+    {}, {"method": "dop853"}, {"method": "rk4", "step": 0.05, "tolerance": None},
+    {"precision": 30, "engine": "python"}, {"scheme": "relaxed", "relaxation": 1e-6},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("settings", MANNERS)
+def test_a_mode_that_is_entered_beyond_a_surface_with_an_if_says_so(engine, settings):
+    model = hsdsl.loads(JUMPER)
+    for last in (3, 0):  # whether `if` holds there or not
+        run = model.simulate(parameters={"last": last}, **{"engine": engine} | settings)
+        assert [made.edge for made in run.transitions] == ["jump", "again"] * 2 + ["jump"]
+        (warning,) = run.warnings
+        assert (warning.code, warning.edge) == ("HS708", "touch")
+        assert float(warning.time) == pytest.approx(1, abs=1e-5)
+        assert "mode air was entered beyond the surface of touch 3 times, first at t = 1" in warning.message
+        assert len(warning.message.split()) <= MOST_WORDS
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("settings", MANNERS)
+def test_a_mode_that_comes_back_inside_or_begins_on_a_surface_says_nothing(engine, settings):
+    settings = {"engine": engine} | settings
+    run = hsdsl.loads(JUMPER).simulate(parameters={"speed": 1.5}, **settings)  # up to 21/16, and down onto the floor
+    assert run.transitions[1].edge == "touch" and run.warnings == ()
+    on = hsdsl.loads(JUMPER).simulate(parameters={"start": 1, "speed": 1.5}, **settings)
+    assert on.transitions[1].edge == "touch" and on.warnings == ()
+    bounces = BALL.replace("h <= 0,", "h <= 0, if: v < 0,").replace("assumptions: [the floor does not move]\n", "")
+    ball = hsdsl.loads(bounces).simulate(until=2.9, **settings)
+    assert ball.transitions and "HS708" not in codes(ball)
+
+
+def test_an_event_that_leaves_a_state_beyond_a_surface_does_not_enter_its_mode_anew():
+    ticks = JUMPER.replace("    transitions:\n", "    transitions:\n      - {name: tick, event: v <= 0}\n")
+    (warning,) = hsdsl.loads(ticks).simulate(until=2).warnings
+    assert "touch at t = 1:" in warning.message
+    back = ticks.replace("event: v <= 0", "event: v <= 1.4")  # it ticks below the floor, before the way up
+    run = hsdsl.loads(back).simulate(parameters={"speed": 1.5}, until=3)
+    assert [made.edge for made in run.transitions] == ["jump", "tick", "touch"] and run.warnings == ()
+
+
+def test_a_part_that_enters_beyond_a_surface_says_so_and_others_do_not():
+    modes = JUMPER[JUMPER.index("modes:") : JUMPER.index("initial:")].replace("\n", "\n    ")
+    text = f"""
+hsdsl: 1
+automata:
+  body:
+    parameters: {{start: 0.75, speed: 0.5, last: 3}}
+    {modes}
+system:
+  a: {{automaton: body, initial: {{mode: ground, h: 1, v: 0, n: 0}}}}
+  b: {{automaton: body, initial: {{mode: ground, h: 1, v: 1/4, n: 0}}, parameters: {{speed: 1.5}}}}
+experiment: {{until: 7}}
+"""
+    run = hsdsl.loads(text).simulate()
+    assert {made.edge for made in run.transitions} == {"a.jump", "a.again", "b.jump", "b.touch"}
+    (warning,) = run.warnings
+    assert (warning.code, warning.edge) == ("HS708", "a.touch") and warning.message.startswith(
+        "part a entered beyond the surface of a.touch 3 times, first at t = 1:"
+    )
+
+
 def test_a_run_without_anything_to_tell_has_an_empty_list():
     run = hsdsl.loads(FOOT).simulate(until=0.4)
     assert run.warnings == () and as_json(run)["warnings"] == []
@@ -148,6 +225,8 @@ def test_sweeps_have_a_column_of_codes_and_count_them(tmp_path):
     foot = hsdsl.loads(FOOT)
     judged = foot.sweep({"ready": [0, 2]}, tmp_path / "judged", record="final,verdict")
     assert judged["warnings"].tolist() == ["", "HS701"]
+    jumper = hsdsl.loads(JUMPER).sweep({"speed": [0.5, 1.5]}, tmp_path / "jumper", record="final,verdict")
+    assert jumper["warnings"].tolist() == ["HS708", ""]
     plain = hsdsl.loads(BALL).sweep({"initial.h": [1, 4]}, tmp_path / "plain")
     assert plain["warnings"].tolist() == ["HS703 HS704", ""]
     assert plain.warning_counts == {"HS703": 1, "HS704": 1}

@@ -473,8 +473,8 @@ class Execution(Deferred):
 
     @property
     def warnings(self) -> tuple[RunWarning, ...]:
-        """The warnings of the run: surfaces passed while an `if` was false, walls that were not checked, motion that
-        completes the run, assumptions of the file. They are found with the verdict.
+        """The warnings of the run: surfaces with an `if` that were passed or entered beyond, walls that were not
+        checked, motion that completes the run, assumptions of the file. They are found with the verdict.
         """
         return self.verdict.warnings
 

@@ -100,6 +100,7 @@ SENTENCES: dict[str, tuple[str, str]] = {
     "sliding": ("HS705", "the run slides between {of} {when}"),
     "crowded": ("HS706", "so many transitions crowd together that each waits in a strip {when} on"),
     "assumed": ("HS707", "{of}"),
+    "entered": ("HS708", "{of} {when}: its `if` prevents firing at once"),
 }
 
 

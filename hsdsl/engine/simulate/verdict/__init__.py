@@ -38,7 +38,7 @@ from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stops import Diagnostics, show
 from hsdsl.engine.simulate.verdict.commutation import choices, first_of_many, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
-from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_the_end, remarked
+from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_rows, remarked
 from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
 from hsdsl.engine.simulate.verdict.screen import Margins, screens_of
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
@@ -65,7 +65,7 @@ def assess_compiled(run: CompiledRun, execution: Execution) -> Verdict:
         return assess(view(screen_made=screen), run.diagnostics)
     shown = problem.program, run.made, screen.margins, screen.commuting
     screens.leave(screen)
-    found = list(at_the_end(view())) if screens.final_walls else []
+    found = list(at_rows(view())) if screens.remarks_at_rows else []
     return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=(found, problem.program))
 
 

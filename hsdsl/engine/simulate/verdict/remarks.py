@@ -2,22 +2,24 @@
 
 Surfaces passed while an `if` was false and walls that do not hold are remarked by `misses` where that takes place. For
 other runs, as those that are outside the theorem, they are searched at the rows of the run, and in eighths of steps on
-which a surface rises at first and falls at last.
+which a surface rises at first and falls at last. Modes entered beyond a surface whose edge has an `if` are searched at
+the first rows of visits, whatever the verdict is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, takewhile
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
-from hsdsl.base.numbers.enclosures import Array, Range, as_range
+from hsdsl.base.numbers.enclosures import Array, Range, Undecided, as_range
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import Diagnostics, Remark, loop_remarks, may_be_passed, of_edge, wall_of, warnings_of
@@ -27,6 +29,7 @@ from hsdsl.mathematics.program import ModeProgram
 
 BEYOND = 4  # times its round-off: a wall that does not hold
 END = 1.0
+HALVINGS, MANY = 14, 1024  # of steps beyond a surface; visits that are looked at together
 POINTS = (*(i / 8 for i in range(8)), END)  # of a step that turns back
 
 # The warnings of a `Verdict.deferred` that has its remarks and its program as `_told`.
@@ -45,7 +48,13 @@ def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
     ):
         beyond = {remark.of for remark in found if remark.kind == "beyond"}
         found += (one for one in _passings(run, walls_alone=known) if one.kind != "beyond" or one.of not in beyond)
-    return [*found, *at_the_end(run)]
+    return [*found, *at_rows(run)]
+
+
+def at_rows(run: RunView) -> Iterator[Remark]:
+    """Remarks about states at rows, which no hypothesis of the theorem concerns."""
+    yield from at_the_end(run)
+    yield from _entered(run)
 
 
 def at_the_end(run: RunView) -> Iterator[Remark]:
@@ -62,6 +71,73 @@ def at_the_end(run: RunView) -> Iterator[Remark]:
         with suppress(*DOMAIN_ERRORS):
             if place.value(k) > BEYOND * place.roundoff_bound(k):
                 yield Remark("beyond", wall_of(mode, k), final.time)
+
+
+def _entered(run: RunView) -> Iterator[Remark]:
+    """Remarks about edges with an `if` beyond whose surface a mode was entered, and stayed while it lasted."""
+    program, table = run.problem.program, run.execution.arc_table
+    if not any(may_be_passed(program, edge) for edge in program.edges):
+        return
+    for index, _, rows in run.rows_by_mode():
+        mode = program.modes[index]
+        asked = [k for k, edge in enumerate(mode.edges) if may_be_passed(program, edge)]
+        if mode.slides or not asked or not len(rows):
+            continue
+        jumps = table.jump[np.searchsorted(table.first, rows, "right") - 1]
+        first = _Steps(run, index, rows[np.r_[True, jumps[1:] != jumps[:-1]]])
+        for k in asked:
+            with suppress(Undecided, *DOMAIN_ERRORS):
+                beyond = first.take(first.values(0.0, k) > 0)
+                if len(beyond.rows):
+                    late = np.abs(beyond.rates(0.0, k)) * 2 * float(run.tie(run.execution.times[-1]))
+                    beyond = beyond.take(beyond.values(0.0, k) > np.maximum(beyond.noise(0.0, k), late))
+                name = mode.edges[k].name
+                entered = f"part {name.rpartition('.')[0]}" if program.parts else f"mode {mode.name} was"
+                what = f"{entered} entered beyond the surface of {name}"
+                visits = [row for row in beyond.rows.tolist() if not _was_beyond(run, run.arc_of(row).jump, name)]
+                for some in (visits[i : i + MANY] for i in range(0, len(visits), MANY)):
+                    for row in _staying(run, index, some, k):
+                        yield Remark("entered", what, run.times[row], edge=name)
+
+
+def _visit(run: RunView, row: int, k: int) -> NDArray[np.int64]:
+    """The rows at which steps begin from a row on, until the mode is left, or a transition leaves surface k inside.
+
+    Events and other parts of a system make transitions meanwhile.
+    """
+    place = bisect_right(run.flows, row, key=lambda arc: arc.first)
+    first, later = run.flows[place - 1], (run.flows[i] for i in range(place, len(run.flows)))
+    mode = run.index(first.mode)
+    rest = takewhile(lambda arc: run.index(arc.mode) == mode and run.at_row(arc, arc.first).value(k) > 0, later)
+    return np.concatenate([np.arange(arc.first, arc.last) for arc in (first, *rest)])
+
+
+def _staying(run: RunView, index: int, entries: Sequence[int], k: int) -> list[int]:
+    """Those of the rows at which visits of a mode begin whose states are surely beyond surface k all along."""
+    from hsdsl.engine.simulate.verdict.steps import Parts, high, low, parts_at, undecided  # few runs have such a visit
+
+    visits = [_visit(run, row, k) for row in entries]
+    rows, of_visit = np.concatenate(visits), np.repeat(np.arange(len(visits)), [len(visit) for visit in visits])
+    inside = np.zeros(len(visits), dtype=bool)
+
+    def decides(parts: Parts) -> NDArray[np.bool_]:
+        value, n = parts.bound(run).surfaces(parts.times, *parts.states())[k], len(parts)
+        visit = of_visit[np.searchsorted(rows, parts.row)]
+        inside[visit[high(value, n) <= 0]] = True
+        return (~(low(value, n) > 0) & ~inside[visit])[:, None]
+
+    left, _ = undecided(parts_at(run, index, run.problem.program.modes[index].states, rows), decides, HALVINGS)
+    inside[of_visit[np.searchsorted(rows, left.row)]] = True
+    return [row for row, came_back in zip(entries, inside.tolist(), strict=True) if not came_back]
+
+
+def _was_beyond(run: RunView, jump: int, name: str) -> bool:
+    """Whether a state was beyond the surface of an edge of this name before what led to a visit."""
+    if not jump:
+        return False
+    place, _ = run.before(run.cascade(run.transitions[jump - 1])[0])
+    same = (k for k, edge in enumerate(place.mode.edges) if edge.name == name)
+    return any(place.value(k) > 0 and not run.is_on(place, k) for k in same)
 
 
 def _passings(run: RunView, *, walls_alone: bool) -> Iterator[Remark]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from hsdsl.base.numbers.bernstein import Array, from_powers, halving
 from hsdsl.base.numbers.enclosures import Range, as_range
 from hsdsl.engine.kernel import ModeKernel
+from hsdsl.engine.simulate.verdict.errors import Errors
 from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, RunView
 
 COLUMNS = ("row", "start", "width", "time", "length", "bernstein", "error")  # one entry for each part
@@ -115,11 +116,14 @@ def steps_of(run: RunView, places: int | None = None, marked: str = "") -> Itera
         rows = rows if marks is None else rows[marks[rows] != 0]
         rows = rows[:: max(1, len(rows) // places)] if places else rows
         for first in range(0, len(rows), MOST_PARTS):
-            yield _steps(run, mode, states, rows[first : first + MOST_PARTS])
+            yield parts_at(run, mode, states, rows[first : first + MOST_PARTS], run.errors)
 
 
-def _steps(run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int64]) -> Parts:
-    n, errors, times = len(states), run.errors, np.asarray(run.execution.times, dtype=float)
+def parts_at(
+    run: RunView, mode: int, states: Sequence[str], rows: NDArray[np.int64], errors: Errors | None = None
+) -> Parts:
+    """The steps that begin at rows of a mode, with the errors of their states, if they are given."""
+    n, times = len(states), np.asarray(run.execution.times, dtype=float)
     values, powers = run.pieces_at(rows, n)
     whole = np.concatenate([values[:, None, :], powers], axis=1).transpose(0, 2, 1)
     error = np.zeros((len(rows), n))
