@@ -19,7 +19,7 @@ from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smoo
 
 import hsdsl
 from hsdsl.base.errors import ModelError, UsageError
-from hsdsl.engine.integrators import AUTO
+from hsdsl.engine.integrators import FALLBACK
 from hsdsl.engine.runtime.structures import SCHEMES
 from hsdsl.engine.simulate import output_buffers
 from hsdsl.interface.model import Model
@@ -66,7 +66,7 @@ def in_chunks() -> int:
     count = 0
     for name, scheme in product(SOME, SCHEMES):
         for call in calls(name, scheme)[::3] if name not in LONG else ():
-            if (scheme, call.get("method", AUTO)) in COMPILED:
+            if (scheme, call.get("method", FALLBACK)) in COMPILED:
                 count += by_c(model(name), **{key: value for key, value in call.items() if key not in COMPARED})
     for name, path in MODELS.items():
         loaded = hsdsl.load(path)
@@ -77,7 +77,7 @@ def in_chunks() -> int:
             try:
                 drawn = Model(elaborate("random.yaml", text=text.encode()))
                 for setting, scheme in product(settings, SCHEMES):
-                    if (scheme, setting.get("method", AUTO)) in COMPILED:
+                    if (scheme, setting.get("method", FALLBACK)) in COMPILED:
                         count += by_c(drawn, max_transitions=25, scheme=scheme, **setting)
             except (ModelError, UsageError):
                 continue
