@@ -178,6 +178,11 @@ def may_be_passed(program: Program, edge: EdgeProgram) -> bool:
     return edge.conditional and not edge.of_event and not program.modes[edge.target].slides
 
 
+def may_be_entered(program: Program) -> bool:
+    """Whether a mode of the file has an edge with an `if`, beyond whose surface it may be entered."""
+    return any(may_be_passed(program, edge) for mode in program.modes if not mode.slides for edge in mode.edges)
+
+
 def wall_of(mode: ModeProgram, k: int) -> str:
     """The wall of surface k for a person."""
     return f"{mode.walls[k - len(mode.edges)]} of {mode.name}"

@@ -65,7 +65,7 @@ def assess_compiled(run: CompiledRun, execution: Execution) -> Verdict:
         return assess(view(screen_made=screen), run.diagnostics)
     shown = problem.program, run.made, screen.margins, screen.commuting
     screens.leave(screen)
-    found = list(at_rows(view())) if screens.remarks_at_rows else []
+    found = at_rows(view()) if screens.remarks_at_rows else ()  # searched when warnings are read
     return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=(found, problem.program))
 
 

@@ -9,10 +9,10 @@ the first rows of visits, whatever the verdict is.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise, takewhile
+from itertools import chain, pairwise, takewhile
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,16 @@ from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
 from hsdsl.base.numbers.enclosures import Array, Range, Undecided, as_range
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.kernel import ModeKernel
-from hsdsl.engine.simulate.stops import Diagnostics, Remark, loop_remarks, may_be_passed, of_edge, wall_of, warnings_of
+from hsdsl.engine.simulate.stops import (
+    Diagnostics,
+    Remark,
+    loop_remarks,
+    may_be_entered,
+    may_be_passed,
+    of_edge,
+    wall_of,
+    warnings_of,
+)
 from hsdsl.engine.simulate.verdict.crossings import sliding_spans
 from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, ROUNDS, RunView
 from hsdsl.mathematics.program import ModeProgram
@@ -32,12 +41,19 @@ END = 1.0
 HALVINGS, MANY = 14, 1024  # of steps beyond a surface; visits that are looked at together
 POINTS = (*(i / 8 for i in range(8)), END)  # of a step that turns back
 
+
+@np.errstate(all="ignore")  # what overflows is no number, and is no remark
+def _warned(verdict: Any) -> Any:
+    remarks, program = verdict._told
+    return warnings_of([*remarks], program)
+
+
 # The warnings of a `Verdict.deferred` that has its remarks and its program as `_told`.
-WARNINGS: dict[str, Callable[[Any], Any]] = {"warnings": lambda verdict: warnings_of(*verdict._told)}
+WARNINGS: dict[str, Callable[[Any], Any]] = {"warnings": _warned}
 
 
-def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
-    """The remarks about a run."""
+def remarked(run: RunView, diagnostics: Diagnostics) -> Iterable[Remark]:
+    """The remarks about a run; those about rows are searched when they are read, which takes longer than many a run."""
     program = run.problem.program
     found = [*loop_remarks(program, diagnostics, run.stop)]
     found += (Remark("sliding", " and ".join(modes), start, end) for modes, start, end in sliding_spans(run))
@@ -48,7 +64,7 @@ def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
     ):
         beyond = {remark.of for remark in found if remark.kind == "beyond"}
         found += (one for one in _passings(run, walls_alone=known) if one.kind != "beyond" or one.of not in beyond)
-    return [*found, *at_rows(run)]
+    return chain(found, at_rows(run))
 
 
 def at_rows(run: RunView) -> Iterator[Remark]:
@@ -75,9 +91,10 @@ def at_the_end(run: RunView) -> Iterator[Remark]:
 
 def _entered(run: RunView) -> Iterator[Remark]:
     """Remarks about edges with an `if` beyond whose surface a mode was entered, and stayed while it lasted."""
-    program, table = run.problem.program, run.execution.arc_table
-    if not any(may_be_passed(program, edge) for edge in program.edges):
+    program = run.problem.program
+    if not may_be_entered(program):
         return
+    table = run.execution.arc_table
     for index, _, rows in run.rows_by_mode():
         mode = program.modes[index]
         asked = [k for k, edge in enumerate(mode.edges) if may_be_passed(program, edge)]
