@@ -25,7 +25,7 @@ from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.scheme import newton, radau
 
 PROBLEMS = sorted((Path(__file__).parents[1] / "tests" / "convergence" / "stiff").glob("*.yaml"))
-COUNTED = (radau, "derive"), (radau, "factor_dense"), (radau, "factor_sparse"), (newton, "iterate")
+COUNTED = (radau, "evaluate_jacobian"), (radau, "factor_dense"), (radau, "factor_sparse"), (newton, "iterate")
 TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-11)
 
 
@@ -48,7 +48,7 @@ def counted(model: Any, tolerance: float) -> tuple[int, int, int]:
     finally:
         for module, name, function in plain:
             setattr(module, name, function)
-    return made["derive"], made["factor_dense"] + made["factor_sparse"], made["iterate"]
+    return made["evaluate_jacobian"], made["factor_dense"] + made["factor_sparse"], made["iterate"]
 
 
 def fastest(run: Any, repetitions: int) -> float:

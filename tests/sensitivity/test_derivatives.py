@@ -164,7 +164,7 @@ def test_a_start_on_a_guard() -> None:
 def test_implicit_steps_of_derivatives_share_factors(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a linear flow one Jacobian serves each mode, and few factorings serve all steps, as without derivatives."""
     made = Counter[str]()
-    for module, name in ((radau, "derive"), (radau, "factor_dense"), (newton, "iterate")):
+    for module, name in ((radau, "evaluate_jacobian"), (radau, "factor_dense"), (newton, "iterate")):
         plain = getattr(module, name)
 
         def noted(*given: Any, plain: Any = plain) -> Any:
@@ -175,7 +175,7 @@ def test_implicit_steps_of_derivatives_share_factors(monkeypatch: pytest.MonkeyP
     call: dict[str, Any] = {"method": "radau", "tolerance": 1e-7, "until": 2, "engine": "python"}
     found = hsdsl.load("models/stiff-switch.yaml").sensitivity("fast,slow,initial.y2", **call)
     steps = len(found.execution.times)
-    assert 0 < made["derive"] <= 2 * len(found.execution.arcs)
+    assert 0 < made["evaluate_jacobian"] <= 2 * len(found.execution.arcs)
     assert 0 < made["factor_dense"] < steps / 3
     assert 0 < made["iterate"] < 2 * steps
 

@@ -42,7 +42,7 @@ def factored_at(jacobian: np.ndarray, of: Variation) -> tuple[Blocks, Radau]:
     n, places = len(jacobian), np.flatnonzero(jacobian).tolist()
     known = Derivatives(lambda t, *x: jacobian.ravel().tolist(), [1.0] * n, places=places, varied=of)
     made = Steps(known, 1e-6, FLOAT64)
-    text.derive(known, made.blocks, made.text, 0.0, [0.0] * n)
+    text.evaluate_jacobian(known, made.blocks, made.text, 0.0, [0.0] * n)
     assert text.factor_all(made.blocks, coefficients(FLOAT64), made.text, STEP, [1.0] * n)
     return made.blocks, made.text
 
