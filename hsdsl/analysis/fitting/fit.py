@@ -178,7 +178,7 @@ def _digits(x: float, digits: int) -> str:
     return f"{x:#.{digits}g}".replace(".e", "e")
 
 
-UNLIKELY = 1e-3  # the probability of residuals below which the model is said not to explain the data
+UNLIKELY = 1e-3  # residuals of a lower probability: the model does not explain the data
 MOST_DIGITS = 12
 FIXED_DIGITS = 6  # before the point; longer numbers have an exponent
 TIMES = ("t", "time")

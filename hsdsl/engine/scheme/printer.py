@@ -1,7 +1,7 @@
 """The text of the scheme as C99: the same operations in the same order, each with its own parentheses.
 
 The text is Python, and a small part of it: `docs/scheme.md` defines which. Modules of this folder are read by Python's
-parser; whatever is not of the subset is refused, with file and line. The first assignment to a name fixes its kind, its
+parser; anything outside the subset is refused, with file and line. The first assignment to a name fixes its kind, its
 type in C: a number, an instant, an integer, a truth, a vector, or a record. In C a function whose result may be absent
 returns whether it has one, and one that may fail whether it has failed; their results go to pointers.
 

@@ -178,9 +178,11 @@ def may_be_passed(program: Program, edge: EdgeProgram) -> bool:
     return edge.conditional and not edge.of_event and not program.modes[edge.target].slides
 
 
-def may_be_entered(program: Program) -> bool:
-    """Whether a mode of the file has an edge with an `if`, beyond whose surface it may be entered."""
-    return any(may_be_passed(program, edge) for mode in program.modes if not mode.slides for edge in mode.edges)
+def has_remarks_at_rows(program: Program) -> bool:
+    """Whether a run may end in a wall, or enter a mode beyond the surface of an edge with an `if`."""
+    own = [mode for mode in program.modes if not mode.slides]
+    entered = any(may_be_passed(program, edge) for mode in own for edge in mode.edges)
+    return entered or any(mode.final and mode.walls for mode in own)
 
 
 def wall_of(mode: ModeProgram, k: int) -> str:

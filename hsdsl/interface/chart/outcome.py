@@ -128,7 +128,7 @@ def _difference(
     return ("values", f"an error of {error:.2g} of the span") if error > within.state else ("", "")
 
 
-OF_CHARTS = Tolerance(state=0.1, time=0.005)  # beyond it a result of a chart is wrong, whatever its error is
+OF_CHARTS = Tolerance(state=0.1, time=0.005)  # beyond it a result of a chart is wrong
 
 
 class Judgement(NamedTuple):

@@ -439,7 +439,8 @@ def _printed(expr: sp.Basic) -> str:
 _NUMBERED = re.compile(r"([a-z_]+)\d+")
 _WORD = re.compile(r"(?<!\w)([a-z_]+\d+)(?!\w)")
 _MOST_SHAPES = 1 << 14
-_texts: dict[tuple, tuple[list[str], list[int]]] = {}
+_Template = tuple[list[str], list[int]]
+_texts: dict[tuple, _Template] = {}
 
 
 class Shape:
@@ -493,20 +494,30 @@ class Shape:
         """The text of a ``kind`` that is written of the expressions."""
         key = (kind, *self.key)
         if key not in _texts:
-            places = {name: i for i, name in enumerate(self.names)}
-            pieces = _WORD.split(write())
-            texts, used = pieces[:1], list[int]()
-            for word, text in zip(pieces[1::2], pieces[2::2], strict=True):
-                if word in places:
-                    used.append(places[word])
-                    texts.append(text)
-                else:
-                    texts[-1] += word + text
+            used = _template(write(), {name: i for i, name in enumerate(self.names)})
             if len(_texts) >= _MOST_SHAPES:
                 _texts.clear()
-            _texts[key] = texts, used
-        texts, used = _texts[key]
-        return "".join(chain(texts[:1], *zip((self.names[i] for i in used), texts[1:], strict=True)))
+            _texts[key] = used
+        return _filled(_texts[key], self.names)
+
+
+def _template(text: str, places: Mapping[str, int]) -> _Template:
+    """Cut a text at the names that have places: the texts between them, and these places."""
+    pieces = _WORD.split(text)
+    texts, used = pieces[:1], list[int]()
+    for word, after in zip(pieces[1::2], pieces[2::2], strict=True):
+        if word in places:
+            used.append(places[word])
+            texts.append(after)
+        else:
+            texts[-1] += word + after
+    return texts, used
+
+
+def _filled(template: _Template, values: Sequence[str]) -> str:
+    """Put values at the places of a template."""
+    texts, used = template
+    return "".join(chain(texts[:1], *zip(map(values.__getitem__, used), texts[1:], strict=True)))
 
 
 def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[list[Statement], tuple]:
@@ -530,31 +541,25 @@ class _Written:
 
     def __init__(self, definition: Definition, names: Sequence[str]) -> None:
         places = {name: i for i, name in enumerate(names)}
-        self.lines: list[tuple[list[str], list[int]]] = []
+        self.lines: list[_Template] = []
         for line in _body(definition.results, definition.statements).splitlines():
             name, _, text = line.strip().rpartition(" = ")
-            pieces = _WORD.split(text.removeprefix("return (").removesuffix(", )"))
-            operands, texts = list[int](), pieces[:1]
-            for word, after in zip(pieces[1::2], pieces[2::2], strict=True):
-                if word in places:
-                    operands.append(places[word])
-                    texts.append(after)
-                else:
-                    texts[-1] += word + after
-            places[name] = len(names) + len(self.lines)
-            self.lines.append((texts, operands))
+            self.lines.append(_template(text.removeprefix("return (").removesuffix(", )"), places))
+            places[name] = len(names) + len(self.lines) - 1
 
     def text(self, names: Sequence[str], known: dict[str, str]) -> str:
         """The result over symbols of these names; statements get the names that they are ``known`` by, or new ones."""
         values, text = list(names), ""
-        for texts, operands in self.lines:
-            text = "".join(chain(texts[:1], *zip(map(values.__getitem__, operands), texts[1:], strict=True)))
+        for line in self.lines:
+            text = _filled(line, values)
             if len(values) < len(names) + len(self.lines) - 1:
-                values.append(text if texts == ["", ""] else known.setdefault(text, f"u{len(known)}"))
+                values.append(text if line[0] == ["", ""] else known.setdefault(text, f"u{len(known)}"))
         return text
 
 
-LEAST_ALIKE = 8  # expressions of one shape that are written one by one
+# So many expressions of one shape are written one by one. Fewer are written together: what they have in common is
+# computed once, and bounds keep their bits in models without many alike parts.
+LEAST_ALIKE = 8
 
 
 def print_each(

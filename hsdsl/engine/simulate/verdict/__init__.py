@@ -38,7 +38,7 @@ from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stops import Diagnostics, show
 from hsdsl.engine.simulate.verdict.commutation import choices, first_of_many, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
-from hsdsl.engine.simulate.verdict.remarks import WARNINGS, at_rows, remarked
+from hsdsl.engine.simulate.verdict.remarks import WARNINGS, remarked, told
 from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
 from hsdsl.engine.simulate.verdict.screen import Margins, screens_of
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
@@ -65,8 +65,7 @@ def assess_compiled(run: CompiledRun, execution: Execution) -> Verdict:
         return assess(view(screen_made=screen), run.diagnostics)
     shown = problem.program, run.made, screen.margins, screen.commuting
     screens.leave(screen)
-    found = at_rows(view()) if screens.remarks_at_rows else ()  # searched when warnings are read
-    return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=(found, problem.program))
+    return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=told(view, (), problem.program))
 
 
 _LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: _margins_of(*verdict._shown), **WARNINGS}
@@ -88,8 +87,8 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     verdict, judged = _judged(run, diagnostics)
     crowded = _crowded_steps(run.problem, run.execution)
     reasons = _once(verdict.reasons, crowded) if crowded else verdict.reasons
-    told = remarked(judged, diagnostics), run.problem.program
-    return Verdict.deferred(WARNINGS, theorem=verdict.theorem, reasons=reasons, _told=told)
+    remarks = told(lambda: judged, remarked(judged, diagnostics), run.problem.program)
+    return Verdict.deferred(WARNINGS, theorem=verdict.theorem, reasons=reasons, _told=remarks)
 
 
 def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:

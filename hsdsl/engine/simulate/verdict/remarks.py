@@ -3,16 +3,16 @@
 Surfaces passed while an `if` was false and walls that do not hold are remarked by `misses` where that takes place. For
 other runs, as those that are outside the theorem, they are searched at the rows of the run, and in eighths of steps on
 which a surface rises at first and falls at last. Modes entered beyond a surface whose edge has an `if` are searched at
-the first rows of visits, whatever the verdict is.
+the first rows of visits, with every verdict.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import chain, pairwise, takewhile
+from itertools import pairwise, takewhile
 from typing import Any
 
 import numpy as np
@@ -25,8 +25,8 @@ from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import (
     Diagnostics,
     Remark,
+    has_remarks_at_rows,
     loop_remarks,
-    may_be_entered,
     may_be_passed,
     of_edge,
     wall_of,
@@ -34,26 +34,32 @@ from hsdsl.engine.simulate.stops import (
 )
 from hsdsl.engine.simulate.verdict.crossings import sliding_spans
 from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, ROUNDS, RunView
-from hsdsl.mathematics.program import ModeProgram
+from hsdsl.mathematics.program import ModeProgram, Program
 
 BEYOND = 4  # times its round-off: a wall that does not hold
 END = 1.0
 HALVINGS, MANY = 14, 1024  # of steps beyond a surface; visits that are looked at together
+Told = tuple[Sequence[Remark], Callable[[], Iterator[Remark]] | None, Program]
 POINTS = (*(i / 8 for i in range(8)), END)  # of a step that turns back
 
 
 @np.errstate(all="ignore")  # what overflows is no number, and is no remark
 def _warned(verdict: Any) -> Any:
-    remarks, program = verdict._told
-    return warnings_of([*remarks], program)
+    remarks, later, program = verdict._told
+    return warnings_of([*remarks, *later()] if later is not None else remarks, program)
 
 
-# The warnings of a `Verdict.deferred` that has its remarks and its program as `_told`.
+# The warnings of a `Verdict.deferred` whose `_told` is what `told` returns.
 WARNINGS: dict[str, Callable[[Any], Any]] = {"warnings": _warned}
 
 
-def remarked(run: RunView, diagnostics: Diagnostics) -> Iterable[Remark]:
-    """The remarks about a run; those about rows are searched when they are read, which takes longer than many a run."""
+def told(run: Callable[[], RunView], remarks: Sequence[Remark], program: Program) -> Told:
+    """What warnings are made of; a search at the rows of a run takes longer than many a run, and waits for a reader."""
+    return remarks, (lambda: at_rows(run())) if has_remarks_at_rows(program) else None, program
+
+
+def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
+    """The remarks about a run, without those of `at_rows`."""
     program = run.problem.program
     found = [*loop_remarks(program, diagnostics, run.stop)]
     found += (Remark("sliding", " and ".join(modes), start, end) for modes, start, end in sliding_spans(run))
@@ -64,7 +70,7 @@ def remarked(run: RunView, diagnostics: Diagnostics) -> Iterable[Remark]:
     ):
         beyond = {remark.of for remark in found if remark.kind == "beyond"}
         found += (one for one in _passings(run, walls_alone=known) if one.kind != "beyond" or one.of not in beyond)
-    return chain(found, at_rows(run))
+    return found
 
 
 def at_rows(run: RunView) -> Iterator[Remark]:
@@ -91,30 +97,33 @@ def at_the_end(run: RunView) -> Iterator[Remark]:
 
 def _entered(run: RunView) -> Iterator[Remark]:
     """Remarks about edges with an `if` beyond whose surface a mode was entered, and stayed while it lasted."""
-    program = run.problem.program
-    if not may_be_entered(program):
-        return
-    table = run.execution.arc_table
+    program, table = run.problem.program, run.execution.arc_table
     for index, _, rows in run.rows_by_mode():
         mode = program.modes[index]
-        asked = [k for k, edge in enumerate(mode.edges) if may_be_passed(program, edge)]
-        if mode.slides or not asked or not len(rows):
+        conditional = [k for k, edge in enumerate(mode.edges) if may_be_passed(program, edge)]
+        if mode.slides or not conditional or not len(rows):
             continue
         jumps = table.jump[np.searchsorted(table.first, rows, "right") - 1]
         first = _Steps(run, index, rows[np.r_[True, jumps[1:] != jumps[:-1]]])
-        for k in asked:
+        for k in conditional:
+            name = mode.edges[k].name
+            entered = f"part {name.rpartition('.')[0]}" if program.parts else f"mode {mode.name} was"
+            what = f"{entered} entered beyond the surface of {name}"
             with suppress(Undecided, *DOMAIN_ERRORS):
-                beyond = first.take(first.values(0.0, k) > 0)
-                if len(beyond.rows):
-                    late = np.abs(beyond.rates(0.0, k)) * 2 * float(run.tie(run.execution.times[-1]))
-                    beyond = beyond.take(beyond.values(0.0, k) > np.maximum(beyond.noise(0.0, k), late))
-                name = mode.edges[k].name
-                entered = f"part {name.rpartition('.')[0]}" if program.parts else f"mode {mode.name} was"
-                what = f"{entered} entered beyond the surface of {name}"
-                visits = [row for row in beyond.rows.tolist() if not _was_beyond(run, run.arc_of(row).jump, name)]
-                for some in (visits[i : i + MANY] for i in range(0, len(visits), MANY)):
-                    for row in _staying(run, index, some, k):
-                        yield Remark("entered", what, run.times[row], edge=name)
+                for row in _entered_beyond(run, index, first, k):
+                    yield Remark("entered", what, run.times[row], edge=name)
+
+
+def _entered_beyond(run: RunView, index: int, first: _Steps, k: int) -> Iterator[int]:
+    """The rows at which visits of a mode begin beyond surface k by more than round-off, and stay there."""
+    beyond = first.take(first.values(0.0, k) > 0)
+    if len(beyond.rows):
+        late = np.abs(beyond.rates(0.0, k)) * 2 * float(run.tie(run.execution.times[-1]))
+        beyond = beyond.take(beyond.values(0.0, k) > np.maximum(beyond.noise(0.0, k), late))
+    name = run.problem.program.modes[index].edges[k].name
+    visits = [row for row in beyond.rows.tolist() if not _was_beyond(run, run.arc_of(row).jump, name)]
+    for some in (visits[i : i + MANY] for i in range(0, len(visits), MANY)):
+        yield from _staying(run, index, some, k)
 
 
 def _visit(run: RunView, row: int, k: int) -> NDArray[np.int64]:
