@@ -5,11 +5,14 @@
 `plan`                  a problem ready to run; the two engines
 `run`                   a problem under way, and the state of its mode
 `located`               the loop: step, first crossing, reset (Fig. 8 of the paper)
+`located_steps`         its steps, with the polynomials of surfaces
+`crossings`             the first crossing of each surface of such a step
 `relaxed`               the other loop: step, strip, reset (Fig. 12, the paper's algorithm)
 `surfaces`              a mode's surfaces at a point, as polynomials along a step, and where these rise through zero
 `transitions`           which crossing goes, its reset, the mode entered, cascades, executions that wait
-`contact`               guards that hold the state, motion along them, and Zeno tails that end in it (M11)
-`control`               the step size, and what errors are compared with
+`contact`               guards that hold the state, and motion along them (M11)
+`zeno`                  Zeno tails: their limit replaces them, or a run stops there
+`control`               the step size, what errors are compared with, why a step fails
 `stalls`                when no shorter step helps, and why a run cannot go on, also the compiled one
 `stops`                 how runs end and what they remark, in sentences
 `input_segments`        inputs as segments that no step crosses
@@ -24,7 +27,8 @@
 `verdict`               do the theorem's hypotheses hold for a run?
 ======================  ==========================================================================================
 
-A reader of the located scheme opens `located`, `surfaces`, `transitions` and `contact`.
+A reader of the located scheme opens `located`, and then what a question is about: `crossings` and the roots that they
+ask `surfaces` for, `transitions`, or `contact` and `zeno`.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from math import nan
 from types import SimpleNamespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.engine.integrators.stepper import State, Stepper, make_resolved
@@ -41,7 +41,20 @@ if TYPE_CHECKING:
     from hsdsl.engine.simulate.run import ModeState, Run
 
 FIRST_PART = 100  # the first step is the largest one divided by this
+ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
 LARGEST_SHARE = 0.1  # of the run: a step over a state at rest must still notice time going on
+
+
+@dataclass(frozen=True)
+class StepFailure:
+    """Why a trial step ends outside the relaxed domain."""
+
+    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump", "slow"]
+    surface: int | None = None
+
+
+NOT_FINITE, TOO_WRONG, UNSOLVED = StepFailure("not finite"), StepFailure("error"), StepFailure("unsolved")
+TOO_FAST = StepFailure("not finite")  # a surface, for one step
 
 
 @dataclass
@@ -90,6 +103,11 @@ def make_control(settings: Settings, arithmetic: Arithmetic) -> Control:
     control.first_steps = iter(settings.first_steps) if settings.first_steps else None
     control.first = control.h
     return control
+
+
+def end_of_step(t: Number, h: Number, limit: Number) -> tuple[Number, Number]:
+    """Return the length and the end of a step, which ends on a limit that is so close."""
+    return (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
 
 
 def error_ratio(

@@ -18,32 +18,17 @@ from hsdsl.engine.integrators.stepper import Polynomial, Stages, State, Stepper,
 from hsdsl.engine.kernel import Vector
 from hsdsl.engine.scheme.control import accept, begin_steps, reject, struggles
 from hsdsl.engine.scheme.pace import count_step, takes_back
-from hsdsl.engine.simulate.contact import holds_next, unresolved
-from hsdsl.engine.simulate.control import error_ratio
+from hsdsl.engine.simulate.contact import holds_next
+from hsdsl.engine.simulate.control import NOT_FINITE, TOO_WRONG, UNSOLVED, StepFailure, end_of_step, error_ratio
 from hsdsl.engine.simulate.run import ModeState, Run
 from hsdsl.engine.simulate.stalls import across_jump, make_pace, stall_ends
 from hsdsl.engine.simulate.stops import reached, reached_in_strip, slides
-from hsdsl.engine.simulate.surfaces import Arrival, Crossing, StepFailure, at, close_bracket, joined, shortened
-from hsdsl.engine.simulate.transitions import choose, comes_back, enter, reset
+from hsdsl.engine.simulate.surfaces import Arrival, Crossing, at, close_bracket, shortened
+from hsdsl.engine.simulate.transitions import Event, choose, comes_back, enter, go_on, reset, sizes, standing_on
+from hsdsl.engine.simulate.zeno import unresolved
 
 SCAN = 8  # pieces in which a step's interpolant is searched for its last up-crossing
 ROOT_SHARE = 1 / 16  # of the round-off: how close to zero a crossing is solved
-ALMOST = 1 - 2.0**-30  # a step this close to a boundary ends on it
-NOT_FINITE, TOO_WRONG, UNSOLVED = StepFailure("not finite"), StepFailure("error"), StepFailure("unsolved")
-
-
-@dataclass(frozen=True)
-class Event:
-    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers behind that.
-
-    The guards of edges ``held`` held the state until then.
-    """
-
-    crossing: Crossing
-    alternatives: tuple[str, ...]
-    t1: Number
-    scale: State
-    held: tuple[int, ...] = ()
 
 
 Found = Sequence[Crossing] | StepFailure  # no crossing: the step ended inside the domain
@@ -80,7 +65,7 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     while t < limit and not count_step(pace, t):
         h, halvings, ratio, failure = control.h, 0, None, TOO_WRONG
         while True:
-            h, t1 = (h, t + h) if h < (limit - t) * ALMOST else (limit - t, limit)
+            h, t1 = end_of_step(t, h, limit)
             found, z, stages, end = attempt(t, h, t1, x, slope)
             if estimate and end is not None and not isinstance(found, StepFailure):
                 ratio = error_ratio(run, here, method, estimate(h, stages, end), t, h, x, z)
@@ -408,27 +393,6 @@ def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
     return reached(t)
 
 
-def go_on(run: Run, here: ModeState) -> ModeState | Stop:
-    """Enter the next segment of the inputs: anew where one of them jumps."""
-    t, x, mode, surfaces = here.t, here.x, here.index, here.surfaces
-    if run.timeline.at(t).jump:
-        try:
-            inside = surfaces.inside(t, x)
-            stood = surfaces.off(t, x, surfaces.active - surfaces.emerging)
-        except DOMAIN_ERRORS:
-            return run.standstill(here).not_finite([(t, x)])
-        return enter(run, mode, here.mode.states, t, x, surfaces.scale, arrival=Arrival(inside=inside, stood=stood))
-    after = run.place(mode, here.mode.states, t, x, surfaces.scale, active=surfaces.active)
-    after.surfaces.emerging.update(surfaces.emerging)
-    return after
-
-
-def standing_on(run: Run, here: ModeState) -> list[Crossing]:
-    """Guards that the state is on, to round-off or a tie."""
-    t, x, zero = here.t, here.x, run.arithmetic.zero
-    return [Crossing(k, zero, t, x, zero) for k in here.surfaces.standing(t, x, run.tie(t))]
-
-
 def stuck(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Event | Stop:
     """No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop."""
     shrunk = failure.kind in ("wall", "deep", "flat", "inward", "not finite", "unsolved")
@@ -436,14 +400,3 @@ def stuck(run: Run, here: ModeState, failure: StepFailure, slope: State) -> Even
         chosen, alternatives = choose(here, standing, run)
         return Event(chosen, alternatives, here.t, sizes(here.x, here.x, here, chosen.edge in here.surfaces.active))
     return run.standstill(here).stuck(failure, slope)
-
-
-def sizes(x: State, z: State, here: ModeState, stays: bool = False) -> State:
-    """Return the sizes of the numbers that a point between x and z is computed from.
-
-    A state that has not moved since the mode was entered still carries the sizes that it came in with. So does one that
-    ``stays`` on a guard, which it has not left: it is off that by the round-off of these.
-    """
-    entered = zip(here.arc.values[0], here.surfaces.scale, strict=True)
-    kept = (s if stays or b == first else b * 0 for b, (first, s) in zip(z, entered, strict=True))
-    return tuple(joined(s, max(abs(a), abs(b))) for s, a, b in zip(kept, x, z, strict=True))

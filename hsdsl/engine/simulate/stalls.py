@@ -31,11 +31,11 @@ from hsdsl.engine.scheme.pace import (
     jump_between,
 )
 from hsdsl.engine.simulate import stops
+from hsdsl.engine.simulate.control import StepFailure
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.run import ModeState, Run
 from hsdsl.engine.simulate.stops import LEFT, Diagnostics, left_domain, show, slides
-from hsdsl.engine.simulate.surfaces import StepFailure
 from hsdsl.engine.simulate.workspace import Workspace
 from hsdsl.mathematics.program import HELD, ModeProgram, Program
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import comb
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
@@ -68,14 +68,6 @@ class Arrival:
 
 
 ANY = Arrival()
-
-
-@dataclass(frozen=True)
-class StepFailure:
-    """Why a trial step ends outside the relaxed domain."""
-
-    kind: Literal["wall", "deep", "flat", "inward", "not finite", "error", "unsolved", "creeping", "jump", "slow"]
-    surface: int | None = None
 
 
 def at(x: State, piece: Polynomial, theta: Number) -> State:

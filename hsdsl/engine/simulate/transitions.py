@@ -17,7 +17,7 @@ its time says, the first was made, or all were dropped.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
@@ -26,11 +26,25 @@ from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.scheme.pace import returns
 from hsdsl.engine.simulate.moving import moved_reset
 from hsdsl.engine.simulate.stops import ENTERED, endless, entered_final, left_domain, reset_not_finite, too_many_wait
-from hsdsl.engine.simulate.surfaces import ANY, Arrival, Crossing
+from hsdsl.engine.simulate.surfaces import ANY, Arrival, Crossing, joined
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram
 
 if TYPE_CHECKING:
     from hsdsl.engine.simulate.run import ModeState, Run
+
+
+@dataclass(frozen=True)
+class Event:
+    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers behind that.
+
+    The guards of edges ``held`` held the state until then.
+    """
+
+    crossing: Crossing
+    alternatives: tuple[str, ...]
+    t1: Number
+    scale: State
+    held: tuple[int, ...] = ()
 
 
 def choose(here: ModeState, crossings: Sequence[Crossing], run: Run) -> tuple[Crossing, tuple[str, ...]]:
@@ -134,3 +148,35 @@ def comes_back(run: Run, flowed: bool, here: ModeState) -> bool:
 def decisive(mode: ModeProgram, x: State) -> State:
     """What of a state decides how a run goes on: a cascade that only counts comes back to it."""
     return tuple(x[i] for i in mode.deciding) if mode.idle else x
+
+
+def standing_on(run: Run, here: ModeState) -> list[Crossing]:
+    """Guards that the state is on, to round-off or a tie."""
+    t, x, zero = here.t, here.x, run.arithmetic.zero
+    return [Crossing(k, zero, t, x, zero) for k in here.surfaces.standing(t, x, run.tie(t))]
+
+
+def sizes(x: State, z: State, here: ModeState, stays: bool = False) -> State:
+    """Return the sizes of the numbers that a point between x and z is computed from.
+
+    A state that has not moved since the mode was entered still carries the sizes that it came in with. So does one that
+    ``stays`` on a guard, which it has not left: it is off that by the round-off of these.
+    """
+    entered = zip(here.arc.values[0], here.surfaces.scale, strict=True)
+    kept = (s if stays or b == first else b * 0 for b, (first, s) in zip(z, entered, strict=True))
+    return tuple(joined(s, max(abs(a), abs(b))) for s, a, b in zip(kept, x, z, strict=True))
+
+
+def go_on(run: Run, here: ModeState) -> ModeState | Stop:
+    """Enter the next segment of the inputs: anew where one of them jumps."""
+    t, x, mode, surfaces = here.t, here.x, here.index, here.surfaces
+    if run.timeline.at(t).jump:
+        try:
+            inside = surfaces.inside(t, x)
+            stood = surfaces.off(t, x, surfaces.active - surfaces.emerging)
+        except DOMAIN_ERRORS:
+            return run.standstill(here).not_finite([(t, x)])
+        return enter(run, mode, here.mode.states, t, x, surfaces.scale, arrival=Arrival(inside=inside, stood=stood))
+    after = run.place(mode, here.mode.states, t, x, surfaces.scale, active=surfaces.active)
+    after.surfaces.emerging.update(surfaces.emerging)
+    return after

@@ -37,8 +37,6 @@ static hs_real state_size(const hs_run *run, int s);
 static int is_push(const hs_run *run, int j);
 static int holds_next(hs_run *run, int k, hs_time t, const hs_real *x);
 static int releases(const hs_run *run, int j);
-static const hs_made *made_before(const hs_run *run, int back);
-static int unresolved(hs_run *run, int k);
 
 /* moving.c */
 #if defined(HS_MOVES)

@@ -38,8 +38,11 @@
 #include "run.c"
 #include "recorder.c"
 #include "transitions.c"
-#include "relaxed.c"
 #include "contact.c"
+#include "zeno.c"
+#include "relaxed.c"
+#include "located_steps.c"
+#include "crossings.c"
 #include "located.c"
 #if !defined(HS_FLOAT32)
 #include "sample.c"

@@ -1,6 +1,6 @@
-/* One step of Taylor's method in lanes, that of next_series() in located.c, and the first crossing on such steps, that
-   of crossings_along() there. Nothing is decided here that is not plain: in a lane where it is not, the loop for one run
-   decides. The text of a model's routines stands before this file, with the table `lane_modes`. */
+/* One step of Taylor's method in lanes, that of next_series() in located_steps.c, and the first crossing on such steps,
+   that of crossings_along() in crossings.c. Nothing is decided here that is not plain: in a lane where it is not, the loop
+   for one run decides. The text of a model's routines stands before this file, with the table `lane_modes`. */
 
 #include "lane_roots.c"
 

@@ -122,3 +122,8 @@ static void note_unsettled(hs_run *run, int k, hs_time time) {
   if (!*unsettled) note(run, HS_UNSETTLED, k, 0, time, time);
   *unsettled = 1;
 }
+
+/* Transition `back` before the last one. */
+static const hs_made *made_before(const hs_run *run, int back) {
+  return &run->made[(uint64_t)(run->jump - 1 - back) % FREE];
+}

@@ -4,10 +4,6 @@
 #define SCAN 8
 #define ROOT_SHARE (1.0 / 16)
 
-#if !defined(HS_NO_CLOCK)
-#define POLL_EVERY (CLOCKS_PER_SEC / 50)
-#endif
-
 static hs_found failure(hs_step_failure kind, int surface) {
   const hs_found found = {kind, surface, 0};
   return found;
@@ -274,32 +270,6 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, hs_real h, hs_time t1) {
   return trial->ends = 0, NOT_FINITE;
 }
 
-/* The sizes of the numbers that a point between x and z, which `stays` on a guard or does not, is computed from, to
-   run->landed. */
-static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int stays) {
-  for (int s = 0; s < run->here.dimension; s++) {
-    const hs_real kept = stays || z[s] == run->entered[s] ? run->scale[s] : 0.0;
-    run->landed[s] = joined(kept, hs_max(fabs(x[s]), fabs(z[s])));
-  }
-}
-
-/* Guards on which the state is, to round-off or a tie, as crossings. */
-static int standing_on(hs_run *run) {
-  int count = 0;
-  untie(run);
-  standing(run, run->here.t, run->x, tie(run->here.t));
-  for (int k = 0; k < run->here.table->edges; k++) {
-    if (!run->tied[k]) continue;
-    hs_crossing *crossing = &run->crossings[count++];
-    crossing->edge = k;
-    crossing->theta = crossing->depth = 0.0;
-    crossing->time = run->here.t;
-    copy(crossing->state, run->x, run->here.dimension);
-    crossing->piece = 0;
-  }
-  return count;
-}
-
 /* No step, however short, stays in the relaxed domain: take a guard reached together with a wall, or stop. */
 static int stuck(hs_run *run, hs_step_failure kind, int surface) {
   const int may_stand = kind != HS_ERROR && kind != HS_CREEPING && kind != HS_JUMP && kind != HS_SLOW;
@@ -314,35 +284,6 @@ static int stuck(hs_run *run, hs_step_failure kind, int surface) {
   run->task->stop.surface = surface;
   copy(run->task->stop.slope, run->slope, run->here.dimension);
   return stopped(run, HS_STUCK, run->here.t);
-}
-
-#if defined(HS_NO_CLOCK)
-/* Ask the caller every so many steps whether to go on. */
-static void poll(hs_run *run) {
-  run->steps_to_poll = run->poll_steps;
-  if (run->task->poll(run->task)) run->interrupted = 1;
-}
-#else
-/* Ask the caller now and then whether to go on, of a run of a few steps never; a clock costs more than many steps, so
-   how many lie between is learnt. */
-static void poll(hs_run *run) {
-  const clock_t now = clock();
-  const int first = !run->polled;
-  if (first) run->polled = now;
-  const int early = now - run->polled < POLL_EVERY;
-  if (early && !first) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
-  if (now - run->polled > 4 * POLL_EVERY) run->poll_steps = run->poll_steps / 8 + 1;
-  run->steps_to_poll = run->poll_steps;
-  if (early) return;
-  run->polled = now;
-  if (run->task->poll(run->task)) run->interrupted = 1;
-}
-#endif
-
-/* Whether to stop: polls the caller now and then. */
-static int interrupted(hs_run *run) {
-  if (--run->steps_to_poll == 0) poll(run);
-  return run->interrupted;
 }
 
 /* Step in the domain until a step ends in a strip, at the segment's end, or nowhere (Fig. 12, lines 3 to 9). */
@@ -407,11 +348,6 @@ static int flow(hs_run *run) {
   return here->t < limit ? stuck(run, HS_SLOW, -1) : AT_BOUNDARY;
 }
 
-static int in_strip(hs_run *run, hs_reason reason, hs_time t) {
-  run->task->stop.edge = run->chosen.edge;
-  return stopped(run, reason, t);
-}
-
 /* Whether flows of two modes that lead to and fro do more than undo each other: strips would freeze the rest. */
 static int moves_on(hs_run *run, const hs_mode_state *before, int unknown) {
   const hs_mode_state *here = &run->here;
@@ -457,27 +393,6 @@ static int through_strip(hs_run *run) {
   return moves_on(run, &before, unknown) ? slides(run, before.mode, k) : GOES_ON;
 }
 
-/* Go on in the segment of the inputs that time is in: anew where one of them has jumped. */
-static int continued(hs_run *run, int jumped) {
-  const hs_time t = run->here.t;
-  const hs_mode_state before = run->here;
-  if (jumped) {
-    if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
-    for (int k = 0; k < run->here.table->surfaces; k++)
-      run->stood[k] = run->active_surfaces[k] && !run->emerging[k] ? run->values[k] : 0.0;
-    return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1, t);
-  }
-  place(run, run->here.mode, run->here.dimension, t, 0);
-  run->here.active = before.active, run->here.emerging = before.emerging;
-  return GOES_ON;
-}
-
-/* Enter the next segment of the inputs. */
-static int go_on(hs_run *run) {
-  const hs_timeline *timeline = run->task->timeline;
-  return continued(run, timeline->jump[segment_at(timeline, run->here.t)]);
-}
-
 /* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */
 static int at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
@@ -492,9 +407,6 @@ static int at_boundary(hs_run *run) {
   record(run, &run->chosen, NAN, 0, 0);
   return in_strip(run, HS_UNTIL_ON_GUARD, t);
 }
-
-/* Whether a run pauses that is to pause behind its next transition. */
-static int pauses(const hs_run *run) { return run->after_jump && run->jump > run->jumps_before; }
 
 /* Follow the relaxed execution until it stops or pauses. */
 static int relaxed(hs_run *run, int outcome) {

@@ -1,5 +1,9 @@
 /* A run under way: the segment of its inputs, its mode and arc, and its stop. See hsdsl/engine/simulate/run.py. */
 
+#if !defined(HS_NO_CLOCK)
+#define POLL_EVERY (CLOCKS_PER_SEC / 50)
+#endif
+
 /* The segment that time is in; at a boundary the later one. */
 static int64_t segment_at(const hs_timeline *timeline, hs_time t) {
   int64_t low = 0, high = timeline->segments;
@@ -83,3 +87,32 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
 }
 
 static int limit_reached(const hs_run *run) { return run->jump >= run->task->settings.max_transitions; }
+
+#if defined(HS_NO_CLOCK)
+/* Ask the caller every so many steps whether to go on. */
+static void poll(hs_run *run) {
+  run->steps_to_poll = run->poll_steps;
+  if (run->task->poll(run->task)) run->interrupted = 1;
+}
+#else
+/* Ask the caller now and then whether to go on, of a run of a few steps never; a clock costs more than many steps, so
+   how many lie between is learnt. */
+static void poll(hs_run *run) {
+  const clock_t now = clock();
+  const int first = !run->polled;
+  if (first) run->polled = now;
+  const int early = now - run->polled < POLL_EVERY;
+  if (early && !first) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
+  if (now - run->polled > 4 * POLL_EVERY) run->poll_steps = run->poll_steps / 8 + 1;
+  run->steps_to_poll = run->poll_steps;
+  if (early) return;
+  run->polled = now;
+  if (run->task->poll(run->task)) run->interrupted = 1;
+}
+#endif
+
+/* Whether to stop: polls the caller now and then. */
+static int interrupted(hs_run *run) {
+  if (--run->steps_to_poll == 0) poll(run);
+  return run->interrupted;
+}

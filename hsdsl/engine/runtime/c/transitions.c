@@ -269,3 +269,58 @@ static int slides(hs_run *run, int mode, int k) {
   note(run, HS_SLIDES, k, mode, run->here.t, run->here.t);
   return stopped(run, HS_ACCUMULATED, run->here.t);
 }
+
+/* Guards on which the state is, to round-off or a tie, as crossings. */
+static int standing_on(hs_run *run) {
+  int count = 0;
+  untie(run);
+  standing(run, run->here.t, run->x, tie(run->here.t));
+  for (int k = 0; k < run->here.table->edges; k++) {
+    if (!run->tied[k]) continue;
+    hs_crossing *crossing = &run->crossings[count++];
+    crossing->edge = k;
+    crossing->theta = crossing->depth = 0.0;
+    crossing->time = run->here.t;
+    copy(crossing->state, run->x, run->here.dimension);
+    crossing->piece = 0;
+  }
+  return count;
+}
+
+/* The sizes of the numbers that a point between x and z, which `stays` on a guard or does not, is computed from, to
+   run->landed. */
+static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int stays) {
+  for (int s = 0; s < run->here.dimension; s++) {
+    const hs_real kept = stays || z[s] == run->entered[s] ? run->scale[s] : 0.0;
+    run->landed[s] = joined(kept, hs_max(fabs(x[s]), fabs(z[s])));
+  }
+}
+
+static int in_strip(hs_run *run, hs_reason reason, hs_time t) {
+  run->task->stop.edge = run->chosen.edge;
+  return stopped(run, reason, t);
+}
+
+/* Go on in the segment of the inputs that time is in: anew where one of them has jumped. */
+static int continued(hs_run *run, int jumped) {
+  const hs_time t = run->here.t;
+  const hs_mode_state before = run->here;
+  if (jumped) {
+    if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
+    for (int k = 0; k < run->here.table->surfaces; k++)
+      run->stood[k] = run->active_surfaces[k] && !run->emerging[k] ? run->values[k] : 0.0;
+    return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1, t);
+  }
+  place(run, run->here.mode, run->here.dimension, t, 0);
+  run->here.active = before.active, run->here.emerging = before.emerging;
+  return GOES_ON;
+}
+
+/* Enter the next segment of the inputs. */
+static int go_on(hs_run *run) {
+  const hs_timeline *timeline = run->task->timeline;
+  return continued(run, timeline->jump[segment_at(timeline, run->here.t)]);
+}
+
+/* Whether a run pauses that is to pause behind its next transition. */
+static int pauses(const hs_run *run) { return run->after_jump && run->jump > run->jumps_before; }
