@@ -13,17 +13,17 @@ typedef int hs_taken(hs_run *run, int k, hs_time t);
 typedef int hs_round(hs_run *run, hs_taken *taken, hs_time t);
 
 /* The size that a state has had, or that of the numbers that it was computed from on entry. */
-static hs_real state_size(const hs_run *run, int s) { return hs_max(run->scales[s], fabs(run->scale[s])); }
+static hs_real state_size(const hs_run *run, int s) { return hs_max(run->sizes.scales[s], fabs(run->sizes.scale[s])); }
 
-/* For each state the size that its flow has had, to run->flow_sizes; `slope` is the flow. */
+/* For each state the size that its flow has had, to run->contact.flow_sizes; `slope` is the flow. */
 static int flow_sizes(hs_run *run, hs_time t, const hs_real *x, const hs_real *slope) {
   const int n = run->here.dimension;
   const hs_sparse *const rows = &run->here.table->jacobian;
-  if (hs_call(&rows->values, run->here.p, t, x, run->jacobian)) return RAISED;
-  for (int i = 0; i < n; i++) run->flow_sizes[i] = fabs(slope[i]);
+  if (hs_call(&rows->values, run->here.p, t, x, run->contact.jacobian)) return RAISED;
+  for (int i = 0; i < n; i++) run->contact.flow_sizes[i] = fabs(slope[i]);
   for (int k = 0; k < rows->count; k++) {
-    hs_real *const size = &run->flow_sizes[rows->place[k] / n];
-    *size = *size + fabs(run->jacobian[k]) * state_size(run, rows->place[k] % n);
+    hs_real *const size = &run->contact.flow_sizes[rows->place[k] / n];
+    *size = *size + fabs(run->contact.jacobian[k]) * state_size(run, rows->place[k] % n);
   }
   return 0;
 }
@@ -42,7 +42,7 @@ static hs_real entry_at(const hs_sparse *rows, const hs_real *values, int place)
 }
 
 /* The sizes that the flow gives the states within the run, from a start in a mode with motion along guards, to
-   run->scale. */
+   run->sizes.scale. */
 static void start_sizes(hs_run *run, int mode, hs_time t) {
   const hs_mode *const table = &run->model->mode[mode];
   const hs_sparse *const rows = &table->jacobian;
@@ -50,21 +50,21 @@ static void start_sizes(hs_run *run, int mode, hs_time t) {
   const hs_real *const p = segment_data(run, segment_at(run->task->timeline, t));
   hs_real back = 0.0, all = 0.0, *const first = run->at, *const moved = run->near;
   if (table->held < 0 || table->flow(p, t, run->x, first)) return;
-  if (hs_call(&rows->values, p, t, run->x, run->jacobian)) return;
+  if (hs_call(&rows->values, p, t, run->x, run->contact.jacobian)) return;
   for (int i = 0; i < n; i++) moved[i] = 0.0;
   for (int e = 0; e < rows->count; e++) {
     const int i = rows->place[e] / n, k = rows->place[e] % n;
-    moved[i] = moved[i] + fabs(run->jacobian[e]) * fabs(entry_at(rows, run->jacobian, k * n + i));
+    moved[i] = moved[i] + fabs(run->contact.jacobian[e]) * fabs(entry_at(rows, run->contact.jacobian, k * n + i));
   }
   for (int i = 0; i < n; i++) back = hs_max(back, moved[i]), moved[i] = 0.0;
   const hs_real time = run->until / (1 + run->until * sqrt(back)); /* in which motion turns back */
   for (int i = 0; i < n; i++) first[i] = hs_max(fabs(run->x[i]), time * fabs(first[i]));
   for (int e = 0; e < rows->count; e++) {
     hs_real *const size = &moved[rows->place[e] / n];
-    *size = *size + fabs(run->jacobian[e]) * first[rows->place[e] % n];
+    *size = *size + fabs(run->contact.jacobian[e]) * first[rows->place[e] % n];
   }
   for (int i = 0; i < n; i++) all = all + (moved[i] = hs_max(first[i], time * moved[i]));
-  for (int i = 0; i < n && hs_finite(all); i++) run->scale[i] = moved[i];
+  for (int i = 0; i < n && hs_finite(all); i++) run->sizes.scale[i] = moved[i];
 }
 
 /* What the reset of edge k, its branch for slow impacts, makes of a state, but for states that it counts with, to
@@ -82,9 +82,9 @@ static int reset_but_counts(hs_run *run, int k, hs_time t, const hs_real *x, hs_
 static int keeps(hs_run *run, hs_time t, const hs_real *x, int k) {
   const hs_mode_state *here = &run->here;
   int still = 1;
-  if (reset_but_counts(run, k, t, x, run->after)) return RAISED;
+  if (reset_but_counts(run, k, t, x, run->event.after)) return RAISED;
   for (int s = 0; s < here->dimension; s++)
-    still &= fabs(run->after[s] - x[s]) <= SAME_UNITS * HS_UNIT * state_size(run, s);
+    still &= fabs(run->event.after[s] - x[s]) <= SAME_UNITS * HS_UNIT * state_size(run, s);
   return still;
 }
 
@@ -100,50 +100,50 @@ static void move_walls(int *marks, const hs_mode *from, int more) {
 /* Count the surfaces that the state is on. */
 static void count_active(hs_run *run) {
   run->here.active = 0;
-  for (int j = 0; j < run->here.table->surfaces; j++) run->here.active += run->active_surfaces[j];
+  for (int j = 0; j < run->here.table->surfaces; j++) run->here.active += run->surfaces.active[j];
 }
 
 /* The number of a contact of the state's mode: 0, HS_LOOKED_AT or HS_HELD. */
-static hs_real *level_of(const hs_run *run, int contact) { return &run->held_p[run->model->data + contact]; }
+static hs_real *level_of(const hs_run *run, int contact) { return &run->contact.p[run->model->data + contact]; }
 
 /* Bind routines to the mode's motions along guards: of those edges `kept`, the pushes are looked at, and those `held`
    hold the state. `held` may be 0 for none. */
 static void bind_contacts(hs_run *run, const int *held, const int *kept) {
   hs_mode_state *const here = &run->here;
   const hs_mode *const own = &run->model->mode[here->mode];
-  if (here->p != run->held_p) run->own_p = here->p;
-  for (int i = 0; i < run->model->data; i++) run->held_p[i] = run->own_p[i];
+  if (here->p != run->contact.p) run->contact.own_p = here->p;
+  for (int i = 0; i < run->model->data; i++) run->contact.p[i] = run->contact.own_p[i];
   for (int i = 0; i < run->model->contacts; i++) *level_of(run, i) = 0.0;
   for (int k = 0; k < own->edges; k++)
     if (own->edge[k].contact >= 0)
       *level_of(run, own->edge[k].contact) = held && held[k] ? HS_HELD : kept[k] ? HS_LOOKED_AT : 0.0;
   here->table = &run->model->mode[own->held];
-  here->p = run->held_p;
+  here->p = run->contact.p;
 }
 
 /* Bind them to the mode itself again. */
 static void bind_mode(hs_run *run) {
   run->here.table = &run->model->mode[run->here.mode];
-  run->here.p = run->own_p;
+  run->here.p = run->contact.own_p;
 }
 
 /* The flow at a point that the guards of edges `touched`, 0 for none, without k and with it, leave. */
 static int flow_beside(hs_run *run, int k, int with, hs_time t, const hs_real *x, const int *touched, hs_real *flow) {
   const hs_mode *const own = run->here.table;
   int count = 0;
-  for (int j = 0; j < own->edges; j++) count += run->others[j] = j == k ? with : touched && touched[j];
-  if (count) bind_contacts(run, run->others, run->others);
+  for (int j = 0; j < own->edges; j++) count += run->contact.others[j] = j == k ? with : touched && touched[j];
+  if (count) bind_contacts(run, run->contact.others, run->contact.others);
   const int raised = run->here.table->flow(run->here.p, t, x, flow);
   if (count) bind_mode(run);
   return raised;
 }
 
 /* Where the flow presses a state, by what the guard of edge k would take away of the flow that those of `touched`, 0
-   for none, leave: off by round-off where the reset of edge k changes it, to run->after. */
+   for none, leave: off by round-off where the reset of edge k changes it, to run->event.after. */
 static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
   const hs_edge *const edge = &run->here.table->edge[k];
   const int n = run->here.dimension;
-  hs_real after = 0.0, *const slope = run->at, *const left = run->after;
+  hs_real after = 0.0, *const slope = run->at, *const left = run->event.after;
   if (flow_beside(run, k, 0, t, x, touched, slope)) return RAISED;
   if (edge->contact >= 0) {
     if (flow_beside(run, k, 1, t, x, touched, left)) return RAISED;
@@ -154,7 +154,7 @@ static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *t
     if (slope[s] != 0) after = hs_max(after, ZERO_UNITS * HS_UNIT * state_size(run, s) / fabs(slope[s]));
   }
   if (!(after > 0)) after = HS_UNIT * run->until; /* where these states have been zero only */
-  for (int s = 0; s < n; s++) run->after[s] = x[s] + after * slope[s];
+  for (int s = 0; s < n; s++) run->event.after[s] = x[s] + after * slope[s];
   return 0;
 }
 
@@ -162,7 +162,7 @@ static int pressed(hs_run *run, int k, hs_time t, const hs_real *x, const int *t
 static int is_possible(hs_run *run, int k, hs_time t, const hs_real *x, const int *touched) {
   const int now = condition(run, k, t, x);
   if (now || !run->here.table->edge[k].conditional) return now == 1;
-  return !pressed(run, k, t, x, touched) && condition(run, k, t, run->after) == 1;
+  return !pressed(run, k, t, x, touched) && condition(run, k, t, run->event.after) == 1;
 }
 
 /* Whether the `if` of an edge that leads back, of a surface that the state is on, holds next along the flow. */
@@ -190,7 +190,7 @@ static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
       if (sized < 0 || hs_call(&row->values, here->p, t, x, run->gradient)) continue;
       if (hs_call(&here->table->rates[k], here->p, t, x, &rate)) continue;
       for (int i = 0; i < row->count; i++)
-        size = size + fabs(run->gradient[i]) * (row->place[i] ? run->flow_sizes[row->place[i] - 1] : 1.0);
+        size = size + fabs(run->gradient[i]) * (row->place[i] ? run->contact.flow_sizes[row->place[i] - 1] : 1.0);
       if (!(fabs(rate) <= ZERO_UNITS * HS_UNIT * size)) continue; /* the flow is not tangent to it, to round-off */
     }
     count += marks[k] = 1;
@@ -201,7 +201,7 @@ static int keeping(hs_run *run, hs_time t, const hs_real *x, int *marks) {
 /* Whether the push on the guard of edge k, which is looked at and zero now, is first negative where the flow makes it
    differ from zero. */
 static int lifts_next(hs_run *run, hs_time from, const hs_real *x, int k) {
-  hs_real r, noise, *const y = run->after;
+  hs_real r, noise, *const y = run->event.after;
   hs_time t = from;
   copy(y, x, run->here.dimension);
   for (hs_real after = HS_UNIT * run->until; from + after < segment_end(run); after = after * FURTHER) {
@@ -222,15 +222,16 @@ static int pushes(hs_run *run, hs_time t, const hs_real *x, const int *held, con
   int same = 1, apart = 0;
   bind_contacts(run, held, kept);
   const hs_mode *const table = run->here.table;
-  const int raised = table->values(run->here.p, t, x, run->values) || magnitudes_at(run, t, x, run->magnitudes);
+  const int raised =
+      table->values(run->here.p, t, x, run->surfaces.values) || magnitudes_at(run, t, x, run->surfaces.magnitudes);
   for (int k = 0; k < edges; k++) {
-    const int active = run->active_surfaces[k];
+    const int active = run->surfaces.active[k];
     pushed[k] = 0;
     if (kept[k] && !raised) {
-      run->active_surfaces[k] = 0;
-      const hs_real r = run->values[k], noise = bound_from(run, run->magnitudes, k, t, x, 0);
+      run->surfaces.active[k] = 0;
+      const hs_real r = run->surfaces.values[k], noise = bound_from(run, run->surfaces.magnitudes, k, t, x, 0);
       pushed[k] = r < -noise || (r <= noise && !lifts_next(run, t, x, k));
-      run->active_surfaces[k] = active;
+      run->surfaces.active[k] = active;
       apart |= r != r;
     }
   }
@@ -262,9 +263,9 @@ static void in_contact(hs_run *run, const int *held) {
   const hs_mode *const own = run->here.table;
   bind_contacts(run, held, held);
   for (int k = 0; k < own->edges; k++)
-    if (held[k]) run->active_surfaces[k] = 0;
+    if (held[k]) run->surfaces.active[k] = 0;
   run->here.emerging = 0;
-  move_walls(run->active_surfaces, own, run->here.table->edges - own->edges);
+  move_walls(run->surfaces.active, own, run->here.table->edges - own->edges);
   count_active(run);
 }
 
@@ -282,12 +283,12 @@ static int flows(hs_run *run, const int *held) {
 static int contact_at(hs_run *run) {
   hs_mode_state *const here = &run->here;
   const hs_mode *const own = here->table;
-  int *const kept = run->kept, *const held = run->held, any = 0, first = -1;
+  int *const kept = run->contact.kept, *const held = run->contact.held, any = 0, first = -1;
   if (!here->active || own->held < 0 || here->dimension != own->dimension || !here->dimension) return GOES_ON;
-  for (int k = 0; k < own->edges; k++) kept[k] = run->active_surfaces[k];
+  for (int k = 0; k < own->edges; k++) kept[k] = run->surfaces.active[k];
   const int count = keeping(run, here->t, run->x, kept);
   if (!count) return GOES_ON;
-  const int one = pressing(run, here->t, run->x, kept, count, held, run->beyond);
+  const int one = pressing(run, here->t, run->x, kept, count, held, run->surfaces.beyond);
   for (int k = 0; k < own->edges; k++) any += held[k] != 0;
   if (!one || (any > 1 && !flows(run, held))) {
     for (int k = own->edges; k-- > 0;) first = kept[k] ? k : first;
@@ -320,8 +321,8 @@ static void after_contact(hs_run *run) {
   hs_mode_state *const here = &run->here;
   const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
   for (int k = 0; k < own->edges; k++)
-    if (releases(run, k)) run->active_surfaces[k] = 1;
-  move_walls(run->active_surfaces, held, own->edges - held->edges);
+    if (releases(run, k)) run->surfaces.active[k] = 1;
+  move_walls(run->surfaces.active, held, own->edges - held->edges);
   bind_mode(run);
   count_active(run);
 }
@@ -336,17 +337,18 @@ static int behind_end(hs_run *run, int j, hs_time *t) {
   hs_real r, noise;
   int of = 0, raised = held->flow(here->p, from, run->x, run->end);
   while (own->edge[of].contact != held->edge[j].releases) of++;
-  for (int k = 0; k < own->edges; k++) run->kept[k] = in_touch(run, k);
+  for (int k = 0; k < own->edges; k++) run->contact.kept[k] = in_touch(run, k);
   for (hs_real after = HS_UNIT * run->until; !raised; after = after * 2) {
     int holds = 1;
     *t = earlier(from + after, segment_end(run));
     for (int s = 0; s < here->dimension; s++) run->z[s] = run->x[s] + (*t - from) * run->end[s];
     bind_mode(run);
-    for (int k = 0; k < own->edges && holds; k++) holds = !run->kept[k] || is_possible(run, k, *t, run->z, run->kept);
-    raised = holds && pressed(run, of, *t, run->z, run->kept);
-    bind_contacts(run, run->kept, run->kept);
+    for (int k = 0; k < own->edges && holds; k++)
+      holds = !run->contact.kept[k] || is_possible(run, k, *t, run->z, run->contact.kept);
+    raised = holds && pressed(run, of, *t, run->z, run->contact.kept);
+    bind_contacts(run, run->contact.kept, run->contact.kept);
     if (!holds) return 1;
-    raised = raised || surface(run, j, *t, run->after, &r) || roundoff_bound(run, j, *t, run->z, 0, &noise);
+    raised = raised || surface(run, j, *t, run->event.after, &r) || roundoff_bound(run, j, *t, run->z, 0, &noise);
     if (!raised && (r > noise || !(after < most && *t < segment_end(run)))) return 0;
   }
   *t = from;
@@ -376,7 +378,7 @@ static void without_nothing(hs_real *x, int n) {
 static int fixed_point(hs_run *run, int k, hs_time t) {
   const hs_mode_state *here = &run->here;
   const int n = here->dimension;
-  hs_real *const x = run->z, *const one = run->after, *const two = run->at, *const after = run->near;
+  hs_real *const x = run->z, *const one = run->event.after, *const two = run->at, *const after = run->near;
   for (int i = 0; i < MOST_ROUNDS; i++) {
     if (reset_but_counts(run, k, t, x, one)) return RAISED;
     if (same_state(one, x, n)) break;
@@ -392,7 +394,7 @@ static int fixed_point(hs_run *run, int k, hs_time t) {
 /* run->z taken to the guard of edge k, which is near, as near as numbers are, each state in proportion to its scale. */
 static int onto_guard(hs_run *run, int k, hs_time t) {
   const int n = run->here.dimension;
-  hs_real *const x = run->z, *const weights = run->at, *const nearer = run->after;
+  hs_real *const x = run->z, *const weights = run->at, *const nearer = run->event.after;
   hs_real r, left;
   if (surface(run, k, t, x, &r)) return RAISED;
   for (int i = 0; i < MOST_CORRECTIONS_TO_GUARD; i++) {
@@ -415,14 +417,14 @@ static int onto_guard(hs_run *run, int k, hs_time t) {
 /* run->z taken by each edge of the tail, in turn. */
 static int by_each(hs_run *run, hs_taken *taken, hs_time t) {
   for (int k = 0; k < run->here.table->edges; k++)
-    if (run->tail[k] && taken(run, k, t)) return RAISED;
+    if (run->zeno.tail[k] && taken(run, k, t)) return RAISED;
   return 0;
 }
 
 /* The point that run->z runs to by repeated `rounds`, to run->z. */
 static int run_to(hs_run *run, hs_round *rounds, hs_taken *taken, hs_time t) {
   const int n = run->here.dimension;
-  hs_real *const x = run->z, *const first = run->turn, *const one = first + n;
+  hs_real *const x = run->z, *const first = run->zeno.turn, *const one = first + n;
   hs_real *const two = run->nearby;
   for (int i = 0; i < MOST_ROUNDS; i++) {
     copy(first, x, n);
@@ -452,16 +454,16 @@ static void be_held_exactly(hs_run *run, hs_time t, hs_real *x, int reached) {
   const hs_mode_state *here = &run->here;
   const int edges = run->model->mode[here->mode].edges;
   int count = 0, held = 1;
-  run->still = same_state(run->began, x, here->dimension);
-  for (int k = 0; k < edges; k++) count += run->kept[k] = in_touch(run, k);
+  run->contact.still = same_state(run->contact.began, x, here->dimension);
+  for (int k = 0; k < edges; k++) count += run->contact.kept[k] = in_touch(run, k);
   after_contact(run);
-  for (int s = 0; s < here->dimension; s++) run->scale[s] = joined(run->scale[s], run->scales[s]);
-  for (int k = 0; k < here->table->surfaces; k++) run->tail[k] = k < edges && run->kept[k];
+  for (int s = 0; s < here->dimension; s++) run->sizes.scale[s] = joined(run->sizes.scale[s], run->sizes.scales[s]);
+  for (int k = 0; k < here->table->surfaces; k++) run->zeno.tail[k] = k < edges && run->contact.kept[k];
   copy(run->z, x, here->dimension);
-  if (reached >= 0) run->tail[reached] = 1;
+  if (reached >= 0) run->zeno.tail[reached] = 1;
   if (in_turn(run, onto_guard, count + (reached >= 0), t)) return;
-  if (reached >= 0) run->tail[reached] = 0;
+  if (reached >= 0) run->zeno.tail[reached] = 0;
   if (in_turn(run, fixed_point, count, t)) return;
-  for (int k = 0; k < edges && held; k++) held = !run->tail[k] || keeps(run, t, run->z, k) == 1;
+  for (int k = 0; k < edges && held; k++) held = !run->zeno.tail[k] || keeps(run, t, run->z, k) == 1;
   if (held) copy(x, run->z, here->dimension);
 }

@@ -12,7 +12,7 @@ static int ends_at(hs_run *run, int k, const hs_crossing *crossing) {
   const hs_time time = crossing->time;
   const hs_real *const q = crossing->state, *const g = run->gradient + 1;
   if (gradient_of(run, k, time, q)) return RAISED;
-  for (int i = 0; i < n; i++) off = off + fabs(g[i]) * (run->control.tolerance * hs_max(run->scales[i], fabs(q[i])));
+  for (int i = 0; i < n; i++) off = off + fabs(g[i]) * (run->control.tolerance * hs_max(run->sizes.scales[i], fabs(q[i])));
   for (int i = 0; i < n; i++) norm = norm + g[i] * g[i];
   if (!(norm > 0)) return 0;
   if (surface(run, k, time, q, &r)) return RAISED;
@@ -58,7 +58,7 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
     at(run, &span->piece, share, crossing->state);
   } else {
     if (bound_at(run, k, AT_START, &noise)) return RAISED;
-    if (!(fabs(run->ends[k]) <= noise)) return 0;
+    if (!(fabs(run->surfaces.ends[k]) <= noise)) return 0;
   }
   const int ends = ends_at(run, k, crossing);
   if (ends != 1) return ends;
@@ -72,8 +72,8 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
 static int is_passed_by(hs_run *run, int k) {
   const hs_curves *curves = &run->curves;
   run->roots.of = 0;
-  if (run->active_surfaces[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
-  if (!(run->ends[k] <= 0)) return 0;
+  if (run->surfaces.active[k]) coefficients_of(curves, 0, k)[0] = coefficients_of(curves, 0, k)[0] * 0; /* deflated */
+  if (!(run->surfaces.ends[k] <= 0)) return 0;
   for (int i = 0; i < curves->parts; i++)
     if (!stays_below(&run->roots, coefficients_of(curves, i, k), *degree_of(curves, i, k), *off_of(curves, i, k))) return 0;
   return 1;
@@ -110,7 +110,7 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
     least = fabs(r), best = s;
     crossing->theta = s;
     if (rise->slope == 0) return span_rest(run, s, crossing->state), 0;
-    if (roundoff_bound(run, k, crossing->time, crossing->state, run->active_surfaces[k], &noise)) return RAISED;
+    if (roundoff_bound(run, k, crossing->time, crossing->state, run->surfaces.active[k], &noise)) return RAISED;
     if (fabs(r) <= noise) return span_rest(run, s, crossing->state), 0;
     s = hs_min(1.0, hs_max(s * 0, s - r / rise->slope));
   }
@@ -119,16 +119,16 @@ static int settled(hs_run *run, int k, const hs_rise *rise, hs_crossing *crossin
   return span_point(run, best, &crossing->time, &crossing->state);
 }
 
-/* Find where surface k first rises along the step: run->waiting says so; 1 where it is reached without a rise, else 0.
-   The Python twin is `rises_of`. */
+/* Find where surface k first rises along the step: run->event.waiting says so; 1 where it is reached without a rise,
+   else 0. The Python twin is `rises_of`. */
 static int first_rise(hs_run *run, int k, hs_crossing *crossing) {
-  hs_riser *const waiting = &run->waiting[k];
+  hs_riser *const waiting = &run->event.waiting[k];
   hs_real first, last;
   waiting->open = 0;
   if (is_passed_by(run, k)) return reaches(run, k, crossing);
   if (bound_at(run, k, AT_START, &first) || bound_at(run, k, AT_END, &last)) return RAISED;
   const int beyond = coefficients_of(&run->curves, 0, k)[0] > first;
-  const hs_path path = {k, 0, {hs_max(first, last), beyond, run->ends[k] > last, 0.0}};
+  const hs_path path = {k, 0, {hs_max(first, last), beyond, run->surfaces.ends[k] > last, 0.0}};
   waiting->path = path;
   waiting->open = next_rise(run, &waiting->path, &waiting->rise);
   return waiting->open ? 0 : reaches(run, k, crossing);
@@ -136,14 +136,14 @@ static int first_rise(hs_run *run, int k, hs_crossing *crossing) {
 
 /* Find the first point of the step, from its first rise on, where surface k is crossed and its condition holds: 1, or 0. */
 static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
-  hs_riser *const waiting = &run->waiting[k];
+  hs_riser *const waiting = &run->event.waiting[k];
   hs_rise *const rise = &waiting->rise;
   waiting->open = 0;
   do {
     if (settled(run, k, rise, crossing)) return RAISED;
     const int holds = k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
     if (holds == RAISED) return RAISED;
-    if (!holds && !(run->active_surfaces[k] && holds_next(run, k, crossing->time, crossing->state))) continue;
+    if (!holds && !(run->surfaces.active[k] && holds_next(run, k, crossing->time, crossing->state))) continue;
     if (!rise->certain) note_unsettled(run, k, crossing->time);
     crossing->edge = k;
     crossing->depth = 0.0;
@@ -155,7 +155,7 @@ static int first_crossing(hs_run *run, int k, hs_crossing *crossing) {
 /* Keep the crossing of surface k where one was `found` that counts, else mark that it has none; return the first one.
    The Python twin is `keep` in `crossings_along`. */
 static const hs_crossing *kept_crossing(hs_run *run, const hs_crossing *first, int k, int found) {
-  hs_crossing *const crossing = &run->crossings[k];
+  hs_crossing *const crossing = &run->event.crossings[k];
   if (!found || (k < run->here.table->edges && too_late(run, k, crossing->time, tie(crossing->time)))) {
     crossing->edge = -1;
     return first;
@@ -163,56 +163,57 @@ static const hs_crossing *kept_crossing(hs_run *run, const hs_crossing *first, i
   return !first || crossing->time < first->time ? crossing : first;
 }
 
-/* Mark in run->beyond the surfaces that rise behind the first crossing: there they are inside, beyond round-off and by
-   more than they rise while crossings are tied. The Python twin is `is_behind`, of one surface. */
+/* Mark in run->surfaces.beyond the surfaces that rise after the first crossing: there they are inside, beyond round-off
+   and by more than they rise while crossings are tied. The Python twin is `is_behind`, of one surface. */
 static int mark_behind(hs_run *run, const hs_crossing *first) {
   const hs_mode *mode = run->here.table;
   const hs_real since = tie(first->time);
-  int known = 0; /* whether run->values and run->magnitudes are those at the crossing */
+  int known = 0; /* whether run->surfaces.values and run->surfaces.magnitudes are those at the crossing */
   for (int k = 0; k < mode->surfaces; k++) {
-    const hs_riser *const waiting = &run->waiting[k];
+    const hs_riser *const waiting = &run->event.waiting[k];
     hs_real rate;
-    run->beyond[k] = 0;
+    run->surfaces.beyond[k] = 0;
     if (!waiting->open || !waiting->rise.certain || !(waiting->rise.share > first->theta)) continue;
-    if (!known && (mode->values(run->here.p, first->time, first->state, run->values) ||
-                   magnitudes_at(run, first->time, first->state, run->magnitudes)))
+    if (!known && (mode->values(run->here.p, first->time, first->state, run->surfaces.values) ||
+                   magnitudes_at(run, first->time, first->state, run->surfaces.magnitudes)))
       return RAISED;
     known = 1;
     if (hs_call(&mode->rates[k], run->here.p, first->time, first->state, &rate)) continue;
-    const hs_real noise = bound_from(run, run->magnitudes, k, first->time, first->state, 0);
-    run->beyond[k] = run->values[k] < -hs_max(noise, fabs(rate) * since);
+    const hs_real noise = bound_from(run, run->surfaces.magnitudes, k, first->time, first->state, 0);
+    run->surfaces.beyond[k] = run->surfaces.values[k] < -hs_max(noise, fabs(rate) * since);
   }
   return 0;
 }
 
-/* Find the first crossing of each surface of the step, to its place in run->crossings, with edge -1 where there is none.
-   Surfaces that rise behind the first of all are not looked at any closer, but of an implicit method: to a point of its
-   step it iterates from the one before. */
+/* Find the first crossing of each surface of the step, to its place in run->event.crossings, with edge -1 where there is
+   none. Surfaces that rise after the first of all are not looked at any closer, but of an implicit method: to a point of
+   its step it iterates from the one before. */
 static int crossings_along(hs_run *run) {
   const hs_mode *mode = run->here.table;
   const hs_crossing *first = 0;
   int open = 0;
   for (int k = 0; k < mode->surfaces; k++) {
-    int found = first_rise(run, k, &run->crossings[k]);
-    if (run->waiting[k].open && run->control.implicit) found = first_crossing(run, k, &run->crossings[k]);
+    int found = first_rise(run, k, &run->event.crossings[k]);
+    if (run->event.waiting[k].open && run->control.implicit) found = first_crossing(run, k, &run->event.crossings[k]);
     if (found == RAISED) return RAISED;
     first = kept_crossing(run, first, k, found);
-    open += run->waiting[k].open;
+    open += run->event.waiting[k].open;
   }
   for (; open && !first; open--) {
     int next = -1;
+    const hs_riser *const waiting = run->event.waiting;
     for (int k = 0; k < mode->surfaces; k++)
-      if (run->waiting[k].open && (next < 0 || run->waiting[k].rise.share < run->waiting[next].rise.share)) next = k;
-    const int found = first_crossing(run, next, &run->crossings[next]);
+      if (waiting[k].open && (next < 0 || waiting[k].rise.share < waiting[next].rise.share)) next = k;
+    const int found = first_crossing(run, next, &run->event.crossings[next]);
     if (found == RAISED) return RAISED;
     first = kept_crossing(run, first, next, found);
   }
   if (open && mark_behind(run, first)) return RAISED;
   for (int k = 0; open && k < mode->surfaces; k++) {
-    if (!run->waiting[k].open) continue;
+    if (!run->event.waiting[k].open) continue;
     open--;
-    if (run->beyond[k]) continue;
-    const int found = first_crossing(run, k, &run->crossings[k]);
+    if (run->surfaces.beyond[k]) continue;
+    const int found = first_crossing(run, k, &run->event.crossings[k]);
     if (found == RAISED) return RAISED;
     first = kept_crossing(run, first, k, found);
   }
@@ -224,21 +225,21 @@ static int crossings_along(hs_run *run) {
 static int with_unseen(hs_run *run, int count) {
   const hs_mode *mode = run->here.table;
   const hs_span *span = &run->span;
-  const hs_crossing *first = &run->crossings[0];
+  const hs_crossing *first = &run->event.crossings[0];
   const int seen = count;
-  int known = 0; /* whether run->values are those at the first crossing */
+  int known = 0; /* whether run->surfaces.values are those at the first crossing */
   for (int i = 1; i < count; i++)
-    if (run->crossings[i].time < first->time) first = &run->crossings[i];
+    if (run->event.crossings[i].time < first->time) first = &run->event.crossings[i];
   if (!(first->theta > 0)) return count;
   for (int k = 0; k < mode->edges; k++) {
     int place = count;
     for (int i = 0; i < seen; i++)
-      if (run->crossings[i].edge == k) place = i;
-    hs_crossing *const found = &run->crossings[place];
+      if (run->event.crossings[i].edge == k) place = i;
+    hs_crossing *const found = &run->event.crossings[place];
     if (releases(run, k) || (place < count && found->time - first->time <= tie(first->time))) continue;
     hs_real start, end, before, noise, s = 0.0;
-    if (!known && mode->values(run->here.p, first->time, first->state, run->values)) return RAISED;
-    known = !(run->values[k] > 0);
+    if (!known && mode->values(run->here.p, first->time, first->state, run->surfaces.values)) return RAISED;
+    known = !(run->surfaces.values[k] > 0);
     if (known) continue;
     if (surface(run, k, span->t, run->x, &start) || surface(run, k, first->time, first->state, &end)) return RAISED;
     if (roundoff_bound(run, k, first->time, first->state, 0, &noise)) return RAISED;
@@ -252,7 +253,7 @@ static int with_unseen(hs_run *run, int count) {
     if (span_point(run, s, &found->time, &found->state)) return RAISED;
     const int holds = condition(run, k, found->time, found->state);
     if (holds == RAISED) return RAISED;
-    if (!holds && !(run->active_surfaces[k] && holds_next(run, k, found->time, found->state))) {
+    if (!holds && !(run->surfaces.active[k] && holds_next(run, k, found->time, found->state))) {
       found->time = later; /* not tied with the first one: its state does not count */
       continue;
     }

@@ -87,35 +87,37 @@ static hs_real **take_stages(hs_store *store, const hs_run *run) {
 /* Give every array of a run its place. */
 static void lay_out(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces, e = run->model->edges;
-  hs_resolved *const by = &run->radau.resolved;
+  hs_resolved *const by = &run->step.radau.resolved;
+  hs_at_surfaces *const at = &run->surfaces;
   hs_real **const states[] = {
-      &run->x,      &run->slope, &run->z,      &run->end,      &run->at,         &run->scale,     &run->entered,
-      &run->after,  &run->landed, &run->error, &run->scales,   &by->found,   &by->least,     &by->slope,
-      &run->near,   &run->nearby, &run->flow_sizes, &run->cascade.x, &run->source, 0};
+      &run->x,           &run->slope,        &run->z,          &run->end,          &run->at,
+      &run->sizes.scale, &run->entered,      &run->event.after, &run->sizes.landed, &run->step.error,
+      &run->sizes.scales, &by->found,        &by->least,       &by->slope,         &run->near,
+      &run->nearby,      &run->contact.flow_sizes, &run->cascade.x, &run->source,   0};
   take_each(store, w, states);
-  run->known = numbers(store, run->model->states);
-  by->near = run->near, by->other = run->nearby, run->radau.at = run->at;
+  run->sizes.known = numbers(store, run->model->states);
+  by->near = run->near, by->other = run->nearby, run->step.radau.at = run->at;
   by->lifted = take(store, w, sizeof(int));
-  run->k = take_stages(store, run);
-  if (store->numbers) run->k[0] = run->slope, run->k[run->method->stages] = run->end;
+  run->step.k = take_stages(store, run);
+  if (store->numbers) run->step.k[0] = run->slope, run->step.k[run->method->stages] = run->end;
   lay_out_method(run, store);
-  hs_real **const values[] = {&run->values, &run->ahead, &run->magnitudes, &run->begun, &run->noise, &run->stood, 0};
+  hs_real **const values[] = {&at->values, &at->ahead, &at->magnitudes, &at->begun, &at->noise, &at->stood, 0};
   take_each(store, m, values);
   run->gradient = numbers(store, w + 1);
-  run->both = numbers(store, 2 * (int64_t)w);
-  int **const marks[] = {&run->active_surfaces, &run->beyond, &run->emerging, &run->others, 0};
+  run->sizes.both = numbers(store, 2 * (int64_t)w);
+  int **const marks[] = {&at->active, &at->beyond, &at->emerging, &run->contact.others, 0};
   take_marks(store, m, marks);
-  int **const of_edges[] = {&run->tied, &run->alternatives, 0};
+  int **const of_edges[] = {&run->event.tied, &run->event.alternatives, 0};
   take_marks(store, e, of_edges);
-  run->held_p = numbers(store, run->model->data + run->model->contacts);
-  run->jacobian = numbers(store, run->model->derivatives);
-  for (int i = 0; store->numbers && i < m; i++) run->stood[i] = 0.0;
+  run->contact.p = numbers(store, run->model->data + run->model->contacts);
+  run->contact.jacobian = numbers(store, run->model->derivatives);
+  for (int i = 0; store->numbers && i < m; i++) at->stood[i] = 0.0;
   run->trial.piece = polynomial(store, run);
   run->cubic = polynomial(store, run);
-  run->crossings = take(store, m, sizeof(hs_crossing));
+  run->event.crossings = take(store, m, sizeof(hs_crossing));
   for (int i = 0; i < m; i++) {
     hs_real *state = numbers(store, w);
-    if (store->numbers) run->crossings[i].state = state;
+    if (store->numbers) run->event.crossings[i].state = state;
   }
 }
 
@@ -149,24 +151,24 @@ static hs_roots lay_out_roots(hs_store *store, int degree) {
 /* The same for the arrays of the located scheme. */
 static void lay_out_located(hs_run *run, hs_store *store) {
   const int w = run->width, m = run->model->surfaces > 0 ? run->model->surfaces : 1, most = most_degree(run->method);
-  int **const marks[] = {&run->kept, &run->held, &run->tail, 0};
+  int **const marks[] = {&run->contact.kept, &run->contact.held, &run->zeno.tail, 0};
   take_marks(store, m, marks);
-  run->turn = numbers(store, 2 * (int64_t)w);
+  run->zeno.turn = numbers(store, 2 * (int64_t)w);
   run->span = lay_out_span(run, store);
   run->before = lay_out_span(run, store);
-  hs_real **const states[] = {&run->q, &run->other_end, &run->began, 0};
-  hs_real **const values[] = {&run->ends, &run->starts, &run->middle, &run->ended, 0};
+  hs_real **const states[] = {&run->q, &run->step.other_end, &run->contact.began, 0};
+  hs_real **const values[] = {&run->surfaces.ends, &run->surfaces.starts, &run->surfaces.middle, &run->surfaces.ended, 0};
   take_each(store, w, states);
-  run->other_k = take_stages(store, run);
+  run->step.other_k = take_stages(store, run);
   take_each(store, m, values);
-  run->rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
+  run->curves.rows = numbers(store, (int64_t)(most + 1 + HS_TESTS) * m);
   run->roots = lay_out_roots(store, most);
-  run->waiting = take(store, m, sizeof(hs_riser));
-  run->unsettled = take(store, (int64_t)run->model->modes * m, sizeof(int));
-  for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->unsettled[i] = 0;
-  run->reach = numbers(store, run->model->modes);
-  run->lost = take(store, run->model->modes, sizeof(int));
-  for (int i = 0; store->numbers && i < run->model->modes; i++) run->reach[i] = 0.0, run->lost[i] = 0;
+  run->event.waiting = take(store, m, sizeof(hs_riser));
+  run->written.unsettled = take(store, (int64_t)run->model->modes * m, sizeof(int));
+  for (int64_t i = 0; store->numbers && i < (int64_t)run->model->modes * m; i++) run->written.unsettled[i] = 0;
+  run->reach.step = numbers(store, run->model->modes);
+  run->reach.lost = take(store, run->model->modes, sizeof(int));
+  for (int i = 0; store->numbers && i < run->model->modes; i++) run->reach.step[i] = 0.0, run->reach.lost[i] = 0;
   run->curves.room = most + 1;
   run->curves.start = numbers(store, MOST_PARTS);
   run->curves.width = numbers(store, MOST_PARTS);
@@ -203,7 +205,7 @@ static void open_run(hs_run *run, hs_task *task) {
   task->now = 0.0;
   task->made = task->entries = 0;
   run->task = task;
-  run->pause = INFINITY;
+  run->pausing.at = INFINITY;
   run->epsilon = task->settings.relaxation;
   run->until = task->settings.until;
   run->control.h = task->settings.step;
@@ -214,11 +216,11 @@ static void open_run(hs_run *run, hs_task *task) {
   run->control.failed_at = NAN;
   run->control.implicit = is_implicit(task->method);
   begin_implicit(run);
-  run->steps_to_poll = run->poll_steps = 32;
-  run->full_queue = -1;
+  run->poll.steps_left = run->poll.steps = 32;
+  run->written.full_queue = -1;
   copy(run->x, task->x, task->dimension);
-  for (int s = 0; s < run->width; s++) run->scale[s] = 0.0;
-  for (int i = 0; i < run->model->states; i++) run->known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
+  for (int s = 0; s < run->width; s++) run->sizes.scale[s] = 0.0;
+  for (int i = 0; i < run->model->states; i++) run->sizes.known[i] = task->settings.scale ? task->settings.scale[i] : 0.0;
 }
 
 /* Enter the task's mode. */
@@ -262,17 +264,17 @@ static int32_t *hand_over_integers(int32_t *memory, int *own, int64_t count, int
 static void exchange(hs_run *run, hs_pause *pause, int back) {
   const int w = run->width, m = run->model->surfaces, located = run->task->settings.scheme == HS_LOCATED;
   const int modes = run->model->modes, all = modes * (m > 0 ? m : 1);
-  hs_real *const states[] = {run->x, run->scales, run->scale, run->entered, run->cascade.x};
+  hs_real *const states[] = {run->x, run->sizes.scales, run->sizes.scale, run->entered, run->cascade.x};
   hs_real *number = pause->numbers;
   int32_t *integer = pause->integers;
   for (int i = 0; i < 5; i++) number = hand_over(number, states[i], w, back);
-  number = hand_over(number, run->known, run->model->states, back);
-  if (located) hand_over(number, run->reach, modes, back);
-  integer = hand_over_integers(integer, run->active_surfaces, m, back);
-  integer = hand_over_integers(integer, run->emerging, m, back);
+  number = hand_over(number, run->sizes.known, run->model->states, back);
+  if (located) hand_over(number, run->reach.step, modes, back);
+  integer = hand_over_integers(integer, run->surfaces.active, m, back);
+  integer = hand_over_integers(integer, run->surfaces.emerging, m, back);
   if (!located) return;
-  integer = hand_over_integers(integer, run->unsettled, all, back);
-  hand_over_integers(integer, run->lost, modes, back);
+  integer = hand_over_integers(integer, run->written.unsettled, all, back);
+  hand_over_integers(integer, run->reach.lost, modes, back);
 }
 
 static void save(hs_run *run, hs_pause *pause, int outcome) {
@@ -282,11 +284,11 @@ static void save(hs_run *run, hs_pause *pause, int outcome) {
   pause->active = here->active, pause->emerging = here->emerging;
   pause->time = here->t;
   pause->control = run->control;
-  pause->placed = run->placed, pause->jump = run->jump, pause->row = run->row;
-  pause->noted_crowded = run->noted_crowded;
+  pause->placed = run->written.placed, pause->jump = run->written.jump, pause->row = run->written.row;
+  pause->noted_crowded = run->written.noted_crowded;
   pause->cascade_mode = run->cascade.mode;
   pause->cascade_length = run->cascade.length, pause->cascade_room = run->cascade.room;
-  for (int i = 0; i < FREE; i++) pause->made[i] = run->made[i];
+  for (int i = 0; i < FREE; i++) pause->made[i] = run->written.made[i];
   for (int i = 0; i < run->model->data; i++) pause->data[i] = here->p[i];
   exchange(run, pause, 0);
 }
@@ -300,11 +302,11 @@ static void restore(hs_run *run, hs_pause *pause) {
   here->active = pause->active, here->emerging = pause->emerging;
   here->t = pause->time;
   run->control = pause->control;
-  run->placed = pause->placed, run->jump = pause->jump, run->row = pause->row;
-  run->noted_crowded = pause->noted_crowded;
+  run->written.placed = pause->placed, run->written.jump = pause->jump, run->written.row = pause->row;
+  run->written.noted_crowded = pause->noted_crowded;
   run->cascade.mode = pause->cascade_mode;
   run->cascade.length = pause->cascade_length, run->cascade.room = pause->cascade_room;
-  for (int i = 0; i < FREE; i++) run->made[i] = pause->made[i];
+  for (int i = 0; i < FREE; i++) run->written.made[i] = pause->made[i];
 }
 
 void hs_begin(hs_task *task, hs_pause *pause, hs_time start) {
@@ -318,10 +320,10 @@ void hs_go_on(hs_task *task, hs_pause *pause, hs_time until, int changed, int af
   hs_run run;
   open_run(&run, task);
   restore(&run, pause);
-  run.pause = until;
+  run.pausing.at = until;
   if (run.until < until + 2 * run.epsilon) run.until = until + 2 * run.epsilon; /* strips end behind it */
-  run.after_jump = after_jump;
-  run.jumps_before = run.jump;
+  run.pausing.after_jump = after_jump;
+  run.pausing.jumps_before = run.written.jump;
   const hs_timeline *timeline = task->timeline;
   const int64_t segment = segment_at(timeline, pause->time);
   int outcome = pause->time < until ? GOES_ON : PAUSED;

@@ -29,7 +29,8 @@ HS_INLINE hs_blocks of_size(hs_blocks of, int own, int columns) {
 
 HS_INLINE int implicit_step_in(hs_run *run, hs_blocks of, hs_time t, hs_real h) {
   int solved = 0;
-  if (radau_step(run, of, run->method->collocation, &run->radau, t, h, run->x, run->slope, run->scales, run->z, &solved))
+  if (radau_step(run, of, run->method->collocation, &run->step.radau, t, h, run->x, run->slope, run->sizes.scales, run->z,
+                 &solved))
     return NO_VALUE;
   return solved ? 0 : NO_CONVERGENCE;
 }
@@ -68,7 +69,7 @@ static int implicit_step(hs_run *run, hs_time t, hs_real h) {
 static int implicit_landing(hs_run *run, hs_time t, hs_real h) {
   const hs_mode *const mode = run->here.table;
   int solved = 0;
-  if (radau_landing(run, blocks_of(mode), run->method->collocation, &run->radau, t, h, run->x, run->scales,
+  if (radau_landing(run, blocks_of(mode), run->method->collocation, &run->step.radau, t, h, run->x, run->sizes.scales,
                     mode->measures, mode->measured, run->z, &solved))
     return NO_VALUE;
   return solved ? 0 : NO_CONVERGENCE;
@@ -76,12 +77,12 @@ static int implicit_landing(hs_run *run, hs_time t, hs_real h) {
 
 static void implicit_piece(hs_run *run, hs_polynomial *piece) {
   piece->degree = 3;
-  fill_piece(blocks_of(run->here.table), run->method->collocation, &run->radau, run->width, piece->c);
+  fill_piece(blocks_of(run->here.table), run->method->collocation, &run->step.radau, run->width, piece->c);
 }
 
 /* What stays for a whole run. */
 static void begin_implicit(hs_run *run) {
-  hs_radau *const radau = &run->radau;
+  hs_radau *const radau = &run->step.radau;
   const hs_real tolerance = hs_max(run->control.tolerance, 0);
   radau->unit = radau->resolved.unit = HS_UNIT;
   radau->tolerance = radau->resolved.tolerance = tolerance;

@@ -104,10 +104,10 @@ static void enter_lane(hs_row_of_lanes *row, int lane, hs_seat *seat) {
   l->made[lane] = run->pace.made, l->since[lane] = run->pace.since, l->brief[lane] = run->pace.brief;
   scatter(run->here.p, l->p, run->model->data, lanes, lane);
   scatter(run->x, l->x, n, lanes, lane);
-  scatter(run->scales, l->scales, n, lanes, lane);
-  scatter(run->scale, l->scale, n, lanes, lane);
+  scatter(run->sizes.scales, l->scales, n, lanes, lane);
+  scatter(run->sizes.scale, l->scale, n, lanes, lane);
   for (int s = 0; s < n; s++) l->before[s * lanes + lane] = run->has_before ? span_size(run, &run->before, 1.0, s) : 0.0;
-  for (int k = 0; k < run->here.table->surfaces; k++) l->standing[k * lanes + lane] = run->active_surfaces[k];
+  for (int k = 0; k < run->here.table->surfaces; k++) l->standing[k * lanes + lane] = run->surfaces.active[k];
   row->seat[lane] = seat, row->count++;
   *seat->mode = -1;
 }
@@ -120,12 +120,12 @@ static void leave_lane(hs_row_of_lanes *row, int lane, hs_seat *seat, int writte
   run->here.t = l->t[lane];
   run->pace.made = (int)l->made[lane], run->pace.since = l->since[lane];
   gather(l->x, run->x, n, lanes, lane);
-  gather(l->scales, run->scales, n, lanes, lane);
+  gather(l->scales, run->sizes.scales, n, lanes, lane);
   gather(l->before, run->before.largest, n, lanes, lane);
   run->has_before = run->before.sized = 1;
   run->here.active = 0;
   for (int k = 0; k < run->here.table->surfaces; k++)
-    run->here.active += run->active_surfaces[k] = l->standing[k * lanes + lane] != 0;
+    run->here.active += run->surfaces.active[k] = l->standing[k * lanes + lane] != 0;
   if (written && seat->unwritten) append(run, run->here.t, run->x, 0);
   if (written) seat->unwritten = 0;
   row->seat[lane] = 0, row->count--;
@@ -147,13 +147,13 @@ static void curves_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
   const int count = run->here.table->surfaces, order = l->order, lanes = row->lanes;
   hs_curves *const curves = &run->curves;
   begin_curves(curves, count);
-  gather(l->starts, run->starts, count, lanes, lane);
-  gather(l->starts, run->values, count, lanes, lane);
-  gather(l->ends, run->ends, count, lanes, lane);
+  gather(l->starts, run->surfaces.starts, count, lanes, lane);
+  gather(l->starts, run->surfaces.values, count, lanes, lane);
+  gather(l->ends, run->surfaces.ends, count, lanes, lane);
   for (int k = 0; k < count; k++) {
     hs_real *const c = coefficients_of(curves, 0, k);
     gather(l->curves + k * (order + 1) * lanes, c, order + 1, lanes, lane);
-    c[0] = run->starts[k];
+    c[0] = run->surfaces.starts[k];
     *degree_of(curves, 0, k) = degree_without_zeros(c, order);
     *off_of(curves, 0, k) = 0;
     curves->certain[k] = 1;
@@ -167,8 +167,8 @@ static int begin_next(hs_team *team, hs_seat *seat, int *outcome) {
   e->done = team->next++;
   begin_instance(e);
   open_run(&seat->run, &e->task);
-  seat->run.parks = 1;
-  seat->run.bare = !e->samples && !e->slides;
+  seat->run.lanes.parks = 1;
+  seat->run.lanes.bare = !e->samples && !e->slides;
   *outcome = begin_run(&seat->run, &e->task, 0.0);
   return 1;
 }
@@ -176,7 +176,7 @@ static int begin_next(hs_team *team, hs_seat *seat, int *outcome) {
 /* Steps of a run in a mode that has no lanes, or whose surfaces bound its steps, or that emerges from them. */
 static int steps_alone(const hs_team *team, const hs_run *run) {
   const int mode = run->here.mode;
-  return !team->program->is_for[mode] || run->reach[mode] > 0 || run->here.emerging || team->lost[mode] > MOST_LOST;
+  return !team->program->is_for[mode] || run->reach.step[mode] > 0 || run->here.emerging || team->lost[mode] > MOST_LOST;
 }
 
 /* Follow the run of a place from what a flow has come to until it may make a step in a lane; where it ends, the next
@@ -210,7 +210,7 @@ static int crossings_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) 
   const hs_mode *const mode = run->here.table;
   const int n = run->here.dimension, lanes = row->lanes;
   for (int k = 0; k < mode->surfaces; k++) {
-    hs_crossing *const crossing = &run->crossings[k];
+    hs_crossing *const crossing = &run->event.crossings[k];
     crossing->edge = -1;
     if (l->open[k * lanes + lane] == 0) continue;
     crossing->edge = k;
@@ -229,7 +229,7 @@ static int behind_crossing(const hs_row_of_lanes *row, int lane, hs_seat *seat) 
   const int landed = l->landed >> lane & 1 && crossings_of_lane(row, lane, run);
   if (!landed && seat->unwritten) append(run, run->here.t, run->x, 0);
   seat->unwritten = 0;
-  if (!landed || !run->bare)
+  if (!landed || !run->lanes.bare)
     step_of_lane(row, lane, run);
   else
     begin_span(run, l->h[lane], l->t1[lane]);
@@ -269,8 +269,8 @@ static int is_wrong_in_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
   run->here.t = l->t[lane];
   gather(l->x, run->x, n, row->lanes, lane);
   gather(l->z, run->z, n, row->lanes, lane);
-  gather(l->error, run->error, n, row->lanes, lane);
-  gather(l->scales, run->scales, n, row->lanes, lane);
+  gather(l->error, run->step.error, n, row->lanes, lane);
+  gather(l->scales, run->sizes.scales, n, row->lanes, lane);
   return is_too_wrong(run, l->h[lane]);
 }
 
@@ -304,8 +304,8 @@ static void behind_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of
     return;
   }
   if (!failed && !wrong && !(doubtful && standing)) {
-    seat->unwritten = run->bare;
-    if (!run->bare) step_of_lane(row, lane, run), pass(run);
+    seat->unwritten = run->lanes.bare;
+    if (!run->lanes.bare) step_of_lane(row, lane, run), pass(run);
     if (doubtful) pass_lane(row, lane, n);
     if (l->t[lane] < seat->limit) return;
   }

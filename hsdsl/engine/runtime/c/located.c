@@ -3,10 +3,10 @@
 
 /* Whether a crossing's state is on a surface that the state was on that it came from, or one holds it: 1, 0 or RAISED. */
 static int stands(hs_run *run, const hs_crossing *crossing) {
-  int stood = run->here.p == run->held_p;
+  int stood = run->here.p == run->contact.p;
   for (int k = 0; run->here.active && k < run->here.table->surfaces && !stood; k++) {
     hs_real r, noise;
-    if (!run->active_surfaces[k]) continue;
+    if (!run->surfaces.active[k]) continue;
     if (surface(run, k, crossing->time, crossing->state, &r)) return RAISED;
     if (roundoff_bound(run, k, crossing->time, crossing->state, 0, &noise)) return RAISED;
     stood = k == crossing->edge || fabs(r) <= noise;
@@ -14,18 +14,18 @@ static int stands(hs_run *run, const hs_crossing *crossing) {
   return stood;
 }
 
-/* The sizes of the numbers behind the chosen crossing's state, to run->landed: the terms of its step and of the one
+/* The sizes of the numbers behind the chosen crossing's state, to run->sizes.landed: the terms of its step and of the one
    before. */
 static int largest(hs_run *run) {
-  const hs_crossing *crossing = &run->chosen;
+  const hs_crossing *crossing = &run->event.chosen;
   const int stood = stands(run, crossing);
   if (stood == RAISED) return RAISED;
   sizes(run, run->x, crossing->state, stood);
   for (int s = 0; s < run->here.table->own; s++) {
-    hs_real *const found = &run->landed[s];
+    hs_real *const found = &run->sizes.landed[s];
     *found = joined(*found, span_size(run, &run->span, crossing->theta, s));
     if (run->has_before) *found = joined(*found, span_size(run, &run->before, 1.0, s));
-    if (run->here.p == run->held_p) *found = hs_max(*found, run->scales[s]); /* off guards that hold it by as much */
+    if (run->here.p == run->contact.p) *found = hs_max(*found, run->sizes.scales[s]); /* off its guards by as much */
   }
   return 0;
 }
@@ -33,7 +33,7 @@ static int largest(hs_run *run) {
 /* Record the part of the step that leads to a crossing; `write` in Python. */
 static void write_crossing(hs_run *run, const hs_crossing *crossing) {
   if (!(crossing->theta > 0)) return;
-  if (run->method->degree > 0 && !run->bare) span_cut(run, crossing->theta, &run->cubic);
+  if (run->method->degree > 0 && !run->lanes.bare) span_cut(run, crossing->theta, &run->cubic);
   append(run, crossing->time, crossing->state, &run->cubic);
 }
 
@@ -45,8 +45,8 @@ static int guards_at(hs_run *run, const hs_crossing *wall) {
   untie(run);
   standing(run, time, run->q, tie(time));
   for (int k = 0; k < run->here.table->edges; k++) {
-    if (!run->tied[k]) continue;
-    hs_crossing *const crossing = &run->crossings[count++];
+    if (!run->event.tied[k]) continue;
+    hs_crossing *const crossing = &run->event.crossings[count++];
     crossing->edge = k;
     crossing->theta = theta, crossing->time = time, crossing->depth = depth;
     copy(crossing->state, run->q, run->here.dimension);
@@ -61,16 +61,16 @@ static int first_event(hs_run *run) {
   int guards = 0, tied = 0;
   hs_crossing *wall = 0;
   for (int k = 0; k < mode->surfaces; k++) {
-    hs_crossing *const crossing = &run->crossings[k];
+    hs_crossing *const crossing = &run->event.crossings[k];
     if (crossing->edge < 0) continue;
     if (k < mode->edges) {
-      const hs_crossing other = run->crossings[guards];
-      run->crossings[guards++] = *crossing;
+      const hs_crossing other = run->event.crossings[guards];
+      run->event.crossings[guards++] = *crossing;
       *crossing = other;
     } else if (!wall || crossing->time < wall->time)
       wall = crossing;
   }
-  for (int i = 0; wall && i < guards; i++) tied |= run->crossings[i].time <= wall->time + tie(wall->time);
+  for (int i = 0; wall && i < guards; i++) tied |= run->event.crossings[i].time <= wall->time + tie(wall->time);
   if (wall && !tied && !(guards = guards_at(run, wall))) {
     write_crossing(run, wall);
     copy(run->x, wall->state, run->here.dimension);
@@ -80,7 +80,7 @@ static int first_event(hs_run *run) {
   if (!guards) return GOES_ON;
   if ((guards = with_unseen(run, guards)) == RAISED) return WITHOUT_VALUE;
   choose(run, guards);
-  write_crossing(run, &run->chosen);
+  write_crossing(run, &run->event.chosen);
   return largest(run) ? WITHOUT_VALUE : LANDED;
 }
 
@@ -108,14 +108,14 @@ HS_INLINE void go_to_end(hs_run *run) {
   run->here.t = run->before.t1;
   swap(&run->x, &run->z);
   swap(&run->slope, &run->end);
-  run->k[0] = run->slope;
-  run->k[run->method->stages] = run->end;
+  run->step.k[0] = run->slope;
+  run->step.k[run->method->stages] = run->end;
 }
 
 /* Begin to step through a flow. */
 static void begin_following(hs_run *run) {
-  run->sloped = run->has_before = 0;
-  run->ratio = 1;
+  run->step.sloped = run->has_before = 0;
+  run->step.ratio = 1;
   forget_steps(run);
   begin_pace(run);
 }
@@ -177,9 +177,9 @@ static int follow(hs_run *run, hs_time limit) {
 /* Forget the ends of contacts among what else might have been. */
 static void drop_releases(hs_run *run) {
   int kept = 0;
-  for (int i = 0; i < run->alternatives_count; i++)
-    if (!releases(run, run->alternatives[i])) run->alternatives[kept++] = run->alternatives[i];
-  run->alternatives_count = kept;
+  for (int i = 0; i < run->event.alternatives_count; i++)
+    if (!releases(run, run->event.alternatives[i])) run->event.alternatives[kept++] = run->event.alternatives[i];
+  run->event.alternatives_count = kept;
 }
 
 /* Go on in the mode itself from run->x, which a guard no longer holds; not on that of edge `at_once`, -1 for none,
@@ -187,9 +187,9 @@ static void drop_releases(hs_run *run) {
 static int released(hs_run *run, hs_time t, int at_once) {
   hs_mode_state *const here = &run->here;
   be_held_exactly(run, t, run->x, -1);
-  if (at_once >= 0 && run->active_surfaces[at_once]) run->active_surfaces[at_once] = 0, here->active--;
+  if (at_once >= 0 && run->surfaces.active[at_once]) run->surfaces.active[at_once] = 0, here->active--;
   const int standing_before = here->active;
-  copy(run->scale, run->landed, here->dimension);
+  copy(run->sizes.scale, run->sizes.landed, here->dimension);
   place(run, here->mode, here->dimension, t, 0);
   here->active = standing_before;
   return GOES_ON;
@@ -198,8 +198,8 @@ static int released(hs_run *run, hs_time t, int at_once) {
 /* Note how far the chosen crossing's state is off those of the first surfaces that it stands on. */
 static void stand(hs_run *run, const int *on, int surfaces) {
   const hs_mode_state *here = &run->here;
-  if (here->table->values(here->p, run->chosen.time, run->chosen.state, run->values)) return;
-  for (int k = 0; k < surfaces; k++) run->stood[k] = on[k] ? run->values[k] : 0.0;
+  if (here->table->values(here->p, run->event.chosen.time, run->event.chosen.state, run->surfaces.values)) return;
+  for (int k = 0; k < surfaces; k++) run->surfaces.stood[k] = on[k] ? run->surfaces.values[k] : 0.0;
 }
 
 /* Flow along guards until one lets go of the state. */
@@ -207,14 +207,14 @@ static int along_guards(hs_run *run, hs_time limit) {
   hs_mode_state *const here = &run->here;
   const hs_time from = here->t;
   for (;;) {
-    const int outcome = follow(run, limit), end = run->chosen.edge;
+    const int outcome = follow(run, limit), end = run->event.chosen.edge;
     if (outcome == LANDED && releases(run, end)) {
-      hs_time t = run->chosen.time;
-      copy(run->x, run->chosen.state, here->dimension);
+      hs_time t = run->event.chosen.time;
+      copy(run->x, run->event.chosen.state, here->dimension);
       int ends = in_touch(run, end);
       if (!ends) {
         ends = behind_end(run, end, &t);
-        if (t > run->chosen.time) {
+        if (t > run->event.chosen.time) {
           secant(run, &run->cubic);
           append(run, t, run->z, &run->cubic);
         }
@@ -227,12 +227,12 @@ static int along_guards(hs_run *run, hs_time limit) {
     }
     if (outcome == LANDED) {
       drop_releases(run);
-      be_held_exactly(run, run->chosen.time, run->chosen.state, end);
-      stand(run, run->kept, here->table->edges);
+      be_held_exactly(run, run->event.chosen.time, run->event.chosen.state, end);
+      stand(run, run->contact.kept, here->table->edges);
     } else if (outcome == AT_BOUNDARY) {
       be_held_exactly(run, here->t, run->x, -1);
     } else {
-      run->still = same_state(run->began, run->x, here->dimension);
+      run->contact.still = same_state(run->contact.began, run->x, here->dimension);
       after_contact(run);
     }
     return outcome;
@@ -246,12 +246,12 @@ static int located_flow(hs_run *run) {
   const hs_mode *const own = run->here.table;
   const int n = run->here.dimension, held = contact_at(run);
   if (held != GOES_ON) return held;
-  if (run->here.table == own) return run->parks ? PARKED : follow(run, limit);
-  copy(run->began, run->x, n);
-  for (int k = 0; k < own->edges; k++) run->held[k] = in_touch(run, k);
+  if (run->here.table == own) return run->lanes.parks ? PARKED : follow(run, limit);
+  copy(run->contact.began, run->x, n);
+  for (int k = 0; k < own->edges; k++) run->contact.held[k] = in_touch(run, k);
   const int outcome = along_guards(run, limit);
   for (int k = 0; k < own->edges; k++)
-    if (run->held[k]) note(run, HS_IN_CONTACT, k, run->still, from, run->task->now);
+    if (run->contact.held[k]) note(run, HS_IN_CONTACT, k, run->contact.still, from, run->task->now);
   return outcome;
 }
 
@@ -262,7 +262,7 @@ static int crowded(hs_run *run, const hs_crossing *crossing) {
   const hs_time t = crossing->time;
   const int k = crossing->edge;
   int again = 0;
-  if (run->jump < FREE || contraction(run, &flight, &ratio) || flown(run, t) > run->epsilon) return 0;
+  if (run->written.jump < FREE || contraction(run, &flight, &ratio) || flown(run, t) > run->epsilon) return 0;
   const hs_time since = t - made_before(run, FREE - 1)->time;
   for (int i = 0; i < FREE; i++) again |= made_before(run, i)->edge == k && made_before(run, i)->mode == run->here.mode;
   if (!again && since <= tie(t)) return 0;
@@ -272,26 +272,26 @@ static int crowded(hs_run *run, const hs_crossing *crossing) {
 /* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. The Python
    twin is `make_transition`. */
 static int jump(hs_run *run) {
-  const hs_crossing *crossing = &run->chosen;
+  const hs_crossing *crossing = &run->event.chosen;
   const hs_time t = crossing->time, until = run->until;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
   const int mode = run->here.mode;
   hs_time resumed = t;
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
-  if (crossing->theta == 0 && run->here.active) stand(run, run->active_surfaces, run->here.table->surfaces);
+  if (crossing->theta == 0 && run->here.active) stand(run, run->surfaces.active, run->here.table->surfaces);
   if (edge->target != mode)
-    for (int j = 0; j < run->model->surfaces; j++) run->stood[j] = 0.0;
+    for (int j = 0; j < run->model->surfaces; j++) run->surfaces.stood[j] = 0.0;
   HS_MOVE(run, move_crossing(run));
-  const int waits = crowded(run, crossing), without_value = reset(run, run->landed);
+  const int waits = crowded(run, crossing), without_value = reset(run, run->sizes.landed);
   if (waits) {
-    if (!run->noted_crowded) note(run, HS_CROWDED, k, 0, t, t);
-    run->noted_crowded = 1;
+    if (!run->written.noted_crowded) note(run, HS_CROWDED, k, 0, t, t);
+    run->written.noted_crowded = 1;
     resumed = t + run->epsilon;
     if (resumed > until + tie(until)) {
       hs_time rows[2][2] = {{t, 0.0}, {until, until - t}};
       strip(run, 2, rows, crossing->state);
-      record(run, crossing, NAN, without_value ? 0 : run->after, 0);
+      record(run, crossing, NAN, without_value ? 0 : run->event.after, 0);
       return in_strip(run, HS_UNTIL_IN_STRIP, until);
     }
     resumed = earlier(resumed, until);
@@ -301,12 +301,12 @@ static int jump(hs_run *run) {
     hs_time rows[2][2] = {{t, 0.0}, {resumed, run->epsilon}};
     strip(run, 2, rows, crossing->state);
   }
-  const hs_time last = run->jump ? made_before(run, 0)->resumed : NAN;
-  const hs_real since = run->alternatives_count || t - last <= tie(t) ? tie(t) : 0.0;
+  const hs_time last = run->written.jump ? made_before(run, 0)->resumed : NAN;
+  const hs_real since = run->event.alternatives_count || t - last <= tie(t) ? tie(t) : 0.0;
   const int flowed = has_flowed(run, t);
-  record(run, crossing, resumed, run->after, 0);
-  copy(run->x, run->after, edge->target_dimension);
-  copy(run->scale, run->both, edge->target_dimension);
+  record(run, crossing, resumed, run->event.after, 0);
+  copy(run->x, run->event.after, edge->target_dimension);
+  copy(run->sizes.scale, run->sizes.both, edge->target_dimension);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0, t);
   if (entered != GOES_ON) return entered;
   if (comes_back(run, flowed)) return slides(run, mode, k);
@@ -320,7 +320,7 @@ static int jump(hs_run *run) {
    Python twin is `at_boundary`. */
 static int located_at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
-  if (t >= run->pause) return PAUSED;
+  if (t >= run->pausing.at) return PAUSED;
   if (t < run->until || segment_follows(run)) return go_on(run);
   const hs_mode *const own = run->here.table;
   const int count = contact_at(run) == GOES_ON ? standing_on(run) : 0;

@@ -5,13 +5,13 @@
 
 /* Let steps go to the other stages, and to `end` (of a step from run->x), for a shorter step. */
 static void aside(hs_run *run, hs_real **end) {
-  hs_real **const kept = run->k;
-  run->k = run->other_k;
-  run->other_k = kept;
-  swap(&run->end, &run->other_end);
+  hs_real **const kept = run->step.k;
+  run->step.k = run->step.other_k;
+  run->step.other_k = kept;
+  swap(&run->end, &run->step.other_end);
   swap(&run->z, end);
-  run->k[0] = run->slope;
-  run->k[run->method->stages] = run->end;
+  run->step.k[0] = run->slope;
+  run->step.k[run->method->stages] = run->end;
 }
 
 /* Time and state at the share s of the step: of a table those of a step that ends there. */
@@ -72,19 +72,19 @@ static void begin_span(hs_run *run, hs_real h, hs_time t1) {
   span->h = h;
   span->t1 = t1;
   span->sized = 0;
-  run->weighed = 0;
+  run->surfaces.weighed = 0;
   copy(span->x, run->x, run->here.dimension);
 }
 
 /* Let no rise count that is lower than what the step's error moves a surface by. */
 static int blur(hs_run *run, int n, hs_time t1) {
   const hs_curves *curves = &run->curves;
-  for (int s = 0; s < n; s++) run->at[s] = run->z[s] + BLUR * run->error[s];
-  if (run->here.table->values(run->here.p, t1, run->at, run->middle)) return RAISED;
+  for (int s = 0; s < n; s++) run->at[s] = run->z[s] + BLUR * run->step.error[s];
+  if (run->here.table->values(run->here.p, t1, run->at, run->surfaces.middle)) return RAISED;
   for (int part = 0; part < curves->parts; part++)
     for (int k = 0; k < curves->count; k++) {
       hs_real *const off = off_of(curves, part, k);
-      *off = *off + fabs(run->middle[k] - run->ends[k]);
+      *off = *off + fabs(run->surfaces.middle[k] - run->surfaces.ends[k]);
     }
   return 0;
 }
@@ -101,47 +101,48 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time
   if (!hs_finite(sum_of(run->z, n) + sum_of(run->end, n))) return HS_NOT_FINITE;
   if (run->control.tolerance > 0) {
     local_error(run, h);
-    run->ratio = error_ratio(run, h);
-    if (!(run->ratio <= 1)) return HS_ERROR;
+    run->step.ratio = error_ratio(run, h);
+    if (!(run->step.ratio <= 1)) return HS_ERROR;
   }
   for (int s = 0; s < n; s++) {
-    span->largest[s] = fabs(run->k[0][s]);
-    for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->k[i][s]));
+    span->largest[s] = fabs(run->step.k[0][s]);
+    for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->step.k[i][s]));
   }
   if (method_piece(run, span->t, h, &span->piece)) return HS_NOT_FINITE;
   for (int m = 0; m < span->piece.degree; m++) /* it may overflow where its end does not */
     if (!all_finite(span->piece.c + m * run->width, n)) return HS_NOT_FINITE;
   if (curves_along(run)) return HS_NOT_FINITE;
-  if (mode->values(p, t1, run->z, run->ends)) return HS_NOT_FINITE;
+  if (mode->values(p, t1, run->z, run->surfaces.ends)) return HS_NOT_FINITE;
   const int blurred = run->control.implicit && run->control.tolerance > 0;
   return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
-/* Make one step of a table or of an implicit method: rejected by the error estimate, halved where something has no value. */
+/* Make one step of a table or of an implicit method: rejected by the error estimate, halved where something has no
+   value. */
 HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
   hs_control *const control = &run->control;
   const hs_time t = run->here.t;
   int halvings = 0;
-  if (!run->sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
-  if (!run->sloped) begin_steps(control, run->scales, run->slope, n);
-  run->sloped = 1;
+  if (!run->step.sloped && run->here.table->flow(run->here.p, t, run->x, run->slope)) return HS_NOT_FINITE;
+  if (!run->step.sloped) begin_steps(control, run->sizes.scales, run->slope, n);
+  run->step.sloped = 1;
   hs_real h = within_reach(run, control->h);
   hs_time t1;
   for (;;) {
     t1 = end_of_step(t, &h, limit);
-    run->refused = 0;
+    run->reach.refused = 0;
     const hs_step_failure tried = t1 > t ? try_table(run, n, h, t1) : HS_ERROR;
     if (tried == HS_CLEAR) {
       if (control->tolerance > 0 && across_jump(run, n, t1)) return HS_JUMP;
-      if (control->tolerance > 0 && halvings == 0) accept(control, h, run->ratio);
+      if (control->tolerance > 0 && halvings == 0) accept(control, h, run->step.ratio);
       slow_enough(run, h);
       return count_creeping(&run->pace, halvings) ? HS_CREEPING : HS_CLEAR;
     }
     if (halvings == 0 && (tried == HS_ERROR || (tried == HS_UNSOLVED && control->tolerance > 0))) {
-      reject(control, h, run->ratio, tried != HS_UNSOLVED);
+      reject(control, h, run->step.ratio, tried != HS_UNSOLVED);
       h = within_reach(run, control->h);
     } else {
-      if (run->refused) too_fast(run, h);
+      if (run->reach.refused) too_fast(run, h);
       h = h / 2, halvings++;
     }
     if (halvings > MOST_HALVINGS || !(t + h > t) || struggles(control)) return tried;
@@ -151,9 +152,10 @@ HS_INLINE hs_step_failure next_table(hs_run *run, const int n, hs_time limit) {
 /* The step at which the first terms that are left out stay below the tolerance; not-a-number where all vanish.
    See hsdsl/engine/integrators/taylor.py. */
 static hs_real proposed_step(const hs_run *run, int n, hs_real tolerance) {
-  hs_real least = step_of_terms(run->lines, run->scales, n, run->method->order, tolerance);
+  hs_real least = step_of_terms(run->step.lines, run->sizes.scales, n, run->method->order, tolerance);
   for (int s = 0; s < n; s++)
-    if (!(tolerance * run->scales[s] > HS_NOTHING)) least = smaller(least, from_zero(series_of(run, s), 1, run->method->order, tolerance));
+    if (!(tolerance * run->sizes.scales[s] > HS_NOTHING))
+      least = smaller(least, from_zero(series_of(run, s), 1, run->method->order, tolerance));
   return least;
 }
 
@@ -173,16 +175,16 @@ static int noise_at_end(hs_run *run, int k, hs_real *allowed) {
 
 /* Whether the polynomial c gives surface k to round-off in the middle of the step, by its interpolant. */
 static int meets_middle(hs_run *run, const hs_real *c, int n, int k, hs_real noise, int *answer) {
-  if (!run->has_middle && surfaces_along(run, 0.5, run->middle)) return RAISED;
-  run->has_middle = 1;
-  *answer = fabs(value_of(c, n, 0.5) - run->middle[k]) <= noise;
+  if (!run->surfaces.has_middle && surfaces_along(run, 0.5, run->surfaces.middle)) return RAISED;
+  run->surfaces.has_middle = 1;
+  *answer = fabs(value_of(c, n, 0.5) - run->surfaces.middle[k]) <= noise;
   return 0;
 }
 
 /* Whether the series of surface k has run out by its last terms, and gives the surface at the end of the step.
    One of a surface that is linear in the states need not run out: it is known by giving the surface to round-off. */
 static int converges(hs_run *run, const hs_real *c, int n, int k, int *answer) {
-  const hs_real given = run->control.tolerance, end = run->ends[k];
+  const hs_real given = run->control.tolerance, end = run->surfaces.ends[k];
   const hs_real tolerance = given > 0 ? hs_max(given, HS_UNIT) : hs_max(UNKNOWN_TOLERANCE, HS_UNIT);
   hs_real most = fabs(c[0]);
   for (int i = 1; i <= n; i++) most = hs_max(most, fabs(c[i]));
@@ -201,16 +203,16 @@ static int series_curves(hs_run *run) {
   hs_curves *const found = &run->curves;
   const hs_real h = run->span.h, *p = run->here.p;
   int known;
-  if (mode->values(p, run->span.t, run->x, run->values)) return RAISED;
+  if (mode->values(p, run->span.t, run->x, run->surfaces.values)) return RAISED;
   if (!mode->surfaces) return 0;
-  copy(run->starts, run->values, mode->surfaces);
-  known = !mode->surface_series(p, order, run->lines);
-  run->has_middle = 0;
+  copy(run->surfaces.starts, run->surfaces.values, mode->surfaces);
+  known = !mode->surface_series(p, order, run->step.lines);
+  run->surfaces.has_middle = 0;
   begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
     hs_real *const c = coefficients_of(found, 0, k), power = 1.0;
     if (!known || mode->surface_line[k] < 0) return curves_along(run);
-    const hs_real *line = run->lines + mode->surface_line[k] * length;
+    const hs_real *line = run->step.lines + mode->surface_line[k] * length;
     for (int m = 0; m <= order; m++) {
       c[m] = line[m] * power;
       power = power * h;
@@ -218,7 +220,7 @@ static int series_curves(hs_run *run) {
     int met;
     if (converges(run, c, order, k, &met)) return RAISED;
     if (!met) return curves_along(run);
-    c[0] = run->starts[k];
+    c[0] = run->surfaces.starts[k];
     *degree_of(found, 0, k) = degree_without_zeros(c, order);
     *off_of(found, 0, k) = 0;
     found->certain[k] = 1;
@@ -239,14 +241,15 @@ HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_tim
   hs_real powers[HS_MOST_ORDER + 1];
   fill_powers(powers, run->method->order, h);
   run->span.piece.degree = run->method->order;
-  taylor_span(run->lines, run->x, n, run->width, run->method->order, powers, run->span.piece.c, run->z, run->error);
+  taylor_span(run->step.lines, run->x, n, run->width, run->method->order, powers, run->span.piece.c, run->z,
+              run->step.error);
   if (mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
   if (!hs_finite(sum_of(run->z, n) + sum_of(run->end, n))) return HS_NOT_FINITE;
   if (run->control.tolerance > 0) {
-    left_of(run->error, run->end, n, run->method->order, h);
+    left_of(run->step.error, run->end, n, run->method->order, h);
     if (is_too_wrong(run, h)) return HS_ERROR;
   }
-  return mode->values(p, t1, run->z, run->ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
+  return mode->values(p, t1, run->z, run->surfaces.ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
 /* Make one step of Taylor's method of a length that is halved where its end does not solve the equation. */
@@ -255,16 +258,16 @@ HS_INLINE hs_step_failure halved_series(hs_run *run, const int n, hs_time limit,
   for (int i = halvings; i < MOST_HALVINGS; i++) {
     const hs_time t1 = end_of_step(t, &h, limit);
     if (!(t1 > t)) break;
-    run->refused = 0;
+    run->reach.refused = 0;
     if (try_series(run, n, h, t1) == HS_CLEAR) return slow_enough(run, h), HS_CLEAR;
-    if (run->refused) too_fast(run, h);
+    if (run->reach.refused) too_fast(run, h);
     h = h / 2;
   }
   return HS_NOT_FINITE;
 }
 
 static int expands(hs_run *run) {
-  return !run->here.table->series(run->here.p, run->method->order, run->here.t, run->x, run->lines);
+  return !run->here.table->series(run->here.p, run->method->order, run->here.t, run->x, run->step.lines);
 }
 
 /* Make one step of Taylor's method, as long as the terms left out allow. */

@@ -14,9 +14,9 @@ static hs_rounded *bound_registers(const hs_run *run, int traced) {
   return v;
 }
 
-/* Move the results of the chosen crossing's reset, run->after, by their round-off, where that is known. */
+/* Move the results of the chosen crossing's reset, run->event.after, by their round-off, where that is known. */
 static void move_reset(hs_run *run) {
-  const hs_crossing *const crossing = &run->chosen;
+  const hs_crossing *const crossing = &run->event.chosen;
   const hs_formulas *const f = &moves_of(run)->formulas[run->here.mode];
   const hs_formula *const formula = &f->reset[crossing->edge];
   const hs_edge *const edge = &run->here.table->edge[crossing->edge];
@@ -24,21 +24,21 @@ static void move_reset(hs_run *run) {
   rounded_formula(f, formula, run->here.table->dimension, run->model->data, crossing->time, crossing->state, v, 1);
   for (int i = 0; i < edge->changes; i++)
     if (!hs_finite(moved(v[formula->result[i]]))) return;
-  for (int i = 0; i < edge->changes; i++) run->after[edge->change[i]] = moved(v[formula->result[i]]);
+  for (int i = 0; i < edge->changes; i++) run->event.after[edge->change[i]] = moved(v[formula->result[i]]);
 }
 
 /* Whether a state moves by more than the least error of one. */
 static int counts(const hs_run *run, int i, hs_real by, hs_real a) {
-  return fabs(by) > ERROR_UNITS * HS_UNIT * hs_max(run->scales[i], fabs(a));
+  return fabs(by) > ERROR_UNITS * HS_UNIT * hs_max(run->sizes.scales[i], fabs(a));
 }
 
 /* Move the state of the chosen crossing along the flow to where it crosses but for the surface's round-off. */
 static void move_crossing(hs_run *run) {
-  const hs_crossing *const crossing = &run->chosen;
+  const hs_crossing *const crossing = &run->event.chosen;
   const hs_mode_state *const here = &run->here;
   const hs_formulas *const f = &moves_of(run)->formulas[here->mode];
   const int n = here->table->dimension;
-  hs_real rate, *const q = crossing->state, *const slope = run->error;
+  hs_real rate, *const q = crossing->state, *const slope = run->step.error;
   if (hs_call(&here->table->rates[crossing->edge], here->p, crossing->time, q, &rate) || !(rate > 0)) return;
   if (here->table->flow(here->p, crossing->time, q, slope)) return;
   hs_rounded *const v = bound_registers(run, 1);
@@ -74,6 +74,6 @@ static void move_along(hs_run *run, hs_time t, hs_real *x, hs_real h) {
 static void move_start(hs_run *run, hs_time t) {
   const hs_real h = run->task->settings.scheme == HS_LOCATED ? within_reach(run, run->control.h) : run->control.h;
   const hs_real left = segment_end(run) - t;
-  for (int s = 0; s < run->here.dimension; s++) run->scales[s] = hs_max(run->scales[s], fabs(run->x[s]));
+  for (int s = 0; s < run->here.dimension; s++) run->sizes.scales[s] = hs_max(run->sizes.scales[s], fabs(run->x[s]));
   if (left > 0) move_along(run, t, run->x, hs_min(h, left));
 }

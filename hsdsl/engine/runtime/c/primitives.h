@@ -62,9 +62,9 @@ HS_INLINE int has_terms(const hs_run *run) { return run->here.table->terms != 0;
 /* The routine wants states and sizes as one vector. */
 static int terms_at(hs_run *run, hs_time t, const hs_real *x, const hs_real *sizes, hs_real *terms) {
   const int n = run->here.dimension;
-  copy(run->both, x, n);
-  copy(run->both + n, sizes, n);
-  return run->here.table->terms(run->here.p, t, run->both, terms) ? RAISED : 0;
+  copy(run->sizes.both, x, n);
+  copy(run->sizes.both + n, sizes, n);
+  return run->here.table->terms(run->here.p, t, run->sizes.both, terms) ? RAISED : 0;
 }
 
 static int derivatives_at(hs_run *run, hs_time t, const hs_real *x, hs_real *rows) {

@@ -2,11 +2,11 @@
 
 /* Flush a full chunk: whether there is room for one more of each afterwards. */
 static int make_chunk(hs_run *run) {
-  if (run->full) return 0;
+  if (run->written.full) return 0;
   const int answer = run->task->flush(run->task);
-  if (answer) run->interrupted = 1;
-  if (answer == 2) run->full = 1;
-  return !run->full;
+  if (answer) run->poll.interrupted = 1;
+  if (answer == 2) run->written.full = 1;
+  return !run->written.full;
 }
 
 HS_INLINE int room(hs_run *run) {
@@ -32,7 +32,7 @@ HS_INLINE void write_row(hs_run *run, hs_time t, const hs_real *x, const hs_poly
   hs_chunk *chunk = &run->task->chunk;
   const int n = run->here.dimension, w = run->width, m = run->model->outputs;
   if (!room(run)) return;
-  if (run->bare) chunk->rows = run->row = 0; /* the last one counts */
+  if (run->lanes.bare) chunk->rows = run->written.row = 0; /* the last one counts */
   const int64_t row = chunk->rows;
   hs_real *values = chunk->values + row * w;
   chunk->times[row] = t;
@@ -41,15 +41,16 @@ HS_INLINE void write_row(hs_run *run, hs_time t, const hs_real *x, const hs_poly
   chunk->depth[row] = depth;
   if (m && (!outputs || outputs(p, t, x, chunk->outputs + row * m)))
     for (int i = 0; i < m; i++) chunk->outputs[row * m + i] = NAN;
-  if (run->method->degree > 0 && !run->bare) write_piece(run, n, piece, chunk->pieces + row * run->method->degree * w);
+  const int degree = run->lanes.bare ? 0 : run->method->degree;
+  if (degree > 0) write_piece(run, n, piece, chunk->pieces + row * degree * w);
   chunk->rows++;
-  run->row++;
+  run->written.row++;
   run->task->now = t;
 }
 
 /* Add the piece that leads to a row, and the row; the scales grow to the state's size. */
 HS_INLINE void append(hs_run *run, hs_time t, const hs_real *x, const hs_polynomial *piece) {
-  for (int s = 0; s < run->here.dimension; s++) run->scales[s] = hs_max(run->scales[s], fabs(x[s]));
+  for (int s = 0; s < run->here.dimension; s++) run->sizes.scales[s] = hs_max(run->sizes.scales[s], fabs(x[s]));
   write_row(run, t, x, piece, 0.0, run->here.outputs, run->here.outputs_p);
 }
 
@@ -57,8 +58,8 @@ HS_INLINE void append(hs_run *run, hs_time t, const hs_real *x, const hs_polynom
 static void begin(hs_run *run, int kind) {
   if (!room(run)) return;
   hs_arc *arc = &run->task->chunk.arc[run->task->chunk.arcs++];
-  arc->first = run->bare ? 0 : run->row;
-  arc->jump = run->jump;
+  arc->first = run->lanes.bare ? 0 : run->written.row;
+  arc->jump = run->written.jump;
   arc->mode = run->here.mode;
   arc->kind = kind;
 }
@@ -83,11 +84,12 @@ static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, co
   const hs_edge *edge = &run->here.table->edge[crossing->edge];
   const hs_mode *const own = &run->model->mode[run->here.mode], *const next = &run->model->mode[edge->target];
   if (resumed == resumed && run->model->queues)
-    run->full_queue = hs_let_wait(run->model, run->task->tail, run->task, own, crossing->state, next, run->after);
+    run->written.full_queue =
+        hs_let_wait(run->model, run->task->tail, run->task, own, crossing->state, next, run->event.after);
   const hs_made made = {crossing->time, resumed, run->here.mode, crossing->edge, edge->target, entry};
-  run->made[run->jump % FREE] = made;
-  run->jump++;
-  run->task->made = run->jump;
+  run->written.made[run->written.jump % FREE] = made;
+  run->written.jump++;
+  run->task->made = run->written.jump;
   run->task->entries += entry;
   if (!room(run)) return;
   const int64_t i = chunk->transitions++;
@@ -97,10 +99,10 @@ static void record(hs_run *run, const hs_crossing *crossing, hs_time resumed, co
   transition->mode = run->here.mode;
   transition->edge = crossing->edge;
   transition->entry = entry;
-  transition->alternatives = run->alternatives_count;
-  for (int a = 0; a < run->alternatives_count; a++)
-    chunk->alternatives[chunk->alternatives_used++] = run->alternatives[a];
-  if (run->bare) return;
+  transition->alternatives = run->event.alternatives_count;
+  for (int a = 0; a < run->event.alternatives_count; a++)
+    chunk->alternatives[chunk->alternatives_used++] = run->event.alternatives[a];
+  if (run->lanes.bare) return;
   copy(chunk->before + i * w, crossing->state, run->here.dimension);
   for (int s = 0; s < edge->target_dimension; s++) chunk->after[i * w + s] = after ? after[s] : (hs_real)NAN;
 }
@@ -118,12 +120,12 @@ static void note(hs_run *run, hs_notice kind, int surface, int64_t number, hs_ti
 
 /* Note that surface k would not settle on a polynomial: once for each. */
 static void note_unsettled(hs_run *run, int k, hs_time time) {
-  int *const unsettled = &run->unsettled[run->here.mode * run->model->surfaces + k];
+  int *const unsettled = &run->written.unsettled[run->here.mode * run->model->surfaces + k];
   if (!*unsettled) note(run, HS_UNSETTLED, k, 0, time, time);
   *unsettled = 1;
 }
 
 /* Transition `back` before the last one. */
 static const hs_made *made_before(const hs_run *run, int back) {
-  return &run->made[(uint64_t)(run->jump - 1 - back) % FREE];
+  return &run->written.made[(uint64_t)(run->written.jump - 1 - back) % FREE];
 }

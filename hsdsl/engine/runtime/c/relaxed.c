@@ -95,7 +95,7 @@ static hs_found excursion(hs_run *run, hs_trial *trial, hs_found found) {
     hs_real out, back;
     if (rate_along(run, k, trial->t, run->x, run->slope, &out)) continue;
     if (rate_along(run, k, trial->t1, run->z, run->end, &back)) continue;
-    const int looked = run->active_surfaces[k] || (out > 0 && 0 >= back);
+    const int looked = run->surfaces.active[k] || (out > 0 && 0 >= back);
     if (looked && beyond_within(run, trial, k) == 1) return failure(HS_DEEP, k);
   }
   return found;
@@ -124,7 +124,7 @@ static int last_up_crossing(hs_run *run, const hs_polynomial *piece, int k, hs_r
 /* Whether a state may be beyond surface k without having crossed it. */
 static int is_transparent(const hs_run *run, int k) {
   const hs_mode *mode = run->here.table;
-  return run->emerging[k] || k >= mode->edges || mode->edge[k].conditional;
+  return run->surfaces.emerging[k] || k >= mode->edges || mode->edge[k].conditional;
 }
 
 /* Where surface k was last crossed upwards on an interpolant: 1; 0 if it was beyond all along. */
@@ -166,7 +166,7 @@ static int too_deep(hs_run *run, int k, const hs_real *values, hs_found *found) 
   hs_real norm;
   if (norm_of(run, run->trial.t1, run->z, k, &norm)) return RAISED;
   if (!(norm > 0)) return *found = failure(HS_FLAT, k), 1;
-  if (values[k] <= run->epsilon * norm + run->noise[k]) return 0;
+  if (values[k] <= run->epsilon * norm + run->surfaces.noise[k]) return 0;
   return *found = failure(HS_DEEP, k), 1;
 }
 
@@ -174,7 +174,7 @@ static int too_deep(hs_run *run, int k, const hs_real *values, hs_found *found) 
 static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *crossing, hs_found *found) {
   hs_trial *trial = &run->trial;
   const hs_polynomial *piece = &trial->piece;
-  const hs_real noise = run->noise[k];
+  const hs_real noise = run->surfaces.noise[k];
   hs_real norm, back, r;
   int status = piece_of(run, trial);
   if (status) return status;
@@ -190,7 +190,7 @@ static int crossing_of(hs_run *run, int k, const hs_real *values, hs_crossing *c
   }
   if (back > noise) return *found = failure(HS_INWARD, k), 0;
   status = condition(run, k, crossing->time, crossing->state);
-  if (!status && (crossing->theta == 0 || run->active_surfaces[k])) {
+  if (!status && (crossing->theta == 0 || run->surfaces.active[k])) {
     const hs_real *q = crossing->state;
     hs_time time = crossing->time;
     if (back > 0) { /* where the flow comes back to the surface after a hop that round-off hides */
@@ -220,20 +220,20 @@ static int judge(hs_run *run, const hs_real *values, hs_found *found) {
   *found = CLEAR;
   for (int k = 0, looked = 0; k < mode->surfaces; k++) {
     if (values[k] <= 0) continue;
-    if (!looked++ && magnitudes_at(run, run->trial.t1, run->z, run->magnitudes)) return RAISED;
-    run->noise[k] = bound_from(run, run->magnitudes, k, run->trial.t1, run->z, 0);
+    if (!looked++ && magnitudes_at(run, run->trial.t1, run->z, run->surfaces.magnitudes)) return RAISED;
+    run->surfaces.noise[k] = bound_from(run, run->surfaces.magnitudes, k, run->trial.t1, run->z, 0);
   }
   for (int k = 0; k < mode->surfaces; k++) {
-    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
-    if (k >= mode->edges && !run->emerging[k]) return *found = failure(HS_WALL, k), 0;
+    if (values[k] <= 0 || values[k] <= run->surfaces.noise[k]) continue;
+    if (k >= mode->edges && !run->surfaces.emerging[k]) return *found = failure(HS_WALL, k), 0;
     if (is_transparent(run, k)) continue;
     const int status = too_deep(run, k, values, found);
     if (status) return status == RAISED ? RAISED : 0;
   }
   int count = 0;
   for (int k = 0; k < mode->edges; k++) {
-    if (values[k] <= 0 || values[k] <= run->noise[k]) continue;
-    const int status = crossing_of(run, k, values, &run->crossings[count], found);
+    if (values[k] <= 0 || values[k] <= run->surfaces.noise[k]) continue;
+    const int status = crossing_of(run, k, values, &run->event.crossings[count], found);
     if (status == RAISED) return RAISED;
     if (found->failure != HS_CLEAR) return 0;
     count += status;
@@ -253,16 +253,16 @@ HS_INLINE hs_found attempt(hs_run *run, const int n, hs_real h, hs_time t1) {
   trial->looked = trial->ends = trial->has_piece = 0;
   const int status = step(run, n, here->t, h);
   if (status == NO_CONVERGENCE) return UNSOLVED;
-  if (status || mode->values(here->p, t1, run->z, run->ahead)) return NOT_FINITE;
-  hs_real largest = m ? run->ahead[0] : 0.0;
-  for (int k = 1; k < m; k++) largest = hs_max(largest, run->ahead[k]);
+  if (status || mode->values(here->p, t1, run->z, run->surfaces.ahead)) return NOT_FINITE;
+  hs_real largest = m ? run->surfaces.ahead[0] : 0.0;
+  for (int k = 1; k < m; k++) largest = hs_max(largest, run->surfaces.ahead[k]);
   if (largest <= 0) {
     if (mode->flow(here->p, t1, run->z, run->end)) return NOT_FINITE;
     trial->looked = trial->ends = 1;
-    return hs_finite(sum_of(run->z, n) + sum_of(run->ahead, m) + sum_of(run->end, n)) ? CLEAR : NOT_FINITE;
+    return hs_finite(sum_of(run->z, n) + sum_of(run->surfaces.ahead, m) + sum_of(run->end, n)) ? CLEAR : NOT_FINITE;
   }
-  if (!hs_finite(sum_of(run->z, n) + sum_of(run->ahead, m))) return NOT_FINITE;
-  if (judge(run, run->ahead, &found)) return trial->ends = 0, NOT_FINITE;
+  if (!hs_finite(sum_of(run->z, n) + sum_of(run->surfaces.ahead, m))) return NOT_FINITE;
+  if (judge(run, run->surfaces.ahead, &found)) return trial->ends = 0, NOT_FINITE;
   if (found.failure != HS_CLEAR || found.crossings || ends(run, trial)) {
     ends(run, trial);
     return found;
@@ -276,8 +276,8 @@ static int stuck(hs_run *run, hs_step_failure kind, int surface) {
   const int count = may_stand ? standing_on(run) : 0;
   if (count) {
     choose(run, count);
-    sizes(run, run->x, run->x, run->active_surfaces[run->chosen.edge]);
-    run->landed_at = run->here.t;
+    sizes(run, run->x, run->x, run->surfaces.active[run->event.chosen.edge]);
+    run->event.landed_at = run->here.t;
     return LANDED;
   }
   run->task->stop.failure = kind;
@@ -295,7 +295,7 @@ static int flow(hs_run *run) {
   const hs_time limit = segment_end(run);
   forget_steps(run);
   if (here->table->flow(here->p, here->t, run->x, run->slope)) return stopped(run, HS_HERE_NOT_FINITE, here->t);
-  begin_steps(control, run->scales, run->slope, n);
+  begin_steps(control, run->sizes.scales, run->slope, n);
   begin_pace(run);
   while (here->t < limit && !count_step(&run->pace, here->t)) {
     hs_real h = control->h, ratio = NAN;
@@ -326,8 +326,8 @@ static int flow(hs_run *run) {
     if (ratio == ratio && halvings == 0) accept(control, h, ratio);
     if (found.crossings || !run->trial.ends) {
       choose(run, found.crossings);
-      sizes(run, run->x, run->chosen.theta > 0 ? run->z : run->x, run->active_surfaces[run->chosen.edge]);
-      run->landed_at = t1;
+      sizes(run, run->x, run->event.chosen.theta > 0 ? run->z : run->x, run->surfaces.active[run->event.chosen.edge]);
+      run->event.landed_at = t1;
       return LANDED;
     }
     if (halvings || !(t1 > here->t)) {
@@ -342,8 +342,8 @@ static int flow(hs_run *run) {
     here->t = t1;
     swap(&run->x, &run->z);
     swap(&run->slope, &run->end);
-    run->k[0] = run->slope;
-    run->k[run->method->stages] = run->end;
+    run->step.k[0] = run->slope;
+    run->step.k[run->method->stages] = run->end;
   }
   return here->t < limit ? stuck(run, HS_SLOW, -1) : AT_BOUNDARY;
 }
@@ -359,8 +359,8 @@ static int moves_on(hs_run *run, const hs_mode_state *before, int unknown) {
 
 /* Wait in the strip for what is left of epsilon, then reset (Fig. 12, lines 10 to 14). */
 static int through_strip(hs_run *run) {
-  const hs_crossing *crossing = &run->chosen;
-  const hs_time t = crossing->time, depth = crossing->depth, until = run->until, t1 = run->landed_at;
+  const hs_crossing *crossing = &run->event.chosen;
+  const hs_time t = crossing->time, depth = crossing->depth, until = run->until, t1 = run->event.landed_at;
   const int k = crossing->edge;
   const hs_edge *edge = &run->here.table->edge[k];
   if (crossing->theta > 0) {
@@ -370,11 +370,11 @@ static int through_strip(hs_run *run) {
   if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
   HS_MOVE(run, move_crossing(run));
   hs_time resumed = t1 + (run->epsilon - depth);
-  const int without_value = reset(run, run->landed);
+  const int without_value = reset(run, run->sizes.landed);
   if (resumed > until + tie(until)) {
     hs_time rows[3][2] = {{t, depth * 0}, {t1, depth}, {until, depth + (until - t1)}};
     strip(run, 3, rows, crossing->state);
-    record(run, crossing, NAN, without_value ? 0 : run->after, 0);
+    record(run, crossing, NAN, without_value ? 0 : run->event.after, 0);
     return in_strip(run, HS_UNTIL_IN_STRIP, until);
   }
   if (without_value) return in_strip(run, HS_RESET_NOT_FINITE, t);
@@ -382,9 +382,9 @@ static int through_strip(hs_run *run) {
   hs_time rows[3][2] = {{t, depth * 0}, {t1, depth}, {resumed, run->epsilon}};
   strip(run, 3, rows, crossing->state);
   const int flowed = has_flowed(run, t);
-  record(run, crossing, resumed, run->after, 0);
-  copy(run->x, run->after, edge->target_dimension);
-  copy(run->scale, run->both, edge->target_dimension);
+  record(run, crossing, resumed, run->event.after, 0);
+  copy(run->x, run->event.after, edge->target_dimension);
+  copy(run->sizes.scale, run->sizes.both, edge->target_dimension);
   const hs_mode_state before = run->here;
   const int unknown = before.table->flow(before.p, t, crossing->state, run->source);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, 0.0, 0, t);
@@ -396,7 +396,7 @@ static int through_strip(hs_run *run) {
 /* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */
 static int at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
-  if (t >= run->pause) return PAUSED;
+  if (t >= run->pausing.at) return PAUSED;
   if (t < run->until || segment_follows(run)) return go_on(run);
   const int count = standing_on(run);
   if (!count) return stopped(run, HS_UNTIL, t);
@@ -404,14 +404,14 @@ static int at_boundary(hs_run *run) {
   choose(run, count);
   hs_time rows[1][2] = {{t, 0.0}};
   strip(run, 1, rows, run->x);
-  record(run, &run->chosen, NAN, 0, 0);
+  record(run, &run->event.chosen, NAN, 0, 0);
   return in_strip(run, HS_UNTIL_ON_GUARD, t);
 }
 
 /* Follow the relaxed execution until it stops or pauses. */
 static int relaxed(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
-    outcome = run->interrupted ? (int)stopped(run, HS_INTERRUPTED, run->here.t) : flow(run);
+    outcome = run->poll.interrupted ? (int)stopped(run, HS_INTERRUPTED, run->here.t) : flow(run);
     if (outcome == LANDED)
       outcome = through_strip(run);
     else if (outcome == AT_BOUNDARY)

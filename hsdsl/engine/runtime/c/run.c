@@ -21,8 +21,8 @@ static int64_t segment_at(const hs_timeline *timeline, hs_time t) {
 static hs_time segment_end(const hs_run *run) {
   const hs_timeline *timeline = run->task->timeline;
   const int64_t segment = run->here.segment;
-  const int open = segment == timeline->segments - 1 && hs_finite(run->pause);
-  return open ? run->pause : earlier(timeline->end[segment], run->pause);
+  const int open = segment == timeline->segments - 1 && hs_finite(run->pausing.at);
+  return open ? run->pausing.at : earlier(timeline->end[segment], run->pausing.at);
 }
 
 /* Whether another segment is behind the one that the run is in. */
@@ -41,22 +41,22 @@ static hs_reason stopped(hs_run *run, hs_reason reason, hs_time t) {
   stop->segment = run->here.segment;
   stop->h = run->control.h;
   copy(stop->x, run->x, run->here.dimension);
-  copy(stop->scales, run->scales, run->here.dimension);
+  copy(stop->scales, run->sizes.scales, run->here.dimension);
   return reason;
 }
 
 /* Keep the scales of a mode's states, and have those of the next one's. */
 static void hand_on_scales(hs_run *run, const hs_mode *from, const hs_mode *to) {
-  for (int s = 0; from && s < from->dimension; s++) run->known[from->state[s]] = run->scales[s];
-  for (int s = 0; s < run->width; s++) run->scales[s] = s < to->dimension ? run->known[to->state[s]] : 0.0;
+  for (int s = 0; from && s < from->dimension; s++) run->sizes.known[from->state[s]] = run->sizes.scales[s];
+  for (int s = 0; s < run->width; s++) run->sizes.scales[s] = s < to->dimension ? run->sizes.known[to->state[s]] : 0.0;
 }
 
 /* Bound the first step of an arc of flow that begins in a mode; further ones may be twice as long each. */
 static void bound_first_step(hs_run *run, int mode) {
   const hs_settings *settings = &run->task->settings;
-  const hs_real bound = run->placed < settings->arcs ? settings->first_steps[run->placed] : 0.0;
-  hs_real *const reach = &run->reach[mode];
-  run->placed++;
+  const hs_real bound = run->written.placed < settings->arcs ? settings->first_steps[run->written.placed] : 0.0;
+  hs_real *const reach = &run->reach.step[mode];
+  run->written.placed++;
   if (bound > 0) *reach = *reach > 0 ? hs_min(*reach, bound) : bound;
 }
 
@@ -86,33 +86,33 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
   copy(run->entered, run->x, dimension);
 }
 
-static int limit_reached(const hs_run *run) { return run->jump >= run->task->settings.max_transitions; }
+static int limit_reached(const hs_run *run) { return run->written.jump >= run->task->settings.max_transitions; }
 
 #if defined(HS_NO_CLOCK)
 /* Ask the caller every so many steps whether to go on. */
 static void poll(hs_run *run) {
-  run->steps_to_poll = run->poll_steps;
-  if (run->task->poll(run->task)) run->interrupted = 1;
+  run->poll.steps_left = run->poll.steps;
+  if (run->task->poll(run->task)) run->poll.interrupted = 1;
 }
 #else
 /* Ask the caller now and then whether to go on, of a run of a few steps never; a clock costs more than many steps, so
    how many lie between is learnt. */
 static void poll(hs_run *run) {
   const clock_t now = clock();
-  const int first = !run->polled;
-  if (first) run->polled = now;
-  const int early = now - run->polled < POLL_EVERY;
-  if (early && !first) run->poll_steps = run->poll_steps < 1L << 20 ? 2 * run->poll_steps : 1L << 20;
-  if (now - run->polled > 4 * POLL_EVERY) run->poll_steps = run->poll_steps / 8 + 1;
-  run->steps_to_poll = run->poll_steps;
+  const int first = !run->poll.at;
+  if (first) run->poll.at = now;
+  const int early = now - run->poll.at < POLL_EVERY;
+  if (early && !first) run->poll.steps = run->poll.steps < 1L << 20 ? 2 * run->poll.steps : 1L << 20;
+  if (now - run->poll.at > 4 * POLL_EVERY) run->poll.steps = run->poll.steps / 8 + 1;
+  run->poll.steps_left = run->poll.steps;
   if (early) return;
-  run->polled = now;
-  if (run->task->poll(run->task)) run->interrupted = 1;
+  run->poll.at = now;
+  if (run->task->poll(run->task)) run->poll.interrupted = 1;
 }
 #endif
 
 /* Whether to stop: polls the caller now and then. */
 static int interrupted(hs_run *run) {
-  if (--run->steps_to_poll == 0) poll(run);
-  return run->interrupted;
+  if (--run->poll.steps_left == 0) poll(run);
+  return run->poll.interrupted;
 }

@@ -68,7 +68,7 @@ typedef struct {
   const hs_real *p;
   hs_routine *outputs;     /* of the arc; 0 where the mode has none of the states they need */
   const hs_real *outputs_p;
-  int active, emerging;    /* numbers of surfaces in active_surfaces and in run->emerging */
+  int active, emerging;    /* numbers of surfaces that are active and emerging */
   hs_time t;
 } hs_mode_state;
 
@@ -103,7 +103,7 @@ typedef struct {
 /* Surfaces along one step: on part i, from start[i] on, surface k is a polynomial of the share of that part. */
 typedef struct {
   int parts, count, room; /* room: numbers for each polynomial */
-  hs_real *start, *width, *c, *off; /* off: how far it may be off; rises that are lower tell nothing */
+  hs_real *start, *width, *rows, *c, *off; /* off: how far it may be off; rises that are lower tell nothing */
   int *degree, *certain; /* for each part and surface */
 } hs_curves;
 
@@ -135,6 +135,98 @@ typedef struct {
   hs_polynomial piece;
 } hs_span;
 
+/* The sizes of the numbers that a point is computed from. */
+typedef struct {
+  /* of the state on entry; negative where the terms of a reset gave them: the next reset reads no more than the value
+     of such a state, and no size multiplies */
+  hs_real *scale;
+  hs_real *scales, *known; /* that states here have had, and those of all modes before this one was entered */
+  hs_real *landed;         /* of a crossing's state */
+  hs_real *both;           /* 2 width: states and sizes */
+} hs_sizes;
+
+/* What the method has of a step. */
+typedef struct {
+  hs_real **k; /* stages, then the flow at the end */
+  hs_real **other_k, *other_end, *error;
+  hs_real *lines; /* of Taylor's method: coefficients, as hs_series writes them */
+  hs_real ratio;  /* of the last error estimate */
+  int expanded;   /* whether it has written `lines`, in this mode */
+  int sloped;     /* whether the flow at the step's start is known */
+  hs_radau radau;
+} hs_stages;
+
+/* The mode's surfaces: one number or mark for each. */
+typedef struct {
+  hs_real *values, *starts, *ends, *middle, *ahead, *magnitudes, *noise;
+  hs_real *begun, *ended; /* magnitudes at the ends of the located step: `weighed` says at which */
+  int weighed, has_middle;
+  int *active, *beyond, *emerging;
+  hs_real *stood; /* how far off it a state is that stood on it, on entry */
+} hs_at_surfaces;
+
+/* Crossings of a step, and the one that goes. */
+typedef struct {
+  hs_crossing *crossings, chosen; /* one for each edge */
+  hs_riser *waiting;              /* one for each surface */
+  int *tied;                      /* one for each edge */
+  int *alternatives, alternatives_count;
+  hs_time landed_at; /* the end of a step into a strip */
+  hs_real *after;    /* the state after the reset */
+} hs_event;
+
+/* Motion along guards: see contact.c. Marks are one for each edge. */
+typedef struct {
+  hs_real *p;           /* what routines are bound to: model->data and then model->contacts numbers */
+  const hs_real *own_p; /* what they are bound to else */
+  int *kept, *held;     /* whether the edge may hold the state, and does */
+  int *others;          /* whether it holds the state where the `if` of another is looked at */
+  hs_real *flow_sizes, *jacobian; /* jacobian: model->derivatives */
+  hs_real *began;                 /* where a motion along a guard began */
+  int still;                      /* whether it ended there */
+} hs_contacts;
+
+/* Zeno tails: see zeno.c. */
+typedef struct {
+  int *tail;          /* one for each surface: whether it is that of an edge of the tail */
+  hs_real *turn;      /* 2 width: where a tail's edges take a state in turn */
+  int64_t contracted; /* after how many transitions contraction() was last asked; what it found */
+  hs_real flight, ratio;
+  int contracts;
+} hs_zeno;
+
+/* The steps that surfaces allow, by modes. */
+typedef struct {
+  hs_real *step; /* 0 where they allow any */
+  int *lost;     /* where no step can follow them */
+  int refused;   /* whether they were too fast for the last one */
+} hs_reach;
+
+/* What was written, counted from the start of the run. */
+typedef struct {
+  int64_t row, jump, placed; /* placed: arcs of flow that were begun */
+  hs_made made[FREE];
+  int full, full_queue;          /* full_queue: a queue of the mode in which more wait than may, or -1 */
+  int *unsettled, noted_crowded; /* unsettled: for each mode and surface */
+} hs_written;
+
+/* How often the caller is asked whether to go on. */
+typedef struct {
+  int interrupted;
+  long steps_left, steps;
+#if !defined(HS_NO_CLOCK)
+  clock_t at;
+#endif
+} hs_polling;
+
+/* When to pause, and whether to do so after a transition: see hs.c. */
+typedef struct {
+  hs_time at;
+  int after_jump;
+  int64_t jumps_before;
+} hs_pausing;
+
+/* Arrays are in the workspace, of a state's room unless said otherwise. */
 typedef struct {
   hs_task *task;
   const hs_model *model;
@@ -145,70 +237,31 @@ typedef struct {
   hs_mode_state here;
   hs_trial trial;
   hs_control control;
-  int64_t placed; /* arcs of flow that were begun */
   hs_pace pace;
   hs_cascade cascade;
-  /* in the workspace, a state's room each unless said otherwise */
-  hs_real *x, *slope, *z, *end, *at, *scale, *entered, *after, *landed, *error;
-  /* scale: the sizes of the numbers that the state was computed from on entry, negative where the terms of a reset gave
-     them: the next reset reads no more than the value of such a state, and no size multiplies */
-  hs_real *scales, *known; /* of the states here, and of those of all modes before this one was entered */
-  hs_real *near, *nearby;
-  hs_real *flow_sizes, *jacobian; /* see contact.c; jacobian: model->derivatives */
-  hs_real *held_p; /* in contact: what routines are bound to, model->data and then model->contacts numbers */
-  const hs_real *own_p; /* what they are bound to else */
-  int *kept, *held; /* one for each edge: whether it may hold the state, and does */
-  hs_real *stood;   /* one for each surface: how far off it a state is that stood on it, on entry */
-  int *others;      /* one for each edge: whether it holds the state where the `if` of another is looked at */
-  int *tail;        /* one for each surface: whether it is that of an edge of a Zeno tail */
-  hs_real *turn;    /* 2 width: where a tail's edges take a state in turn */
-  hs_real **k;          /* stages, then the flow at the end */
-  hs_real *lines;       /* of Taylor's method: coefficients, as hs_series writes them */
-  int expanded;        /* whether it has written them, in this mode */
-  hs_radau radau;
-  hs_real *values, *ahead, *magnitudes, *noise; /* one for each surface */
-  hs_real *begun, *ended; /* magnitudes at the ends of the located step: `weighed` says at which */
-  int weighed;
-  int *active_surfaces, *beyond, *emerging;
-  hs_real *source;      /* the flow that led to a transition, or between two states */
-  int *tied;           /* one for each edge */
-  hs_real *gradient;    /* width + 1 */
-  hs_real *both;        /* 2 width: states and sizes */
-  hs_crossing *crossings; /* one for each edge */
+  hs_real *x, *slope, *z, *end; /* where the run is, and where its step ends, with the flow there */
+  hs_real *at, *near, *nearby, *q, *gradient; /* for a while; gradient: width + 1 */
+  hs_real *entered;                           /* the state with which the arc begins */
+  hs_real *source; /* the flow that led to a transition, or between two states */
   hs_polynomial cubic;
-  hs_crossing chosen;
-  int *alternatives, alternatives_count;
-  hs_time landed_at;    /* the end of a step into a strip */
-  int64_t row, jump;   /* counted from the start of the run */
-  int interrupted, full;
-  long steps_to_poll, poll_steps;
-#if !defined(HS_NO_CLOCK)
-  clock_t polled;
-#endif
+  hs_sizes sizes;
+  hs_stages step;
+  hs_at_surfaces surfaces;
+  hs_event event;
+  hs_contacts contact;
+  hs_zeno zeno;
+  hs_reach reach;
+  hs_written written;
+  hs_polling poll;
+  hs_pausing pausing;
   /* of the located scheme */
   hs_span span, before;
-  int has_before, sloped; /* sloped: the flow at the step's start is known */
-  hs_real ratio;                     /* of the last error estimate */
+  int has_before;
   hs_curves curves;
-  hs_riser *waiting; /* one for each surface */
   hs_roots roots;
-  hs_real *rows;
-  hs_real *q, *ends, *starts, *middle, *other_end, **other_k;
-  int has_middle;
-  hs_real *began;                   /* where a motion along a guard began */
-  int still;                         /* whether it ended there */
-  int full_queue; /* a queue of the mode in which more wait than may, or -1 */
-  int *unsettled, noted_crowded;     /* unsettled: for each mode and surface */
-  hs_real *reach;                    /* the step that each mode's surfaces allow, 0 where they allow any */
-  int *lost, refused;               /* modes whose surfaces no step can follow; whether they were too fast for one */
-  hs_made made[FREE];
-  int64_t contracted; /* behind how many transitions contraction() was last asked; what it found */
-  hs_real flight, flight_ratio;
-  int contracts;
-  hs_time pause; /* see hs.c: when to pause, and whether to do so behind a transition */
-  int after_jump;
-  int64_t jumps_before;
-  int parks, bare; /* whether steps are made in lanes, and only the last row counts, without its piece: see lanes.c */
+  struct {
+    int parks, bare; /* whether steps are made in lanes, and only the last row counts, without its piece: see lanes.c */
+  } lanes;
 } hs_run;
 
 /* All that a paused run needs to go on: plain data. `data` has the numbers that routines were bound to; there are

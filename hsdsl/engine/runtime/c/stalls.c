@@ -5,10 +5,10 @@
 static int still(hs_run *run, int surface, hs_time t1) {
   const hs_mode_state *here = &run->here;
   if (surface < 0) return 0;
-  if (here->table->values(here->p, here->t, run->x, run->values)) return 0;
-  const hs_real before = run->values[surface];
-  if (here->table->values(here->p, t1, run->z, run->values)) return 0;
-  return run->values[surface] == before;
+  if (here->table->values(here->p, here->t, run->x, run->surfaces.values)) return 0;
+  const hs_real before = run->surfaces.values[surface];
+  if (here->table->values(here->p, t1, run->z, run->surfaces.values)) return 0;
+  return run->surfaces.values[surface] == before;
 }
 
 static int unmoved(const hs_run *run) {

@@ -12,15 +12,15 @@ HS_INLINE hs_real weighted_row(const hs_row *row, hs_real *const *k, int state) 
 /* Evaluate stage i of a step from (t, run->x); not 0 where the flow has no value. */
 HS_INLINE int evaluate(hs_run *run, int n, int i, hs_time t, hs_real h) {
   const hs_method *method = run->method;
-  for (int s = 0; s < n; s++) run->at[s] = run->x[s] + h * weighted_row(&method->a[i], run->k, s);
-  return run->here.table->flow(run->here.p, t + method->c[i] * h, run->at, run->k[i]);
+  for (int s = 0; s < n; s++) run->at[s] = run->x[s] + h * weighted_row(&method->a[i], run->step.k, s);
+  return run->here.table->flow(run->here.p, t + method->c[i] * h, run->at, run->step.k[i]);
 }
 
 /* One step from (t, run->x) to run->z; not 0 where the flow has no value. */
 HS_INLINE int table_step(hs_run *run, int n, hs_time t, hs_real h) {
   for (int i = 1; i < run->method->stages; i++)
     if (evaluate(run, n, i, t, h)) return 1;
-  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + h * weighted_row(&run->method->b, run->k, s);
+  for (int s = 0; s < n; s++) run->z[s] = run->x[s] + h * weighted_row(&run->method->b, run->step.k, s);
   return 0;
 }
 
@@ -51,7 +51,7 @@ static int table_piece(hs_run *run, hs_time t, hs_real h, hs_polynomial *piece) 
   piece->degree = method->degree;
   for (int m = 0; m < method->degree; m++)
     for (int s = 0; s < run->here.dimension; s++)
-      piece->c[m * run->width + s] = h * weighted_row(&method->dense[m], run->k, s);
+      piece->c[m * run->width + s] = h * weighted_row(&method->dense[m], run->step.k, s);
   return 0;
 }
 
@@ -64,8 +64,9 @@ static hs_real sharpened(hs_real fine, hs_real coarse) {
 static void table_error(hs_run *run, hs_real h) {
   const hs_method *method = run->method;
   for (int s = 0; s < run->here.dimension; s++) {
-    run->error[s] = h * weighted_row(&method->error, run->k, s);
-    if (method->coarse.terms) run->error[s] = sharpened(run->error[s], h * weighted_row(&method->coarse, run->k, s));
+    run->step.error[s] = h * weighted_row(&method->error, run->step.k, s);
+    if (method->coarse.terms)
+      run->step.error[s] = sharpened(run->step.error[s], h * weighted_row(&method->coarse, run->step.k, s));
   }
 }
 
@@ -92,29 +93,29 @@ static int method_piece(hs_run *run, hs_time t, hs_real h, hs_polynomial *piece)
   }
 }
 
-/* The estimate of the local error, to run->error; the flow at the step's end is run->end. */
+/* The estimate of the local error, to run->step.error; the flow at the step's end is run->end. */
 static void local_error(hs_run *run, hs_real h) {
   switch (run->method->kind) {
     case HS_TAYLOR: taylor_error(run, run->here.dimension, h); break;
-    case HS_RADAU: copy(run->error, run->radau.error, run->here.dimension); break;
+    case HS_RADAU: copy(run->step.error, run->step.radau.error, run->here.dimension); break;
     default: table_error(run, h);
   }
 }
 
 /* The scales of the states that errors of the step just made are measured by. */
 static const hs_real *error_scales(const hs_run *run) {
-  return run->method->kind == HS_RADAU ? run->radau.scales : run->scales;
+  return run->method->kind == HS_RADAU ? run->step.radau.scales : run->sizes.scales;
 }
 
 /* The same with a look at what the flow is computed from; 0 where it has no value. See hsdsl/engine/simulate/control.py. */
 static const hs_real *closer_scales(hs_run *run, hs_real h) {
-  hs_resolved *const by = &run->radau.resolved;
+  hs_resolved *const by = &run->step.radau.resolved;
   const hs_mode_state *const here = &run->here;
   if (run->method->kind == HS_RADAU) {
-    look_closer(run, blocks_of(here->table), &run->radau, here->t, h, run->x, run->scales);
-    return run->radau.scales;
+    look_closer(run, blocks_of(here->table), &run->step.radau, here->t, h, run->x, run->sizes.scales);
+    return run->step.radau.scales;
   }
-  return resolve(run, by, here->dimension, here->t, h, run->x, run->scales, 0) ? 0 : by->found;
+  return resolve(run, by, here->dimension, here->t, h, run->x, run->sizes.scales, 0) ? 0 : by->found;
 }
 
 static int is_implicit(const hs_method *method) { return method->kind == HS_RADAU; }
@@ -122,19 +123,20 @@ static int is_implicit(const hs_method *method) { return method->kind == HS_RADA
 /* Give the arrays of the method their places. */
 static void lay_out_method(hs_run *run, hs_store *store) {
   if (run->method->kind == HS_TAYLOR)
-    run->lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
-  if (run->method->kind == HS_RADAU) lay_out_radau(&run->radau, run->width, run->model->factors, run->model->varied, store);
+    run->step.lines = numbers(store, (int64_t)run->model->lines * series_length(run->method));
+  if (run->method->kind == HS_RADAU)
+    lay_out_radau(&run->step.radau, run->width, run->model->factors, run->model->varied, store);
 }
 
 /* Forget what a method knows of the place it was at: the mode or the segment of the inputs is another one. */
 static void forget_steps(hs_run *run) {
-  run->expanded = 0;
-  if (run->method->kind == HS_RADAU) begin_stretch(&run->radau, blocks_of(run->here.table));
+  run->step.expanded = 0;
+  if (run->method->kind == HS_RADAU) begin_stretch(&run->step.radau, blocks_of(run->here.table));
 }
 
 /* Error ratio of a step of length h to run->z, errors compared with these scales. */
 HS_INLINE hs_real ratio_with(hs_run *run, hs_real h, const hs_real *scales) {
-  return ratio_to(&run->control, h, run->error, run->z, scales, run->scales, run->here.dimension);
+  return ratio_to(&run->control, h, run->step.error, run->z, scales, run->sizes.scales, run->here.dimension);
 }
 
 /* The same with a look at what the flow is computed from; see hsdsl/engine/simulate/control.py. */
@@ -158,15 +160,15 @@ HS_INLINE hs_real error_ratio(hs_run *run, hs_real h) {
 
 /* Cut a step to what the surfaces of the mode allow. */
 static hs_real within_reach(const hs_run *run, hs_real h) {
-  const hs_real reach = run->reach[run->here.mode];
+  const hs_real reach = run->reach.step[run->here.mode];
   return reach > 0 ? hs_min(h, reach) : h;
 }
 
 /* Learn that surfaces vary too fast for a step. */
-static void too_fast(hs_run *run, hs_real tried) { run->reach[run->here.mode] = tried / 2; }
+static void too_fast(hs_run *run, hs_real tried) { run->reach.step[run->here.mode] = tried / 2; }
 
 /* Learn that they do not for another one. */
 static void slow_enough(hs_run *run, hs_real taken) {
-  hs_real *const reach = &run->reach[run->here.mode];
+  hs_real *const reach = &run->reach.step[run->here.mode];
   if (*reach > 0 && taken >= *reach) *reach = 2 * taken;
 }

@@ -38,8 +38,8 @@ HS_INLINE hs_real joined(hs_real scale, hs_real size) { return scale < 0 ? -hs_m
 
 /* Value of surface k at a point. */
 static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r) {
-  if (run->here.table->values(run->here.p, t, x, run->values)) return RAISED;
-  *r = run->values[k];
+  if (run->here.table->values(run->here.p, t, x, run->surfaces.values)) return RAISED;
+  *r = run->surfaces.values[k];
   return 0;
 }
 
@@ -63,10 +63,10 @@ static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time
   const hs_sparse *const row = &here->table->gradients[k];
   hs_real *const g = run->gradient;
   if (!hs_call(&row->values, here->p, t, x, g) && hs_finite(sum_of(g, row->count))) {
-    const int push = is_push(run, k), scaled = entry || run->active_surfaces[k];
+    const int push = is_push(run, k), scaled = entry || run->surfaces.active[k];
     for (int i = 0; i < row->count; i++) {
       const int s = row->place[i] - 1;
-      const hs_real size = s < 0 ? fabs(t) : push ? state_size(run, s) : scaled ? fabs(run->scale[s]) : 0.0;
+      const hs_real size = s < 0 ? fabs(t) : push ? state_size(run, s) : scaled ? fabs(run->sizes.scale[s]) : 0.0;
       total = total + fabs(g[i]) * (s < 0 ? size : hs_max(fabs(x[s]), size));
     }
   }
@@ -75,8 +75,8 @@ static hs_real bound_from(hs_run *run, const hs_real *magnitudes, int k, hs_time
 
 /* Below this surface k counts as zero at a point; where its gradient has no value only the sides count. */
 static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int entry, hs_real *noise) {
-  if (magnitudes_at(run, t, x, run->magnitudes)) return RAISED;
-  *noise = bound_from(run, run->magnitudes, k, t, x, entry);
+  if (magnitudes_at(run, t, x, run->surfaces.magnitudes)) return RAISED;
+  *noise = bound_from(run, run->surfaces.magnitudes, k, t, x, entry);
   return 0;
 }
 
@@ -86,41 +86,40 @@ enum { AT_START = 1, AT_END = 2 };
 static int bound_at(hs_run *run, int k, int end, hs_real *noise) {
   const hs_time t = end == AT_END ? run->span.t1 : run->span.t;
   const hs_real *const x = end == AT_END ? run->z : run->x;
-  hs_real *const magnitudes = end == AT_END ? run->ended : run->begun;
-  if (!(run->weighed & end) && magnitudes_at(run, t, x, magnitudes)) return RAISED;
-  run->weighed |= end;
+  hs_real *const magnitudes = end == AT_END ? run->surfaces.ended : run->surfaces.begun;
+  if (!(run->surfaces.weighed & end) && magnitudes_at(run, t, x, magnitudes)) return RAISED;
+  run->surfaces.weighed |= end;
   *noise = bound_from(run, magnitudes, k, t, x, 0);
   return 0;
 }
 
-/* Look at the surfaces on entry, whose values are run->ahead: mark in run->beyond those the state is beyond, and note
-   those it stands on. A surface that the flow passes within the time `since` counts as stood on. So does one that the
-   state was not beyond when it was reset, before it waited in a strip. Where an input `jumped`, one that run->beyond
-   marks as not reached before counts as beyond. It stood on others, off them by run->stood: no further off them it still
-   does. */
+/* Look at run->surfaces on entry, whose values are `ahead`: mark as `beyond` those the state is beyond, and note those it
+   stands on. A surface that the flow passes within the time `since` counts as stood on. So does one that the state was
+   not beyond when it was reset, before it waited in a strip. Where an input `jumped`, one marked `beyond`, as not reached
+   before, counts as beyond. The state stood on others, off them by `stood`: no further off them it still does. */
 static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_time reset_at) {
-  const hs_real *const values = run->ahead, *const then = reset_at < t ? run->noise : values;
-  int *const beyond = run->beyond;
-  if (run->here.table->surfaces && magnitudes_at(run, t, run->x, run->magnitudes)) return RAISED;
-  if (reset_at < t && run->here.table->values(run->here.p, reset_at, run->x, run->noise)) return RAISED;
+  const hs_real *const values = run->surfaces.ahead, *const then = reset_at < t ? run->surfaces.noise : values;
+  int *const beyond = run->surfaces.beyond;
+  if (run->here.table->surfaces && magnitudes_at(run, t, run->x, run->surfaces.magnitudes)) return RAISED;
+  if (reset_at < t && run->here.table->values(run->here.p, reset_at, run->x, run->surfaces.noise)) return RAISED;
   for (int k = 0; k < run->here.table->surfaces; k++) {
     hs_real noise, rate;
     const int inside = jumped && beyond[k];
-    run->active_surfaces[k] = run->emerging[k] = beyond[k] = 0;
-    noise = hs_max(bound_from(run, run->magnitudes, k, t, run->x, 1), fabs(run->stood[k]));
-    run->stood[k] = 0.0;
+    run->surfaces.active[k] = run->surfaces.emerging[k] = beyond[k] = 0;
+    noise = hs_max(bound_from(run, run->surfaces.magnitudes, k, t, run->x, 1), fabs(run->surfaces.stood[k]));
+    run->surfaces.stood[k] = 0.0;
     if (since != 0 && fabs(values[k]) > noise) {
       if (hs_call(&run->here.table->rates[k], run->here.p, t, run->x, &rate)) return RAISED;
       noise = hs_max(noise, fabs(rate) * since);
     }
     if (values[k] > noise && !(then[k] > noise)) {
-      run->active_surfaces[k] = 1, run->here.active++;
+      run->surfaces.active[k] = 1, run->here.active++;
       if (hs_call(&run->here.table->rates[k], run->here.p, t, run->x, &rate)) return RAISED;
-      if (rate < 0) run->emerging[k] = 1, run->here.emerging++;
+      if (rate < 0) run->surfaces.emerging[k] = 1, run->here.emerging++;
     } else if (values[k] > noise || (inside && values[k] >= -noise))
       beyond[k] = 1;
     else if (values[k] >= -noise)
-      run->active_surfaces[k] = 1, run->here.active++;
+      run->surfaces.active[k] = 1, run->here.active++;
   }
   return 0;
 }
@@ -128,13 +127,13 @@ static int enter_surfaces(hs_run *run, hs_time t, hs_real since, int jumped, hs_
 /* Mark the edges without an `if` whose surfaces the state has not reached, to the round-off that counts on entry. */
 static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside) {
   const hs_mode *mode = run->here.table;
-  if (mode->values(run->here.p, t, x, run->values)) return RAISED;
-  const int raised = magnitudes_at(run, t, x, run->magnitudes);
+  if (mode->values(run->here.p, t, x, run->surfaces.values)) return RAISED;
+  const int raised = magnitudes_at(run, t, x, run->surfaces.magnitudes);
   for (int k = 0; k < mode->surfaces; k++) {
     inside[k] = 0;
     if (k >= mode->edges || mode->edge[k].conditional) continue;
     if (raised) return RAISED;
-    inside[k] = run->values[k] < -bound_from(run, run->magnitudes, k, t, x, 1);
+    inside[k] = run->surfaces.values[k] < -bound_from(run, run->surfaces.magnitudes, k, t, x, 1);
   }
   return 0;
 }
@@ -142,18 +141,19 @@ static int mark_inside(hs_run *run, hs_time t, const hs_real *x, int *inside) {
 /* Forget the surfaces that the state stood on and has left: inwards, or outwards where `if` was false. */
 static void leave(hs_run *run, hs_time t, const hs_real *x) {
   const hs_mode *const mode = run->here.table;
-  if (mode->values(run->here.p, t, x, run->values)) return;
-  const int raised = magnitudes_at(run, t, x, run->magnitudes);
+  if (mode->values(run->here.p, t, x, run->surfaces.values)) return;
+  const int raised = magnitudes_at(run, t, x, run->surfaces.magnitudes);
   for (int k = 0; !raised && k < mode->surfaces; k++) {
-    if (!run->active_surfaces[k]) continue;
-    if (fabs(run->values[k]) > bound_from(run, run->magnitudes, k, t, x, 0))
-      run->active_surfaces[k] = 0, run->here.active--;
+    if (!run->surfaces.active[k]) continue;
+    if (fabs(run->surfaces.values[k]) > bound_from(run, run->surfaces.magnitudes, k, t, x, 0))
+      run->surfaces.active[k] = 0, run->here.active--;
   }
   for (int k = 0; run->here.emerging && k < mode->surfaces; k++) {
     hs_real rate = 0.0;
-    if (!run->emerging[k]) continue;
-    if (!(run->values[k] <= 0) && (hs_call(&run->here.table->rates[k], run->here.p, t, x, &rate) || rate < 0)) continue;
-    run->emerging[k] = 0, run->here.emerging--;
+    if (!run->surfaces.emerging[k]) continue;
+    if (!(run->surfaces.values[k] <= 0) && (hs_call(&run->here.table->rates[k], run->here.p, t, x, &rate) || rate < 0))
+      continue;
+    run->surfaces.emerging[k] = 0, run->here.emerging--;
   }
 }
 
@@ -199,23 +199,25 @@ static int too_late(const hs_run *run, int k, hs_time t, hs_real since) {
   return run->here.table->edge[k].strict && t + since >= run->until;
 }
 
-/* Mark in run->tied, beside the edges that are marked, those on whose guards the state stands, with the flow pointing out
-   and `if` true, which are not only touched. On the guard means to round-off, or within the time `since`: sums of steps
-   are no more exact than that. */
+/* Mark in run->event.tied, beside the edges that are marked, those on whose guards the state stands, with the flow
+   pointing out and `if` true, which are not only touched. On the guard means to round-off, or within the time `since`:
+   sums of steps are no more exact than that. */
 static void standing(hs_run *run, hs_time t, const hs_real *x, hs_real since) {
   const hs_mode *const mode = run->here.table;
-  int known = 0; /* whether run->values and run->magnitudes are those at x */
+  int known = 0; /* whether run->surfaces.values and run->surfaces.magnitudes are those at x */
   for (int k = 0; k < mode->edges; k++) {
     hs_real rate;
-    if (run->tied[k]) continue;
-    if (!known && (mode->values(run->here.p, t, x, run->values) || magnitudes_at(run, t, x, run->magnitudes))) return;
+    if (run->event.tied[k]) continue;
+    if (!known && (mode->values(run->here.p, t, x, run->surfaces.values) ||
+                   magnitudes_at(run, t, x, run->surfaces.magnitudes)))
+      return;
     known = 1;
     if (releases(run, k) || too_late(run, k, t, since) || hs_call(&mode->rates[k], run->here.p, t, x, &rate)) continue;
-    const hs_real noise = bound_from(run, run->magnitudes, k, t, x, 0);
-    const int near = fabs(run->values[k]) <= hs_max(noise, rate * since);
+    const hs_real noise = bound_from(run, run->surfaces.magnitudes, k, t, x, 0);
+    const int near = fabs(run->surfaces.values[k]) <= hs_max(noise, rate * since);
     if (!near || !points_out(run, k, t, x, rate)) continue;
-    if (turns_back(run, k, t, x, rate, since, noise - run->values[k])) continue;
-    run->tied[k] = condition(run, k, t, x) == 1;
+    if (turns_back(run, k, t, x, rate, since, noise - run->surfaces.values[k])) continue;
+    run->event.tied[k] = condition(run, k, t, x) == 1;
   }
 }
 
@@ -332,7 +334,7 @@ static int interpolate_part(hs_run *run, hs_functions *functions, const hs_inter
   hs_curves *const curves = &run->curves;
   const int part = curves->parts, count = curves->count, nodes = by->degree + 1;
   const hs_real start = curves->start[part], width = curves->width[part];
-  hs_real *const rows = run->rows, *const checks = rows + nodes * count;
+  hs_real *const rows = run->curves.rows, *const checks = rows + nodes * count;
   for (int i = 0; i < nodes; i++)
     if (functions(run, start + width * by->nodes[i], rows + i * count)) return RAISED;
   for (int i = 0; i < HS_TESTS; i++)
@@ -362,8 +364,8 @@ static void straighten(hs_run *run, int degree) {
   for (int k = 0; k < count; k++) {
     if (curves->certain[part * count + k]) continue;
     hs_real *const c = coefficients_of(curves, part, k);
-    c[0] = run->rows[k];
-    c[1] = run->rows[degree * count + k] - run->rows[k];
+    c[0] = run->curves.rows[k];
+    c[1] = run->curves.rows[degree * count + k] - run->curves.rows[k];
     *degree_of(curves, part, k) = 1;
     *off_of(curves, part, k) = 0;
   }
@@ -371,7 +373,7 @@ static void straighten(hs_run *run, int degree) {
 
 /* Interpolate `count` functions of s in [0, 1] by pieces, with residuals below a share of their largest value, or
    `allowed` more: to run->curves. Not `far`, only to where the first of them is positive. It may refuse what varies too
-   fast: run->refused says so, and the step is to be shorter. */
+   fast: run->reach.refused says so, and the step is to be shorter. */
 static int interpolated(hs_run *run, hs_functions *functions, int count, const hs_interpolation *by,
                         hs_allowed *allowed, int far, int most, int may_refuse) {
   struct {
@@ -388,7 +390,7 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
     curves->start[curves->parts] = start, curves->width[curves->parts] = width;
     if (interpolate_part(run, functions, by, allowed, &settled)) return RAISED;
     if (may_refuse && !settled && (curves->parts >= most || (start == 0 && halvings == MOST_FIRST)))
-      return run->refused = 1, RAISED;
+      return run->reach.refused = 1, RAISED;
     if (!settled && halvings < MOST_SPLITS && curves->parts < most) {
       const hs_real half = width / 2;
       parts[open].start = start + half, parts[open].width = half, parts[open++].halvings = halvings + 1;
@@ -397,7 +399,7 @@ static int interpolated(hs_run *run, hs_functions *functions, int count, const h
     }
     if (!settled) straighten(run, by->degree);
     curves->parts++;
-    if (!far && run->rows[by->degree * count] > 0) break;
+    if (!far && run->curves.rows[by->degree * count] > 0) break;
   }
   return 0;
 }
@@ -423,13 +425,13 @@ static int affine_curves(hs_run *run, hs_real share) {
   const hs_mode *mode = run->here.table;
   const hs_span *span = &run->span;
   hs_curves *const found = &run->curves;
-  if (mode->values(run->here.p, span->t, run->x, run->values)) return RAISED;
+  if (mode->values(run->here.p, span->t, run->x, run->surfaces.values)) return RAISED;
   begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
     hs_real *const c = coefficients_of(found, 0, k);
     const hs_sparse *const row = &mode->gradients[k];
     if (hs_call(&row->values, run->here.p, span->t, run->x, run->gradient)) return RAISED;
-    c[0] = run->values[k];
+    c[0] = run->surfaces.values[k];
     const hs_real sizes =
         affine_curve(&span->piece, run->width, span->h, row, run->gradient, c, degree_of(found, 0, k));
     *off_of(found, 0, k) = share * sizes;
@@ -441,7 +443,7 @@ static int affine_curves(hs_run *run, hs_real share) {
 /* Give up following a mode's surfaces: visits beyond them may be missed from here on. */
 static void lose(hs_run *run) {
   const hs_curves *curves = &run->curves;
-  run->lost[run->here.mode] = 1;
+  run->reach.lost[run->here.mode] = 1;
   for (int k = 0; k < curves->count; k++) {
     int certain = 1;
     for (int part = 0; part < curves->parts; part++) certain &= curves->certain[part * curves->count + k];
@@ -453,7 +455,7 @@ static void lose(hs_run *run) {
 static int curves_along(hs_run *run) {
   const hs_interpolation *by = run->task->interpolation;
   if (run->here.table->affine) return affine_curves(run, by->share);
-  const int lost = run->lost[run->here.mode], most = lost ? LOST_IN_A_STEP : IN_A_STEP;
+  const int lost = run->reach.lost[run->here.mode], most = lost ? LOST_IN_A_STEP : IN_A_STEP;
   const int refuse = run->span.h * (lost ? LOST_SHORTEST : SHORTEST) > run->until;
   if (interpolated(run, surfaces_along, run->here.table->surfaces, by, noise_at_ends, 1, most, refuse)) return RAISED;
   if (!refuse && run->curves.parts >= most) lose(run);

@@ -4,11 +4,11 @@
 static int series_length(const hs_method *method) { return method->order + 2; }
 
 /* Coefficients of state s. */
-static const hs_real *series_of(const hs_run *run, int s) { return run->lines + (s + 1) * series_length(run->method); }
+static const hs_real *series_of(const hs_run *run, int s) { return run->step.lines + (s + 1) * series_length(run->method); }
 
 /* Whether the coefficients are those along the flow through (t, run->x). */
 static int is_expanded(const hs_run *run, hs_time t) {
-  if (!run->expanded || run->lines[0] != (hs_real)t) return 0;
+  if (!run->step.expanded || run->step.lines[0] != (hs_real)t) return 0;
   for (int s = 0; s < run->here.dimension; s++)
     if (series_of(run, s)[0] != run->x[s]) return 0;
   return 1;
@@ -17,8 +17,8 @@ static int is_expanded(const hs_run *run, hs_time t) {
 /* Compute the coefficients along the flow through (t, run->x), shared by trials from there. Not 0 where it has none. */
 static int expand(hs_run *run, hs_time t) {
   if (is_expanded(run, t)) return 0;
-  run->expanded = !run->here.table->series(run->here.p, run->method->order, t, run->x, run->lines);
-  return !run->expanded;
+  run->step.expanded = !run->here.table->series(run->here.p, run->method->order, t, run->x, run->step.lines);
+  return !run->step.expanded;
 }
 
 static int taylor_step(hs_run *run, hs_time t, hs_real h) {
@@ -53,7 +53,7 @@ HS_INLINE void taylor_error(hs_run *run, const int n, hs_real h) {
     const hs_real *c = series_of(run, s);
     hs_real moved = order * (c[order] * powers[order]);
     for (int m = order - 1; m > 0; m--) moved = m * (c[m] * powers[m]) + moved;
-    run->error[s] = moved;
+    run->step.error[s] = moved;
   }
-  left_of(run->error, run->end, n, order, h);
+  left_of(run->step.error, run->end, n, order, h);
 }

@@ -10,50 +10,50 @@ static int goes_before(const hs_mode *mode, int a, int b) {
 
 /* Let no edge be marked. */
 static void untie(hs_run *run) {
-  for (int k = 0; k < run->here.table->edges; k++) run->tied[k] = 0;
+  for (int k = 0; k < run->here.table->edges; k++) run->event.tied[k] = 0;
 }
 
 /* Choose which of several crossings goes: the earliest; of tied ones the highest priority, then the file's order.
    Tied are also guards that the earliest crossing's point stands on. The chosen edge goes from that point. */
 static void choose(hs_run *run, int count) {
   const hs_mode *mode = run->here.table;
-  hs_crossing *first = &run->crossings[0];
+  hs_crossing *first = &run->event.crossings[0];
   for (int i = 1; i < count; i++)
-    if (run->crossings[i].time < first->time) first = &run->crossings[i];
+    if (run->event.crossings[i].time < first->time) first = &run->event.crossings[i];
   const hs_real since = tie(first->time);
   hs_real depth = first->depth;
   int chosen = first->edge;
   untie(run);
   for (int i = 0; i < count; i++)
-    if (run->crossings[i].time - first->time <= since) run->tied[run->crossings[i].edge] = 2 + i;
+    if (run->event.crossings[i].time - first->time <= since) run->event.tied[run->event.crossings[i].edge] = 2 + i;
   standing(run, first->time, first->state, since);
   for (int k = 0; k < mode->edges; k++)
-    if (run->tied[k] && goes_before(mode, k, chosen)) chosen = k;
-  if (run->tied[chosen] >= 2) depth = run->crossings[run->tied[chosen] - 2].depth;
-  run->alternatives_count = 0;
+    if (run->event.tied[k] && goes_before(mode, k, chosen)) chosen = k;
+  if (run->event.tied[chosen] >= 2) depth = run->event.crossings[run->event.tied[chosen] - 2].depth;
+  run->event.alternatives_count = 0;
   for (int k = 0; k < mode->edges; k++)
-    if (run->tied[k] && k != chosen) run->alternatives[run->alternatives_count++] = k;
-  run->chosen = *first;
-  run->chosen.edge = chosen;
-  run->chosen.depth = depth;
+    if (run->event.tied[k] && k != chosen) run->event.alternatives[run->event.alternatives_count++] = k;
+  run->event.chosen = *first;
+  run->event.chosen.edge = chosen;
+  run->event.chosen.depth = depth;
 }
 
-/* Apply the chosen crossing's reset to the values before the jump, sizes of their numbers in `scale`: the state behind
-   it to run->after, and to run->both the sizes of the numbers it came from. Not 0 where it has no finite value. */
+/* Apply the chosen crossing's reset to the values before the jump, sizes of their numbers in `scale`: the state after it
+   to run->event.after, and to run->sizes.both the sizes of the numbers it came from. Not 0 where it has no finite value. */
 static int reset(hs_run *run, const hs_real *scale) {
-  const hs_crossing *crossing = &run->chosen;
+  const hs_crossing *crossing = &run->event.chosen;
   const hs_edge *edge = &run->here.table->edge[crossing->edge];
   const int n = run->here.dimension, to = edge->target_dimension;
-  hs_real *const sizes = run->error;
+  hs_real *const sizes = run->step.error;
   const hs_real *const x = crossing->state;
-  if (hs_changed(edge, &edge->reset, run->here.p, crossing->time, x, x, run->after)) return 1;
-  if (!all_finite(run->after, to)) return 1;
+  if (hs_changed(edge, &edge->reset, run->here.p, crossing->time, x, x, run->event.after)) return 1;
+  if (!all_finite(run->event.after, to)) return 1;
   HS_MOVE(run, move_reset(run));
-  copy(run->both, crossing->state, n);
-  copy(run->both + n, scale, n);
-  if (hs_changed(edge, &edge->spread, run->here.p, crossing->time, run->both, scale, sizes) || !all_finite(sizes, to))
-    for (int s = 0; s < to; s++) sizes[s] = fabs(run->after[s]); /* where it is infinitely steep, no more is known */
-  copy(run->both, sizes, to);
+  copy(run->sizes.both, crossing->state, n);
+  copy(run->sizes.both + n, scale, n);
+  if (hs_changed(edge, &edge->spread, run->here.p, crossing->time, run->sizes.both, scale, sizes) || !all_finite(sizes, to))
+    for (int s = 0; s < to; s++) sizes[s] = fabs(run->event.after[s]); /* where it is infinitely steep, no more is known */
+  copy(run->sizes.both, sizes, to);
   return 0;
 }
 
@@ -138,9 +138,9 @@ int hs_let_wait(const hs_model *model, hs_tail *tail, hs_task *task, const hs_mo
 static const hs_real *decisive(hs_run *run) {
   const hs_mode *const mode = run->here.table;
   if (!mode->idle) return run->x;
-  copy(run->error, run->x, run->here.dimension);
-  for (int i = 0; i < mode->idle; i++) run->error[mode->idles[i]] = 0.0;
-  return run->error;
+  copy(run->step.error, run->x, run->here.dimension);
+  for (int i = 0; i < mode->idle; i++) run->step.error[mode->idles[i]] = 0.0;
+  return run->step.error;
 }
 
 static uint64_t hash_of(int mode, const hs_real *x, int n) {
@@ -200,20 +200,20 @@ static void choose_entry(hs_run *run, const int *beyond, hs_time t) {
   int chosen = -1;
   for (int k = 0; k < mode->edges; k++)
     if (beyond[k] && (chosen < 0 || goes_before(mode, k, chosen))) chosen = k;
-  run->alternatives_count = 0;
+  run->event.alternatives_count = 0;
   for (int k = 0; k < mode->edges; k++)
-    if (beyond[k] && k != chosen) run->alternatives[run->alternatives_count++] = k;
-  run->chosen.edge = chosen;
-  run->chosen.theta = run->chosen.depth = 0.0;
-  run->chosen.time = t;
-  run->chosen.state = run->x;
-  run->chosen.piece = 0;
+    if (beyond[k] && k != chosen) run->event.alternatives[run->event.alternatives_count++] = k;
+  run->event.chosen.edge = chosen;
+  run->event.chosen.theta = run->event.chosen.depth = 0.0;
+  run->event.chosen.time = t;
+  run->event.chosen.state = run->x;
+  run->event.chosen.piece = 0;
 }
 
-/* Enter a mode at (t, run->x), sizes in run->scale, and make the transitions that fire at once.
+/* Enter a mode at (t, run->x), sizes in run->sizes.scale, and make the transitions that fire at once.
    A surface that the flow passes within the time `since` counts as stood on: tied transitions share one point. So does
    one that moved past the state while it waited in a strip, where it was reset before t, at `reset_at`. One of an edge
-   that run->beyond marks was not reached before an input `jumped`: on it counts as beyond. */
+   that run->surfaces.beyond marks was not reached before an input `jumped`: on it counts as beyond. */
 static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here, hs_real since, int jumped,
                  hs_time reset_at) {
   forget(&run->task->visited);
@@ -221,43 +221,43 @@ static int enter(hs_run *run, int mode, int dimension, hs_time t, int from_here,
     const hs_mode_state before = run->here;
     place(run, mode, dimension, t, from_here ? &before : 0);
     const hs_mode *table = run->here.table;
-    if (run->full_queue >= 0) {
-      run->task->stop.edge = run->full_queue;
+    if (run->written.full_queue >= 0) {
+      run->task->stop.edge = run->written.full_queue;
       return stopped(run, HS_WAITING, t);
     }
     if (table->final) return stopped(run, HS_FINAL, t);
     if (make_room(run)) return stopped(run, HS_INTERRUPTED, t);
     if (visit(&run->task->visited, run->width, mode, decisive(run), dimension)) return stopped(run, HS_ZENO, t);
-    if (table->values(run->here.p, t, run->x, run->ahead) || enter_surfaces(run, t, since, jumped, reset_at))
+    if (table->values(run->here.p, t, run->x, run->surfaces.ahead) || enter_surfaces(run, t, since, jumped, reset_at))
       return stopped(run, HS_HERE_NOT_FINITE, t);
-    if (!all_finite(run->ahead, table->surfaces)) return stopped(run, HS_HERE_NOT_FINITE, t);
+    if (!all_finite(run->surfaces.ahead, table->surfaces)) return stopped(run, HS_HERE_NOT_FINITE, t);
     int fires = 0;
     for (int k = 0; k < table->edges; k++) {
-      run->beyond[k] = run->beyond[k] && !table->edge[k].conditional;
-      fires |= run->beyond[k];
+      run->surfaces.beyond[k] = run->surfaces.beyond[k] && !table->edge[k].conditional;
+      fires |= run->surfaces.beyond[k];
     }
     if (!fires) {
       for (int k = table->edges; k < table->surfaces; k++)
-        if (run->beyond[k]) return entered_outside(run, k, t);
+        if (run->surfaces.beyond[k]) return entered_outside(run, k, t);
       return GOES_ON;
     }
     if (limit_reached(run)) return stopped(run, HS_LIMIT, t);
-    if (run->interrupted) return stopped(run, HS_INTERRUPTED, t);
-    choose_entry(run, run->beyond, t);
-    if (reset(run, run->scale)) {
-      run->task->stop.edge = run->chosen.edge;
+    if (run->poll.interrupted) return stopped(run, HS_INTERRUPTED, t);
+    choose_entry(run, run->surfaces.beyond, t);
+    if (reset(run, run->sizes.scale)) {
+      run->task->stop.edge = run->event.chosen.edge;
       return stopped(run, HS_RESET_NOT_FINITE, t);
     }
-    record(run, &run->chosen, t, run->after, 1);
-    mode = table->edge[run->chosen.edge].target;
-    dimension = table->edge[run->chosen.edge].target_dimension;
-    copy(run->x, run->after, dimension);
-    copy(run->scale, run->both, dimension);
+    record(run, &run->event.chosen, t, run->event.after, 1);
+    mode = table->edge[run->event.chosen.edge].target;
+    dimension = table->edge[run->event.chosen.edge].target_dimension;
+    copy(run->x, run->event.after, dimension);
+    copy(run->sizes.scale, run->sizes.both, dimension);
   }
 }
 
 /* Whether the run has flowed between its last transition and a time. */
-static int has_flowed(const hs_run *run, hs_time t) { return !run->jump || t > made_before(run, 0)->resumed; }
+static int has_flowed(const hs_run *run, hs_time t) { return !run->written.jump || t > made_before(run, 0)->resumed; }
 
 /* Count a transition that led to run->x; see the text. */
 static int comes_back(hs_run *run, int flowed) {
@@ -276,8 +276,8 @@ static int standing_on(hs_run *run) {
   untie(run);
   standing(run, run->here.t, run->x, tie(run->here.t));
   for (int k = 0; k < run->here.table->edges; k++) {
-    if (!run->tied[k]) continue;
-    hs_crossing *crossing = &run->crossings[count++];
+    if (!run->event.tied[k]) continue;
+    hs_crossing *crossing = &run->event.crossings[count++];
     crossing->edge = k;
     crossing->theta = crossing->depth = 0.0;
     crossing->time = run->here.t;
@@ -288,16 +288,16 @@ static int standing_on(hs_run *run) {
 }
 
 /* The sizes of the numbers that a point between x and z, which `stays` on a guard or does not, is computed from, to
-   run->landed. */
+   run->sizes.landed. */
 static void sizes(hs_run *run, const hs_real *x, const hs_real *z, int stays) {
   for (int s = 0; s < run->here.dimension; s++) {
-    const hs_real kept = stays || z[s] == run->entered[s] ? run->scale[s] : 0.0;
-    run->landed[s] = joined(kept, hs_max(fabs(x[s]), fabs(z[s])));
+    const hs_real kept = stays || z[s] == run->entered[s] ? run->sizes.scale[s] : 0.0;
+    run->sizes.landed[s] = joined(kept, hs_max(fabs(x[s]), fabs(z[s])));
   }
 }
 
 static int in_strip(hs_run *run, hs_reason reason, hs_time t) {
-  run->task->stop.edge = run->chosen.edge;
+  run->task->stop.edge = run->event.chosen.edge;
   return stopped(run, reason, t);
 }
 
@@ -306,9 +306,9 @@ static int continued(hs_run *run, int jumped) {
   const hs_time t = run->here.t;
   const hs_mode_state before = run->here;
   if (jumped) {
-    if (mark_inside(run, t, run->x, run->beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
+    if (mark_inside(run, t, run->x, run->surfaces.beyond)) return stopped(run, HS_HERE_NOT_FINITE, t);
     for (int k = 0; k < run->here.table->surfaces; k++)
-      run->stood[k] = run->active_surfaces[k] && !run->emerging[k] ? run->values[k] : 0.0;
+      run->surfaces.stood[k] = run->surfaces.active[k] && !run->surfaces.emerging[k] ? run->surfaces.values[k] : 0.0;
     return enter(run, run->here.mode, run->here.dimension, t, 0, 0.0, 1, t);
   }
   place(run, run->here.mode, run->here.dimension, t, 0);
@@ -323,4 +323,4 @@ static int go_on(hs_run *run) {
 }
 
 /* Whether a run pauses that is to pause behind its next transition. */
-static int pauses(const hs_run *run) { return run->after_jump && run->jump > run->jumps_before; }
+static int pauses(const hs_run *run) { return run->pausing.after_jump && run->written.jump > run->pausing.jumps_before; }
