@@ -125,7 +125,8 @@ def make_radau(of: Blocks, tolerance: Number, soon: Number, arithmetic: Arithmet
         has_jacobian=False, stepped=False, factored=False, stale=False, lifted=False,
         jacobian_at=zero, factored_for=zero, start=zero, length=zero, rate=zero + 1, eta=zero + 1,
         rows=room(0), fresh=room(0), lasting=room(of.width), scales=(), least=room(of.width),
-        z=rooms(3), last=rooms(3), transformed=rooms(3), change=rooms(3), slopes=rooms(3), right=rooms(3),
+        z=rooms(3), last=rooms(3), ended=room(of.width), whole=False,
+        transformed=rooms(3), change=rooms(3), slopes=rooms(3), right=rooms(3),
         largest=room(of.width), error=room(of.width), at=room(of.width), factors=factors,
         resolved=make_resolved(of.width, tolerance, arithmetic),
     )  # fmt: skip

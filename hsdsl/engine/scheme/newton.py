@@ -38,7 +38,7 @@ class Radau:
     factored: bool  # whether ``factors`` are those of ``rows`` for the length ``factored_for``
     jacobian_at: Time  # when ``rows`` were evaluated
     factored_for: Number
-    start: Time  # of the step whose increments are in ``last``
+    start: Time  # of the step whose polynomial is in ``last``
     length: Number  # of that step
     rate: Number  # convergence rate theta: the ratio of the last two changes; 1 where it is not known
     eta: Number  # theta / (1 - theta): the sum of all further changes, relative to the last one
@@ -50,7 +50,9 @@ class Radau:
     scales: Vector  # with which the last step was solved
     least: Room
     z: list[Room]  # increments Z
-    last: list[Room]  # Z of the last solved step
+    last: list[Room]  # coefficients of the polynomial of the last solved step, by its share
+    ended: Room  # increment at the end of that step
+    whole: bool  # whether ``z`` are of that step, not of a part of it
     transformed: list[Room]  # increments transformed by the inverse of T: W = T^-1 Z
     change: list[Room]  # what an iteration adds to ``transformed``
     slopes: list[Room]  # the flow at the stages

@@ -41,6 +41,7 @@ def begin_stretch(steps: Radau, of: Blocks) -> None:
     for s in range(of.n, of.width):  # these do not flow
         steps.largest[s] = 0
         steps.error[s] = 0
+        steps.ended[s] = 0
         for i in range(3):
             steps.z[i][s] = 0
             steps.last[i][s] = 0
@@ -147,14 +148,15 @@ def starting_values(of: Blocks, known: Collocation, steps: Radau, t: Time, h: Nu
     u, v, w = steps.transformed[0], steps.transformed[1], steps.transformed[2]
     behind = steps.stepped and t == steps.start + steps.length
     if behind or (steps.stepped and t == steps.start):
-        e, f, g = steps.last[0], steps.last[1], steps.last[2]
+        e, f, g, ended = steps.last[0], steps.last[1], steps.last[2], steps.ended
+        if not behind:
+            ended = steps.change[0]
+            for s in range(of.n):
+                ended[s] = 0
         share, base = h / steps.length, 1 if behind else 0
         first, second, third = base + known.node[0] * share, base + known.node[1] * share, base + known.node[2] * share
         for s in each(of.n):
-            a = weighted(known.power[0], e[s], f[s], g[s])
-            b = weighted(known.power[1], e[s], f[s], g[s])
-            c = weighted(known.power[2], e[s], f[s], g[s])
-            end = g[s] if behind else 0
+            a, b, c, end = e[s], f[s], g[s], ended[s]
             i = first * (a + first * (b + first * c)) - end
             j = second * (a + second * (b + second * c)) - end
             k = third * (a + third * (b + third * c)) - end
@@ -276,9 +278,15 @@ def radau_step(
         steps.stepped = True
         steps.start = t
         steps.length = h
-        for i in range(3):
-            for s in range(of.n):
-                steps.last[i][s] = steps.z[i][s]
+        steps.whole = True
+        u, v, w = steps.z[0], steps.z[1], steps.z[2]
+        e, f, g, ended = steps.last[0], steps.last[1], steps.last[2], steps.ended
+        for s in each(of.n):
+            i, j, k = u[s], v[s], w[s]
+            e[s] = weighted(known.power[0], i, j, k)
+            f[s] = weighted(known.power[1], i, j, k)
+            g[s] = weighted(known.power[2], i, j, k)
+            ended[s] = k
         if steps.tolerance > 0:
             estimate(here, of, known, steps, t, h, x, slope)
         for s in range(of.width):
@@ -320,6 +328,7 @@ def radau_landing(
     if of.n == 0:
         return True
     solved = solve_step(here, of, known, steps, t, h, x, scales, True)
+    steps.whole = False
     if solved:
         for s in range(of.width):
             z[s] = x[s] + steps.z[2][s]
@@ -330,6 +339,10 @@ def radau_landing(
 
 def fill_piece(of: Blocks, known: Collocation, steps: Radau, room: int, piece: Room) -> None:
     """Write the step's polynomial in its fraction s: the coefficients of s**(m + 1) begin at m ``room``."""
-    for m in range(3):
-        for s in range(of.width):
-            piece[m * room + s] = weighted(known.power[m], steps.z[0][s], steps.z[1][s], steps.z[2][s])
+    u, v, w = steps.z[0], steps.z[1], steps.z[2]
+    e, f, g = steps.last[0], steps.last[1], steps.last[2]
+    for s in range(of.width):
+        whole, i, j, k = steps.whole, u[s], v[s], w[s]
+        piece[s] = e[s] if whole else weighted(known.power[0], i, j, k)
+        piece[room + s] = f[s] if whole else weighted(known.power[1], i, j, k)
+        piece[2 * room + s] = g[s] if whole else weighted(known.power[2], i, j, k)

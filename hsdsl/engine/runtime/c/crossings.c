@@ -39,15 +39,13 @@ static hs_real turning(const hs_real *c, int n) {
   return low;
 }
 
-/* Find where in the step surface k is reached so and its condition holds: 1, 0 or RAISED. */
-static int reaches(hs_run *run, int k, hs_crossing *crossing) {
+/* Find where in the step surface k, whose slope at the end is known, is reached so and its condition holds: 1, 0 or
+   RAISED. */
+static int reached(hs_run *run, int k, hs_real slope, hs_crossing *crossing) {
   const hs_span *span = &run->span;
   const hs_real *const c = coefficients_of(&run->curves, 0, k);
   const int n = *degree_of(&run->curves, 0, k);
   hs_real rate, noise, share = 1.0;
-  if (!may_be_reached(run, k)) return 0;
-  const hs_real slope = slope_of(c, n, 1.0);
-  if (slope > ROUNDOFF_UNITS * HS_UNIT * c[1]) return 0;
   if (hs_call(&run->here.table->rates[k], run->here.p, span->t1, run->z, &rate)) return RAISED;
   crossing->time = span->t1;
   copy(crossing->state, run->z, run->here.dimension);
@@ -66,6 +64,14 @@ static int reaches(hs_run *run, int k, hs_crossing *crossing) {
   crossing->edge = k;
   crossing->depth = 0.0;
   return k >= run->here.table->edges ? 1 : condition(run, k, crossing->time, crossing->state);
+}
+
+/* The same of a surface that may still rise there. */
+HS_INLINE int reaches(hs_run *run, int k, hs_crossing *crossing) {
+  const hs_real *const c = coefficients_of(&run->curves, 0, k);
+  if (!may_be_reached(run, k)) return 0;
+  const hs_real slope = slope_of(c, *degree_of(&run->curves, 0, k), 1.0);
+  return slope > ROUNDOFF_UNITS * HS_UNIT * c[1] ? 0 : reached(run, k, slope, crossing);
 }
 
 /* Whether the polynomials of surface k say that it is not crossed. */
@@ -186,7 +192,7 @@ static int mark_behind(hs_run *run, const hs_crossing *first) {
 }
 
 /* Find the first crossing of each surface of the step, to its place in run->event.crossings, with edge -1 where there is
-   none. Surfaces that rise after the first of all are not looked at any closer, but of an implicit method: to a point of
+   none: whether there is any, or RAISED. Surfaces that rise after the first of all are not looked at any closer, but of an implicit method: to a point of
    its step it iterates from the one before. */
 static int crossings_along(hs_run *run) {
   const hs_mode *mode = run->here.table;
@@ -217,7 +223,7 @@ static int crossings_along(hs_run *run) {
     if (found == RAISED) return RAISED;
     first = kept_crossing(run, first, k, found);
   }
-  return 0;
+  return first != 0;
 }
 
 /* Crossings, with those before the first one, of `count`, that rise by less than the step's polynomials are off by: how

@@ -96,7 +96,7 @@ static void lay_out(hs_run *run, hs_store *store) {
       &run->nearby,      &run->contact.flow_sizes, &run->cascade.x, &run->source,   0};
   take_each(store, w, states);
   run->sizes.known = numbers(store, run->model->states);
-  by->near = run->near, by->other = run->nearby, run->step.radau.at = run->at;
+  by->near = run->near, by->other = run->nearby, run->step.radau.at = run->at, run->step.radau.error = run->step.error;
   by->lifted = take(store, w, sizeof(int));
   run->step.k = take_stages(store, run);
   if (store->numbers) run->step.k[0] = run->slope, run->step.k[run->method->stages] = run->end;

@@ -49,20 +49,27 @@ STEPS_OF(step_of_two_and_columns, 2, of.varied->count)
 STEPS_OF(step_of_three_and_columns, 3, of.varied->count)
 #endif
 
+HS_APART static int step_of_any(hs_run *run, hs_time t, hs_real h) {
+  return implicit_step_in(run, blocks_of(run->here.table), t, h);
+}
+
 /* Try a step; compiled for two and three states apart, a tenth faster, and a third where these have columns. */
-static int implicit_step(hs_run *run, hs_time t, hs_real h) {
-  const hs_mode *const mode = run->here.table;
-  const hs_blocks of = blocks_of(mode);
+HS_INLINE int implicit_step(hs_run *run, hs_time t, hs_real h) {
 #if !defined(__OPTIMIZE_SIZE__)
-  if (!columns_of(mode) && of.n == 2) return step_of_two(run, t, h);
-  if (!columns_of(mode) && of.n == 3) return step_of_three(run, t, h);
-  if (columns_of(mode) && of.whole && !of.pattern) {
+  const hs_mode *const mode = run->here.table;
+  if (!columns_of(mode)) {
+    if (mode->dimension == 2) return step_of_two(run, t, h);
+    if (mode->dimension == 3) return step_of_three(run, t, h);
+    return step_of_any(run, t, h);
+  }
+  const hs_blocks of = blocks_of(mode);
+  if (of.whole && !of.pattern) {
     if (of.n == 4 && of.own == 2) return step_of_two_and_column(run, t, h);
     if (of.own == 2) return step_of_two_and_columns(run, t, h);
     if (of.own == 3) return step_of_three_and_columns(run, t, h);
   }
 #endif
-  return implicit_step_in(run, of, t, h);
+  return step_of_any(run, t, h);
 }
 
 /* Make a part of the last step. */
@@ -106,7 +113,7 @@ static void lay_out_radau(hs_radau *radau, int w, int factors, int varied, hs_st
   hs_real **const matrices[] = {&radau->rows, &radau->fresh, &by->real, &by->re, &by->im};
   hs_real ***const threes[] = {&radau->z,      &radau->last,   &radau->transformed,
                                &radau->change, &radau->slopes, &radau->right};
-  hs_real **const states[] = {&radau->largest, &radau->error, &radau->least, &radau->resolved.diagonal};
+  hs_real **const states[] = {&radau->largest, &radau->ended, &radau->least, &radau->resolved.diagonal};
   for (int i = 0; i < 5; i++) *matrices[i] = numbers(store, factors);
   for (int i = 0; i < 6; i++) *threes[i] = vectors(store, 3, w);
   for (int i = 0; i < 4; i++) *states[i] = numbers(store, w);

@@ -123,7 +123,7 @@ static void leave_lane(hs_row_of_lanes *row, int lane, hs_seat *seat, int writte
   gather(l->scales, run->sizes.scales, n, lanes, lane);
   gather(l->before, run->before.largest, n, lanes, lane);
   run->has_before = run->before.sized = 1;
-  run->here.active = 0;
+  run->here.active = run->surfaces.has_starts = 0;
   for (int k = 0; k < run->here.table->surfaces; k++)
     run->here.active += run->surfaces.active[k] = l->standing[k * lanes + lane] != 0;
   if (written && seat->unwritten) append(run, run->here.t, run->x, 0);
@@ -148,7 +148,6 @@ static void curves_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
   hs_curves *const curves = &run->curves;
   begin_curves(curves, count);
   gather(l->starts, run->surfaces.starts, count, lanes, lane);
-  gather(l->starts, run->surfaces.values, count, lanes, lane);
   gather(l->ends, run->surfaces.ends, count, lanes, lane);
   for (int k = 0; k < count; k++) {
     hs_real *const c = coefficients_of(curves, 0, k);

@@ -105,6 +105,8 @@ HS_INLINE void go_to_end(hs_run *run) {
   run->before = run->span;
   run->span = before;
   run->has_before = 1;
+  run->surfaces.has_starts = run->surfaces.has_ends;
+  swap(&run->surfaces.starts, &run->surfaces.ends);
   run->here.t = run->before.t1;
   swap(&run->x, &run->z);
   swap(&run->slope, &run->end);
@@ -114,7 +116,7 @@ HS_INLINE void go_to_end(hs_run *run) {
 
 /* Begin to step through a flow. */
 static void begin_following(hs_run *run) {
-  run->step.sloped = run->has_before = 0;
+  run->step.sloped = run->has_before = run->surfaces.has_starts = 0;
   run->step.ratio = 1;
   forget_steps(run);
   begin_pace(run);
@@ -137,7 +139,7 @@ HS_INLINE int pass(hs_run *run) {
 }
 
 /* Go on behind a step on which this happens first: GOES_ON, or what happens. */
-static int behind_event(hs_run *run, int event) {
+HS_INLINE int behind_event(hs_run *run, int event) {
   if (event == GOES_ON) return pass(run);
   if (event != WITHOUT_VALUE) return event;
   copy(run->task->stop.slope, run->z, run->here.dimension);
@@ -148,7 +150,8 @@ static int behind_event(hs_run *run, int event) {
 
 /* Go on behind a step that was made. */
 static int behind_step(hs_run *run) {
-  return behind_event(run, crossings_along(run) ? WITHOUT_VALUE : first_event(run));
+  const int found = crossings_along(run);
+  return behind_event(run, found == RAISED ? WITHOUT_VALUE : found ? first_event(run) : GOES_ON);
 }
 
 HS_INLINE int behind(hs_run *run, hs_step_failure failure) {

@@ -72,7 +72,7 @@ static void begin_span(hs_run *run, hs_real h, hs_time t1) {
   span->h = h;
   span->t1 = t1;
   span->sized = 0;
-  run->surfaces.weighed = 0;
+  run->surfaces.weighed = run->surfaces.has_ends = 0;
   copy(span->x, run->x, run->here.dimension);
 }
 
@@ -89,6 +89,13 @@ static int blur(hs_run *run, int n, hs_time t1) {
   return 0;
 }
 
+HS_INLINE int is_finite_piece(const hs_run *run, int n, const hs_polynomial *piece) {
+  if (n == run->width) return all_finite(piece->c, piece->degree * n);
+  for (int m = 0; m < piece->degree; m++)
+    if (!all_finite(piece->c + m * run->width, n)) return 0;
+  return 1;
+}
+
 /* Try a step of a table or of an implicit method, or say what is in its way; `TableSteps._try`. */
 HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time t1) {
   hs_span *const span = &run->span;
@@ -100,7 +107,7 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time
   if (status || mode->flow(p, t1, run->z, run->end)) return HS_NOT_FINITE;
   if (!hs_finite(sum_of(run->z, n) + sum_of(run->end, n))) return HS_NOT_FINITE;
   if (run->control.tolerance > 0) {
-    local_error(run, h);
+    if (run->method->kind == HS_TABLE) table_error(run, h);
     run->step.ratio = error_ratio(run, h);
     if (!(run->step.ratio <= 1)) return HS_ERROR;
   }
@@ -109,10 +116,9 @@ HS_INLINE hs_step_failure try_table(hs_run *run, const int n, hs_real h, hs_time
     for (int i = 1; i < run->method->stages; i++) span->largest[s] = hs_max(span->largest[s], fabs(run->step.k[i][s]));
   }
   if (method_piece(run, span->t, h, &span->piece)) return HS_NOT_FINITE;
-  for (int m = 0; m < span->piece.degree; m++) /* it may overflow where its end does not */
-    if (!all_finite(span->piece.c + m * run->width, n)) return HS_NOT_FINITE;
+  if (!is_finite_piece(run, n, &span->piece)) return HS_NOT_FINITE; /* it may overflow where its end does not */
   if (curves_along(run)) return HS_NOT_FINITE;
-  if (mode->values(p, t1, run->z, run->surfaces.ends)) return HS_NOT_FINITE;
+  if (ends_of(run)) return HS_NOT_FINITE;
   const int blurred = run->control.implicit && run->control.tolerance > 0;
   return blurred && blur(run, n, t1) ? HS_NOT_FINITE : HS_CLEAR;
 }
@@ -203,9 +209,8 @@ static int series_curves(hs_run *run) {
   hs_curves *const found = &run->curves;
   const hs_real h = run->span.h, *p = run->here.p;
   int known;
-  if (mode->values(p, run->span.t, run->x, run->surfaces.values)) return RAISED;
+  if (starts_of(run)) return RAISED;
   if (!mode->surfaces) return 0;
-  copy(run->surfaces.starts, run->surfaces.values, mode->surfaces);
   known = !mode->surface_series(p, order, run->step.lines);
   run->surfaces.has_middle = 0;
   begin_curves(found, mode->surfaces);
@@ -249,7 +254,7 @@ HS_INLINE hs_step_failure try_series(hs_run *run, const int n, hs_real h, hs_tim
     left_of(run->step.error, run->end, n, run->method->order, h);
     if (is_too_wrong(run, h)) return HS_ERROR;
   }
-  return mode->values(p, t1, run->z, run->surfaces.ends) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
+  return ends_of(run) || series_curves(run) ? HS_NOT_FINITE : HS_CLEAR;
 }
 
 /* Make one step of Taylor's method of a length that is halved where its end does not solve the equation. */

@@ -68,6 +68,7 @@ static void move_along(hs_run *run, hs_time t, hs_real *x, hs_real h) {
     const hs_real by = h * v[f->flow.result[i]].off;
     if (counts(run, i, by, x[i])) x[i] += side((unsigned)i) * by;
   }
+  run->surfaces.has_ends = 0; /* what is known of a step's end */
 }
 
 /* The same where an arc begins at run->x: by what its first step may be. */

@@ -160,7 +160,7 @@ typedef struct {
 typedef struct {
   hs_real *values, *starts, *ends, *middle, *ahead, *magnitudes, *noise;
   hs_real *begun, *ended; /* magnitudes at the ends of the located step: `weighed` says at which */
-  int weighed, has_middle;
+  int weighed, has_starts, has_ends, has_middle; /* has_...: whether those of the step are known */
   int *active, *beyond, *emerging;
   hs_real *stood; /* how far off it a state is that stood on it, on entry */
 } hs_at_surfaces;
@@ -288,9 +288,9 @@ static inline hs_time earlier(hs_time a, hs_time b) { return b < a ? b : a; }
 static inline hs_real tie(hs_time t) { return HS_TIE * fabs(t); }
 
 static inline int all_finite(const hs_real *v, int n) {
-  for (int i = 0; i < n; i++)
-    if (!hs_finite(v[i])) return 0;
-  return 1;
+  hs_real none = 0.0; /* not-a-number where one is not finite */
+  for (int i = 0; i < n; i++) none += v[i] - v[i];
+  return none == 0;
 }
 
 static inline void swap(hs_real **a, hs_real **b) {

@@ -80,6 +80,21 @@ static int roundoff_bound(hs_run *run, int k, hs_time t, const hs_real *x, int e
   return 0;
 }
 
+/* The surfaces where the located step starts, unless they are known from the end of the one before. */
+HS_INLINE int starts_of(hs_run *run) {
+  hs_at_surfaces *const at = &run->surfaces;
+  if (!at->has_starts && run->here.table->values(run->here.p, run->span.t, run->x, at->starts)) return RAISED;
+  at->has_starts = 1;
+  return 0;
+}
+
+/* The surfaces where it ends. */
+HS_INLINE int ends_of(hs_run *run) {
+  if (run->here.table->values(run->here.p, run->span.t1, run->z, run->surfaces.ends)) return RAISED;
+  run->surfaces.has_ends = 1;
+  return 0;
+}
+
 enum { AT_START = 1, AT_END = 2 };
 
 /* The bound of surface k at the start or the end of the located step, whose magnitudes are made once. */
@@ -425,13 +440,13 @@ static int affine_curves(hs_run *run, hs_real share) {
   const hs_mode *mode = run->here.table;
   const hs_span *span = &run->span;
   hs_curves *const found = &run->curves;
-  if (mode->values(run->here.p, span->t, run->x, run->surfaces.values)) return RAISED;
+  if (starts_of(run)) return RAISED;
   begin_curves(found, mode->surfaces);
   for (int k = 0; k < mode->surfaces; k++) {
     hs_real *const c = coefficients_of(found, 0, k);
     const hs_sparse *const row = &mode->gradients[k];
     if (hs_call(&row->values, run->here.p, span->t, run->x, run->gradient)) return RAISED;
-    c[0] = run->surfaces.values[k];
+    c[0] = run->surfaces.starts[k];
     const hs_real sizes =
         affine_curve(&span->piece, run->width, span->h, row, run->gradient, c, degree_of(found, 0, k));
     *off_of(found, 0, k) = share * sizes;
