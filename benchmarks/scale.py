@@ -1,9 +1,10 @@
 """What large flat models cost: chains of masses with stops (`tests/chains.py`), and the grid of 625 modes.
 
 For each number of masses: processor seconds to load, lower and compile the first time, and again with everything kept;
-processor time of a run for each step and state; memory. SciPy and scikit-SUNDAE (CVODE, sparse) run with events to the
-same tolerance, in turns with ours: how many times as long the fastest of their runs takes. Then chains whose masses all
-come to rest on their stops, and a stiff chain by `radau`.
+processor time of a run for each step and state; memory. SciPy and scikit-SUNDAE run with events to the same tolerance,
+in turns with ours: how many times as long the fastest of their runs takes. CVODE has its sparse solver, or its banded
+one, for which each mass's states stand together. Then chains whose masses all come to rest on their stops, and a stiff
+chain by `radau`.
 
     python benchmarks/scale.py [10 50 100 200 500]
 """
@@ -32,6 +33,7 @@ from lint.grid import grid
 import hsdsl
 
 TOLERANCE, UNTIL, TURNS, REPETITIONS = 1e-6, 2.0, 3, 20
+MOST_FOR_SCIPY = 500  # masses: it calls each of their events in Python at each step
 STIFFNESS, GAP, BOUNCE = 4.0, 0.25, 0.5  # as in tests/chains.py
 START = """
 import resource, sys, time
@@ -111,25 +113,35 @@ class Chain:
             hit = np.array([len(times) > 0 for times in found.t_events])
             t, x, count = found.t[-1], self.bounced(found.y[:, -1], hit), count + int(hit.sum())
 
-    def by_cvode(self, until: float) -> int:
-        """Run by CVODE with its sparse solver, likewise."""
+    def by_cvode(self, until: float, banded: bool = False) -> int:
+        """Run by CVODE with its sparse solver, or with its banded one and the states mass by mass, likewise."""
+        n = self.n
+        order = np.arange(2 * n).reshape(2, n).T.ravel() if banded else np.arange(2 * n)
+        place = np.argsort(order)  # of each state among those that CVODE has
+        rate, at = np.empty(2 * n), place[:n]
 
         def rates(_: float, x: np.ndarray, out: np.ndarray) -> None:
-            self.flow(x, out)
+            if not banded:
+                return self.flow(x, out)
+            self.flow(x[place], rate)
+            out[:] = rate[order]
+            return None
 
         def events(_: float, x: np.ndarray, out: np.ndarray) -> None:
-            out[:] = x[: self.n] - GAP
+            out[:] = x[at] - GAP
 
-        events.terminal, events.direction = [True] * self.n, [1] * self.n  # type: ignore[attr-defined]
-        options = {"rtol": TOLERANCE, "atol": TOLERANCE, "linsolver": "sparse", "sparsity": self.pattern()}
-        solver = sun.cvode.CVODE(rates, eventsfn=events, num_events=self.n, max_num_steps=1_000_000, **options)
+        events.terminal, events.direction = [True] * n, [1] * n  # type: ignore[attr-defined]
+        sparse = {"linsolver": "sparse", "sparsity": self.pattern()}
+        options = {"linsolver": "band", "lband": 3, "uband": 2} if banded else sparse
+        options |= {"rtol": TOLERANCE, "atol": TOLERANCE, "max_num_steps": 1_000_000}
+        solver = sun.cvode.CVODE(rates, eventsfn=events, num_events=n, **options)
         t, x, count = 0.0, self.at, 0
         while True:
-            found = solver.solve(np.array([t, until]), x)
+            found = solver.solve(np.array([t, until]), x[order])
             if found.status != 2:
                 return count
             hit = np.atleast_2d(found.i_events)[-1] != 0
-            t, x = float(np.ravel(found.t_events)[-1]), self.bounced(np.atleast_2d(found.y_events)[-1], hit)
+            t, x = float(np.ravel(found.t_events)[-1]), self.bounced(np.atleast_2d(found.y_events)[-1][place], hit)
             count += int(hit.sum())
 
 
@@ -150,15 +162,16 @@ def row(n: int) -> str:
     first, again, memory = started(chain(n))
     model, other = hsdsl.loads(chain(n, until=UNTIL)), Chain(n, 1 / 20)
     found = model.simulate(tolerance=TOLERANCE)
-    peers = (lambda: other.by_scipy(UNTIL), lambda: other.by_cvode(UNTIL))
-    own, scipy, cvode = fastest(lambda: model.simulate(tolerance=TOLERANCE), *peers)
+    peers = [lambda: other.by_cvode(UNTIL), lambda: other.by_cvode(UNTIL, banded=True)]
+    peers += [lambda: other.by_scipy(UNTIL)] if n <= MOST_FOR_SCIPY else []
+    own, *others = fastest(lambda: model.simulate(tolerance=TOLERANCE), *peers)
     for peer in peers:
-        if peer() != len(found.transitions):
-            print(f"other impacts: {peer()}", end=" ")
+        if (count := peer()) != len(found.transitions):
+            print(f"other impacts: {count}", end=" ")
     each = own / len(found.times) / (2 * n) * 1e9
     return (
         f"{n:5}  {first:6.2f} s  {again:6.2f} s  {memory:5.0f} MB  {len(found.transitions):5}  {own * 1e3:8.2f} ms"
-        f"  {each:6.0f} ns  {scipy / own:6.0f} x  {cvode / own:6.0f} x"
+        f"  {each:6.0f} ns  {'  '.join(f'{time / own:6.1f} x' for time in others)}"
     )
 
 
@@ -184,7 +197,7 @@ def resting(n: int) -> str:
 
 def main() -> None:
     """Print the tables."""
-    print("    n     first     again    memory  impacts      run   step/state    SciPy     CVODE", flush=True)
+    print("    n     first     again    memory  impacts      run   step/state   sparse    banded     SciPy", flush=True)
     for n in map(int, sys.argv[1:] or (10, 50, 100, 200, 500)):
         print(row(n), flush=True)
     print("masses that come to rest on their stops:", flush=True)

@@ -11,7 +11,7 @@ two sums of roots is larger can take SymPy for ever.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
@@ -187,6 +187,27 @@ def power(base, exponent):
 def rebuilt(expr, arguments):
     """An expression with other arguments, made as :func:`power` makes powers."""
     return power(*arguments) if expr.is_Pow else expr.func(*arguments)
+
+
+def as_written(expr: Any, arguments: Sequence[Any]) -> Any:
+    """An expression with other arguments in the same places: nothing is simplified, no operand is moved."""
+    if expr.is_Add or expr.is_Mul:
+        return expr.func._from_args(arguments)
+    if tuple(arguments) == expr.args:
+        return expr
+    return sp.Pow(*arguments, evaluate=False) if expr.is_Pow else expr.func(*arguments)
+
+
+def renamed(expr: Any, names: Mapping[Any, Any], done: dict[Any, Any]) -> Any:
+    """An expression over other symbols, as it is written; ``done`` is kept as in :func:`replaced`.
+
+    It is what the same steps make of these symbols, if their names are in the same order.
+    """
+    if not expr.args:
+        return names.get(expr, expr)
+    if expr not in done:
+        done[expr] = as_written(expr, [renamed(a, names, done) for a in expr.args])
+    return done[expr]
 
 
 def replaced(expr: Any, mapping: Mapping[Any, Any], done: dict[Any, Any]) -> Any:

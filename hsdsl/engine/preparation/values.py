@@ -322,7 +322,8 @@ def initial_layout(values: Values, overrides: Mapping[str, Any]) -> tuple[int, t
     for name in overrides:
         if name != "mode" and name not in states:
             raise UsageError(f"{where} has no state '{name}'", meant(name, known))
-    if missing := [name for name in states if name not in (*program.initial_states, *overrides)]:
+    valued = {*program.initial_states, *overrides}
+    if missing := [name for name in states if name not in valued]:
         raise UsageError(
             f"mode {mode.name} starts with {', '.join(states)}, but no value is given for {', '.join(missing)}",
             f"--set initial.{missing[0]}=VALUE",

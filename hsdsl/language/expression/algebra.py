@@ -8,7 +8,9 @@ gets arguments that have a value where it is not chosen.
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -193,6 +195,67 @@ def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
     rates = {TIME: sp.S.One, **flow}
     present = sorted(expr.free_symbols & rates.keys(), key=lambda s: s.name)
     return sp.Add(*(derivative(expr, s) * rates[s] for s in present))
+
+
+_NUMBERED = re.compile(r"([a-z_]+)\d+")
+
+
+def letter_of(name: str) -> str | None:
+    """What is before the number in a numbered name, None of another name."""
+    return found[1] if (found := _NUMBERED.fullmatch(name)) else None
+
+
+class Shape:
+    """Expressions up to the numbers in the names of their symbols: what equal ones are written as is made once.
+
+    The parts of a large model, and its modes, have the same routines over other symbols. SymPy and the printer put
+    operands in an order of their names. So the names of a ``letter`` count by their order, and another letter is
+    another shape; names without one count as they are. Every part of an expression is visited once. ``symbols`` has the
+    symbols with their places among the parts, ``names`` those that have a letter in order, and ``key`` tells shapes
+    apart. With ``beside`` another symbol goes with some symbols.
+    """
+
+    def __init__(
+        self,
+        expressions: Iterable[sp.Basic],
+        beside: Mapping[sp.Basic, sp.Basic] | None = None,
+        letter: Callable[[str], str | None] = letter_of,
+    ) -> None:
+        self._nodes: list[object] = []
+        self._numbers: dict[sp.Basic, int] = {}
+        self.symbols: dict[sp.Basic, int] = {}
+        ends = list(map(self._visit, expressions))
+        if beside:
+            ends += [self._visit(beside[symbol]) for symbol in tuple(self.symbols) if symbol in beside]
+        self.names: list[str] = []
+        ranks = Counter[str]()
+        for symbol in sorted(self.symbols, key=lambda s: s.name):
+            if (found := letter(symbol.name)) is not None:
+                self._nodes[self.symbols[symbol]] = found, ranks[found], symbol.is_real
+                ranks[found] += 1
+                self.names.append(symbol.name)
+        self.key = (*ends, None, *self._nodes)
+
+    def _visit(self, whole: sp.Basic) -> int:
+        numbers, nodes, waiting = self._numbers, self._nodes, [whole]
+        while waiting:
+            expr = waiting[-1]
+            if expr in numbers:
+                waiting.pop()
+            elif expr.args and (missing := [part for part in expr.args if part not in numbers]):
+                waiting += missing
+            else:
+                numbers[expr] = len(nodes)
+                if expr.is_Symbol:
+                    self.symbols[expr] = len(nodes)
+                nodes.append((expr.func, *map(numbers.__getitem__, expr.args)) if expr.args else expr)
+        return numbers[whole]
+
+    def order(self, places: Mapping[sp.Symbol, int]) -> tuple[int, ...]:
+        """The symbols that are arguments, in the order of these, by their places among the parts."""
+        return tuple(
+            self.symbols[symbol] for symbol in sorted(self.symbols.keys() & places.keys(), key=places.__getitem__)
+        )
 
 
 _MOST_TRIES = 3  # points at which a matrix must be singular to count as singular everywhere

@@ -22,7 +22,7 @@ from hsdsl.base.parts import numbered
 from hsdsl.language.expression.algebra import derivative, lie_derivative
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Surface
-from hsdsl.mathematics.completion.contact import Contact, contact
+from hsdsl.mathematics.completion.contact import Alike, Contact, contact
 from hsdsl.mathematics.completion.nearby import MOST_NODES, NO_SLOPES, Slopes, cancelled, size, slopes_of_inputs
 from hsdsl.mathematics.program import HELD, LOOKED_AT
 
@@ -53,7 +53,8 @@ def constrained_modes(system: HybridSystem) -> list[ConstrainedMode | None]:
 
 def constrained_mode(mode: Mode, numbers: Collection[str] = (), moving: Slopes = NO_SLOPES) -> ConstrainedMode | None:
     """The motions along guards of a mode, None without any; for ``numbers`` and ``moving`` see `contact`."""
-    contacts = [found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers, moving))]
+    alike: Alike = {}
+    contacts = [found for k in range(len(mode.edges)) if (found := contact(mode, k, numbers, moving, alike))]
     if not contacts:
         return None
     flags = tuple(symbol(f"contact {i}") for i in range(len(contacts)))
@@ -63,7 +64,7 @@ def constrained_mode(mode: Mode, numbers: Collection[str] = (), moving: Slopes =
     for i, (found, flag) in enumerate(zip(contacts, chosen, strict=True)):
         edges[found.edge] = _released(found, flag, flags[i], *pushes[i])
         releases[found.edge] = i
-        for end in found.further:  # is reached in contact only
+        for end, _ in found.further:  # is reached in contact only
             residual = below(flag, LOOKED_AT, sp.S.NegativeOne, end.surface.residual)
             edges.append(replace(end, surface=Surface(residual, sp.S.Zero, residual, end.surface.text)))
         releases += [i] * len(found.further)

@@ -11,17 +11,20 @@ the rate of the guard is positive (M2), which decides that of what is zero at re
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import takewhile
+from typing import Any
 
 import sympy as sp
 from sympy.core.relational import Relational
 
-from hsdsl.base.functions import absolute, maximum, minimum, power, rewritten, sign
+from hsdsl.base.functions import absolute, maximum, minimum, power, renamed, rewritten, sign
 from hsdsl.base.names import memory, without_memory
-from hsdsl.language.expression.algebra import derivative, lie_derivative
+from hsdsl.language.expression.algebra import Shape, derivative, lie_derivative
 from hsdsl.language.expression.plain import text_of
+from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Altered, Edge, Mode, Surface
 from hsdsl.mathematics.completion.nearby import (
     NO_SLOPES,
@@ -53,8 +56,8 @@ class Contact:
     ``base`` is the mode. ``rows`` has the constrained flow of the states whose flow changes, by their numbers.
     ``projection`` has what each of these rows takes away of the flow, as shares of the rates of time and states.
     ``release`` is in the place of the edge in contact: its surface is the push of the flow on the guard, negative.
-    ``further`` edges, beyond the mode's own, are where an `if` may end; ``ends`` has the condition under which each
-    does; ``kept`` has those of its inequalities that motion along the guard keeps at their limits. ``push`` is the
+    ``further`` edges, beyond the mode's own, are where an `if` may end, each with the condition under which it does;
+    ``kept`` has those of its inequalities that motion along the guard keeps at their limits. ``push`` is the
     derivative of ``last`` along the flow. That is the guard where ``order`` is 1, or else, where the guard's own
     derivative ``rate`` is zero on it, that rate. ``landing`` is the state to which repeated resets lead from a state
     near the guard. ``counts`` are the states that they count with, which keep their values. ``along`` is the direction
@@ -66,16 +69,26 @@ class Contact:
     base: Mode
     rows: dict[int, sp.Expr]
     projection: dict[int, dict[sp.Symbol, sp.Expr]]
-    release: Edge
-    further: tuple[Edge, ...]
     rate: sp.Expr
     push: sp.Expr
     landing: Altered
-    ends: tuple[sp.Basic, ...]
     near: Nearby
-    counts: tuple[int, ...] = ()
-    kept: tuple[Relational, ...] = ()
-    along: dict[sp.Symbol, sp.Expr] | None = None
+    counts: tuple[int, ...]
+    kept: tuple[Relational, ...]
+    along: dict[sp.Symbol, sp.Expr] | None
+
+    @property
+    def release(self) -> Edge:
+        """The edge by which the motion along the guard ends."""
+        edge, kept = self.base.edges[self.edge], Altered(self.near.states, {})
+        return replace(edge, surface=zero_surface(-self.push), condition=None, condition_text=None, reset=kept,
+                       reset_texts=self.base.states)  # fmt: skip
+
+    @cached_property
+    def further(self) -> list[tuple[Edge, sp.Basic]]:
+        """The edges where an `if` may end, each with the condition under which it does."""
+        condition = self.base.edges[self.edge].condition
+        return _ends_of_condition(self, condition, [atom for atom in atoms_of(condition) if atom not in self.kept])
 
     @property
     def last(self) -> sp.Expr:
@@ -89,13 +102,20 @@ class Contact:
         for i, row in self.rows.items():
             flow[i], texts[i] = row, text_of(row)
         edges[self.edge] = self.release
-        return replace(self.base, flow=tuple(flow), flow_texts=tuple(texts), edges=(*edges, *self.further))
+        further = (edge for edge, _ in self.further)
+        return replace(self.base, flow=tuple(flow), flow_texts=tuple(texts), edges=(*edges, *further))
 
 
-def contact(mode: Mode, k: int, numbers: Collection[str] = (), moving: Slopes = NO_SLOPES) -> Contact | None:
+Alike = dict[tuple[Any, ...], "tuple[Contact | None, Shape]"]
+
+
+def contact(
+    mode: Mode, k: int, numbers: Collection[str] = (), moving: Slopes = NO_SLOPES, alike: Alike | None = None
+) -> Contact | None:
     """The motion along the guard of edge k of a mode; None where there is none, or where it is not unique.
 
-    ``numbers`` are states that are modes of parts, ``moving`` has the slopes of inputs.
+    ``numbers`` are states that are modes of parts, ``moving`` has the slopes of inputs. ``alike`` keeps what is found,
+    for edges that are the same up to names.
     """
     edge = mode.edges[k]
     if edge.target != mode.name or edge.target_states != mode.states or mode.derived or not fires(edge):
@@ -104,8 +124,22 @@ def contact(mode: Mode, k: int, numbers: Collection[str] = (), moving: Slopes = 
     if any(mode.states[i] in numbers for i in edge.reset.changes if i not in kept):
         return None
     near = Nearby(mode, edge, mode_of_part(edge, numbers), kept, moving=moving)
-    near = branched(near) if near.changed and near.is_small() else near
-    if near is None:
+    if not near.changed or not near.is_small():
+        return None
+    if alike is None or edge.of_event:
+        return _found(near, k, kept)
+    shape, kinds = near.shape(atoms_of(edge.condition))
+    if (key := (*kinds, *shape.key)) not in alike:
+        alike[key] = _found(near, k, kept), shape
+    found, known = alike[key]
+    names = dict(zip(map(symbol, known.names), map(symbol, shape.names), strict=True))
+    return found and _renamed(found, near, k, names)
+
+
+def _found(near: Nearby, k: int, kept: Sequence[int]) -> Contact | None:
+    """The motion along the guard of edge k."""
+    mode, edge = near.mode, near.edge
+    if (near := branched(near)) is None:
         return None
     near = near.without(counts) if (counts := (*kept, *counts_of(near))) else near
     constrained = _constrained(near) if near.changed and near.is_small() else None
@@ -115,17 +149,50 @@ def contact(mode: Mode, k: int, numbers: Collection[str] = (), moving: Slopes = 
     push, order = _push(near, at)
     if order is None or (edge.of_event and order == 1 and not _stays(near.guard, near, rows, at)):
         return None  # a condition that stays true does not turn true again
-    release = replace(edge, surface=zero_surface(-push), condition=None, condition_text=None,
-                      reset=Altered(near.states, {}), reset_texts=mode.states)  # fmt: skip
-    atoms = sorted(edge.condition.atoms(Relational), key=str) if edge.condition is not None else ()
-    kept = tuple(atom for atom in atoms if _is_kept(_falling(atom), near, rows, push, at))
-    further, ends = _ends_of_condition(release, edge.condition, [atom for atom in atoms if atom not in kept])
+    lasting = tuple(atom for atom in atoms_of(edge.condition) if _is_kept(_falling(atom), near, rows, push, at))
     rate = cancelled(near.along(near.guard))
     along = _direction(near, near.guard if order == 1 else rate, projection, at)
+    return Contact(k, order, mode, rows, projection, rate, push, landing, near, counts, lasting, along)
+
+
+def _renamed(found: Contact, near: Nearby, k: int, names: Mapping[sp.Symbol, sp.Symbol]) -> Contact:
+    """The motion along the guard of edge k, which is that of another edge but for names."""
+    if found.edge == k:
+        return found
+    done: dict[Any, Any] = {}
+
+    def of(value: Any) -> Any:
+        return renamed(value, names, done)
+
+    was = found.base.edges[found.edge]
+    place = dict(zip(was.reset.changes, near.edge.reset.changes, strict=True))
+    counts = tuple(place[i] for i in found.counts)
+    if (impact := found.near.impact) is not None:
+        changes = {place[i]: of(value) for i, value in found.near.edge.reset.changes.items()}
+        near = near.by(
+            replace(near.edge, reset=Altered(near.edge.reset.kept, changes)), {of(x): v for x, v in impact.items()}
+        )
+    near = near.without(counts) if counts else near
+    pairs = zip(atoms_of(was.condition), atoms_of(near.edge.condition), strict=True)
     return Contact(
-        k, order, mode, rows, projection, release, tuple(further), rate, push, landing, tuple(ends), near, counts, kept,
-        along,
-    )  # fmt: skip
+        k,
+        found.order,
+        near.mode,
+        {place[i]: of(row) for i, row in found.rows.items()},
+        {place[i]: {of(x): of(share) for x, share in shares.items()} for i, shares in found.projection.items()},
+        of(found.rate),
+        of(found.push),
+        Altered(near.states, {place[i]: of(value) for i, value in found.landing.changes.items()}),
+        near,
+        counts,
+        tuple(atom for other, atom in pairs if other in found.kept),
+        found.along and {of(x): of(share) for x, share in found.along.items()},
+    )
+
+
+def atoms_of(condition: sp.Basic | None) -> list[Relational]:
+    """The inequalities in a condition."""
+    return sorted(condition.atoms(Relational), key=str) if condition is not None else []
 
 
 def fires(edge: Edge) -> bool:
@@ -236,21 +303,20 @@ def _falling(atom: Relational) -> sp.Expr:
     return atom.gts - atom.lts if hasattr(atom, "gts") else atom.lhs - atom.rhs
 
 
-def _ends_of_condition(release: Edge, condition: sp.Basic | None, ending: Sequence[Relational]):
+def _ends_of_condition(found: Contact, condition: sp.Basic | None, ending: Sequence[Relational]):
     """Edges where an `if` may end, one for each inequality ``ending`` and each way that counts, and when it does."""
-    edges: list[Edge] = []
-    ends: list[sp.Basic] = []
-    if condition is None:
-        return edges, ends
+    if condition is None or not ending:
+        return []
+    release, ends = found.release, list[tuple[Edge, sp.Basic]]()
     plain = isinstance(condition, Relational) or (
         isinstance(condition, sp.And) and set(condition.args) == condition.atoms(Relational)
     )
     for atom in ending:
         falling = _falling(atom)
         for residual, beyond in ((-falling, sp.false),) if plain else ((-falling, sp.false), (falling, sp.true)):
-            edges.append(replace(release, surface=zero_surface(residual)))
-            ends.append(sp.Not(condition.xreplace({atom: beyond})))
-    return edges, ends
+            end = replace(release, surface=zero_surface(residual))
+            ends.append((end, sp.Not(condition.xreplace({atom: beyond}))))
+    return ends
 
 
 def zero_surface(residual: sp.Expr) -> Surface:

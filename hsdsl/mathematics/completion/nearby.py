@@ -17,7 +17,7 @@ from typing import Any
 import sympy as sp
 
 from hsdsl.base.numbers.arithmetic import Number, multiprecision
-from hsdsl.language.expression.algebra import derivative, lie_derivative
+from hsdsl.language.expression.algebra import NO_VALUE, Shape, derivative, lie_derivative
 from hsdsl.language.expression.scope import slope_symbol, symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, symbols_of
 
@@ -95,6 +95,15 @@ class Nearby:
         found = dict.fromkeys(self.among(sp.Tuple(self.guard, *self.moved)))
         further = [y for x in found for y in self.among(sp.sympify(self.flow(x)))]
         return [self.flow(x) for x in dict.fromkeys((*found, *further))]
+
+    def shape(self, atoms: Sequence[sp.Basic]) -> tuple[Shape, tuple[Any, ...]]:
+        """What this is up to names, with the inequalities of a condition, and what each of these names is."""
+        condition = sp.true if self.edge.condition is None else self.edge.condition
+        flows = (self.flow(x) for x in self.among(condition))
+        values = map(sp.sympify, (self.guard, *self.moved, *self.own, *self.flows(), condition, *atoms, *flows))
+        shape, unused = Shape(values, letter=lambda name: ""), unused_in(self.mode)
+        kinds = (x if x in (TIME, NO_VALUE) else (x in self._moving, x in self._flow) for x in map(symbol, shape.names))
+        return shape, (*kinds, *(i in unused for i in self.changed))
 
     def is_small(self) -> bool:
         """Whether all of this written out is short enough to be differentiated twice as trees."""
@@ -294,9 +303,7 @@ def counts_of(near: Nearby) -> tuple[int, ...]:
     A sum that converges, as that of what impacts dissipate, is none: its increment vanishes where the state rests. Nor
     is what repeated resets take to a limit of its own.
     """
-    if near.changed and (not _last or _last[0][0] is not near.mode):
-        _last[:] = [(near.mode, _unused(near.mode))]
-    few = tuple(i for i in near.changed if i in _last[0][1])
+    few = tuple(i for i in near.changed if i in unused_in(near.mode))
     if not few or not near.is_small() or (found := fixed_point(near.without(few))) is None:
         return ()
     anywhere = {x: NUMBERS.zero + 1 + 1 / (3 + k) for k, x in enumerate(sorted(near.moved.free_symbols, key=str))}
@@ -312,8 +319,14 @@ def counts_of(near: Nearby) -> tuple[int, ...]:
 _last: list[tuple[Mode, frozenset[int]]] = []  # of a mode all edges in turn; to hash one takes longer than this does
 
 
+def unused_in(mode: Mode) -> frozenset[int]:
+    """The states without a flow that no flow, surface, `if` or other state depends on while a mode lasts."""
+    if not _last or _last[0][0] is not mode:
+        _last[:] = [(mode, _unused(mode))]
+    return _last[0][1]
+
+
 def _unused(mode: Mode) -> frozenset[int]:
-    """The states without a flow that no flow, surface, `if` or other state depends on while the mode lasts."""
     states = dict(zip(symbols_of(mode.states), range(len(mode.states)), strict=True))
     loops = [edge for edge in mode.edges if edge.target == mode.name and edge.target_states == mode.states]
     conditions = [edge.condition for edge in mode.edges if edge.condition is not None]

@@ -168,7 +168,7 @@ class _Writer:
             to = names[few - {found.edge}]
             left = {"name": f"{name}->{to}", "source": name, "target": to}
             edges[found.edge] = replace(found.release, reset=_onto_guard(base, found), **left)
-            for further, end in zip(found.further, found.ends, strict=True):
+            for further, end in found.further:
                 time = symbol(self._contact_time())
                 depth = time * found.push if found.order == 1 else time**2 * found.push / 2
                 edges.append(replace(further, condition=end, reset=_onto_guard(base, found, depth), **left))

@@ -21,6 +21,7 @@ import sympy as sp
 from hsdsl.base.functions import absolute, below, floor, maximum, minimum, rebuilt, replaced, sign
 from hsdsl.base.graphs import closure, filled
 from hsdsl.base.names import without_memory
+from hsdsl.language.expression.algebra import Shape
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode
 from hsdsl.mathematics import program as lowered
@@ -31,7 +32,6 @@ from hsdsl.mathematics.lower.straight import (
     Cut,
     Definition,
     Gradient,
-    Shape,
     Statement,
     print_each,
     print_routines,
@@ -122,7 +122,7 @@ class LoweredMode:
             ),
             **others,
         )
-        bounded = program.jumps or may_hide(self.flow, self.arguments)
+        bounded = program.jumps or may_hide(self.flow, self._places)
         if not bounded:
             return program
         return replace(program, terms=self._terms())

@@ -25,8 +25,8 @@ from typing import NamedTuple
 
 import sympy as sp
 
-from hsdsl.base.functions import below, rebuilt, solution
-from hsdsl.language.expression.algebra import derivative, moving
+from hsdsl.base.functions import as_written, below, rebuilt, solution
+from hsdsl.language.expression.algebra import Shape, derivative, moving
 from hsdsl.mathematics.lower.printer import LARGEST_PRODUCT, KernelPrinter
 from hsdsl.mathematics.program import Routines
 
@@ -109,11 +109,7 @@ class _Shared:
         parts = [self._new(part) for part in self._operands[expr]]
         if _is_quotient(expr):
             return sp.Pow(parts[0], -1, evaluate=False)
-        if expr.is_Add or expr.is_Mul:
-            return expr.func._from_args(parts)
-        if tuple(parts) == expr.args:
-            return expr
-        return sp.Pow(*parts, evaluate=False) if expr.is_Pow else expr.func(*parts)
+        return as_written(expr, parts)
 
 
 def _unsigned(expr: sp.Add) -> frozenset:
@@ -401,11 +397,11 @@ def text_of(definition: Definition | Alike) -> str:
     """Print one routine as a Python function."""
     if isinstance(definition, Alike):
         shape, places = definition.shape, definition.places
-        body = shape.text(definition.kind, lambda: _body(*definition.write()))
+        body = _text(shape, definition.kind, lambda: _body(*definition.write()))
         return _few(definition.name, shape.symbols.keys() & places.keys(), places, body)
     results, statements = tuple(map(sp.sympify, definition.results)), tuple(definition.statements)
     shape = Shape((*results, *(part for statement in statements for part in statement)))
-    body = shape.text(len(results), lambda: _body(results, statements))
+    body = _text(shape, len(results), lambda: _body(results, statements))
     if definition.places is None:
         return f"def {definition.name}({', '.join(s.name for s in definition.arguments)}):\n{body}"
     return _few(definition.name, shape.symbols.keys() & definition.places.keys(), definition.places, body)
@@ -433,72 +429,24 @@ def _returned(lines: Sequence[str], results: Sequence[str]) -> str:
 
 
 def _printed(expr: sp.Basic) -> str:
-    return expr.name if expr.is_Symbol else Shape((expr,)).text(None, lambda: KernelPrinter().doprint(expr))
+    return expr.name if expr.is_Symbol else _text(Shape((expr,)), None, lambda: KernelPrinter().doprint(expr))
 
 
-_NUMBERED = re.compile(r"([a-z_]+)\d+")
 _WORD = re.compile(r"(?<!\w)([a-z_]+\d+)(?!\w)")
 _MOST_SHAPES = 1 << 14
 _Template = tuple[list[str], list[int]]
 _texts: dict[tuple, _Template] = {}
 
 
-class Shape:
-    """Expressions up to the numbers in the names of their symbols: what equal ones are written as is made once.
-
-    The parts of a large model, and its modes, have the same routines over other symbols. SymPy and the printer put
-    operands in an order of their names. So the names of a letter count by their order, and another letter is another
-    shape; names that are made in between have letters of their own. Every part of an expression is visited once.
-    ``symbols`` has the symbols with their places among the parts, ``names`` the numbered names in order, and ``key``
-    tells shapes apart. With ``beside`` another symbol goes with some symbols.
-    """
-
-    def __init__(self, expressions: Iterable[sp.Basic], beside: Mapping[sp.Basic, sp.Basic] | None = None) -> None:
-        self._nodes: list[object] = []
-        self._numbers: dict[sp.Basic, int] = {}
-        self.symbols: dict[sp.Basic, int] = {}
-        ends = list(map(self._visit, expressions))
-        if beside:
-            ends += [self._visit(beside[symbol]) for symbol in tuple(self.symbols) if symbol in beside]
-        self.names: list[str] = []
-        ranks = Counter[str]()
-        for symbol in sorted(self.symbols, key=lambda s: s.name):
-            if found := _NUMBERED.fullmatch(symbol.name):
-                self._nodes[self.symbols[symbol]] = found[1], ranks[found[1]], symbol.is_real
-                ranks[found[1]] += 1
-                self.names.append(symbol.name)
-        self.key = (*ends, None, *self._nodes)
-
-    def _visit(self, whole: sp.Basic) -> int:
-        numbers, nodes, waiting = self._numbers, self._nodes, [whole]
-        while waiting:
-            expr = waiting[-1]
-            if expr in numbers:
-                waiting.pop()
-            elif expr.args and (missing := [part for part in expr.args if part not in numbers]):
-                waiting += missing
-            else:
-                numbers[expr] = len(nodes)
-                if expr.is_Symbol:
-                    self.symbols[expr] = len(nodes)
-                nodes.append((expr.func, *map(numbers.__getitem__, expr.args)) if expr.args else expr)
-        return numbers[whole]
-
-    def order(self, places: Mapping[sp.Symbol, int]) -> tuple[int, ...]:
-        """The symbols that are arguments, in the order of these, by their places among the parts."""
-        return tuple(
-            self.symbols[symbol] for symbol in sorted(self.symbols.keys() & places.keys(), key=places.__getitem__)
-        )
-
-    def text(self, kind: object, write: Callable[[], str]) -> str:
-        """The text of a ``kind`` that is written of the expressions."""
-        key = (kind, *self.key)
-        if key not in _texts:
-            used = _template(write(), {name: i for i, name in enumerate(self.names)})
-            if len(_texts) >= _MOST_SHAPES:
-                _texts.clear()
-            _texts[key] = used
-        return _filled(_texts[key], self.names)
+def _text(shape: Shape, kind: object, write: Callable[[], str]) -> str:
+    """The text of a ``kind`` that is written of the expressions of a shape, once."""
+    key = (kind, *shape.key)
+    if key not in _texts:
+        used = _template(write(), {name: i for i, name in enumerate(shape.names)})
+        if len(_texts) >= _MOST_SHAPES:
+            _texts.clear()
+        _texts[key] = used
+    return _filled(_texts[key], shape.names)
 
 
 def _template(text: str, places: Mapping[str, int]) -> _Template:

@@ -59,11 +59,11 @@ def shape_of(text: str, data: dict[str, str]) -> tuple[str, tuple[str, ...]]:
 
     Routines of parts that are alike have one shape.
     """
-    given = data | {name: f"x[{int(place) - 1}]" for name, place in _GIVEN.findall(text) if name != "t"}
+    given = {name: f"x[{int(place) - 1}]" for name, place in _GIVEN.findall(text) if name != "t"}
     operands: dict[str, int] = {}
 
     def slot(found: re.Match[str]) -> str:
-        operand = given.get(found[0])
+        operand = given.get(found[0]) or data.get(found[0])
         if operand is None:  # a name of the routine's own
             return found[0]
         return f"{operand[0]}_{operands.setdefault(operand, len(operands))}"

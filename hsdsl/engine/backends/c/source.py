@@ -193,7 +193,7 @@ def routine_functions(routines: Routines, program: Program, prefix: str) -> str:
 class Writer:
     def __init__(self, program: Program) -> None:
         self.data = data_names(program)
-        self.states, self.queues = program.all_states, program.queues
+        self.states, self.queues = {name: str(i) for i, name in enumerate(program.all_states)}, program.queues
         self.timed = bool(program.inputs or program.switches)
         self.functions: dict[str, str] = {}  # by the routine's text
         self.tables: list[str] = []
@@ -230,7 +230,7 @@ class Writer:
             self.pattern(mode.jacobian.elimination),
             str(int(mode.affine)),
             self.only(mode.terms) if mode.terms else "0",
-            self.table("int", "state", [str(self.states.index(name)) for name in mode.states]),
+            self.table("int", "state", [self.states[name] for name in mode.states]),
             str(-1 if mode.held is None else mode.held),
             str(len(mode.measured)),
             self.table("int", "measured", list(map(str, mode.measured))),
