@@ -158,6 +158,69 @@ def test_a_mode_that_comes_back_inside_or_begins_on_a_surface_says_nothing(engin
     assert ball.transitions and "HS708" not in codes(ball)
 
 
+# An input jumps at 1 and back at 4, or its ramps jump. The surface is that of u >= x + 1, and x moves from 0 at a rate.
+DRIVEN = """
+hsdsl: 1
+parameters: {rate: 0, armed: 1}
+inputs: {u: INPUT}
+modes:
+  a:
+    flow: {x: rate, n: 0}
+    transitions: [{name: trip, when: u >= x + 1, if: armed > 1/2, to: b}]
+  b: {flow: {x: 0, n: 0}}
+initial: {mode: a, x: 0, n: 0}
+experiment: {until: 5}
+"""
+INPUTS = {
+    "samples": "{times: [0, 1, 4], values: [0, LEVEL, 0], hold: zero}",
+    "ramps": "{times: [0, 1, 1, 4, 4, 5], values: [0, 0, LEVEL, LEVEL, 0, 0], hold: linear}",
+    "select": '"select((t - 1)*(4 - t), LEVEL, 0)"',
+    "floor": '"LEVEL*min(floor(t/1), 1) - LEVEL*floor(t/4)"',
+}
+
+
+def driven(kind, level, **changes):
+    return hsdsl.loads(DRIVEN.replace("INPUT", INPUTS[kind].replace("LEVEL", str(level)))).simulate(**changes)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("settings", MANNERS)
+@pytest.mark.parametrize("kind", INPUTS)
+def test_an_input_that_carries_a_state_beyond_a_surface_with_an_if_says_so(engine, settings, kind):
+    settings = {"engine": engine} | settings
+    for armed in (0, 1):  # whether `if` holds there or not
+        for level, rate, where in ((2, 0, "beyond"), (2, 1 / 8, "beyond"), (1, 0, "onto")):
+            run = driven(kind, level, parameters={"rate": rate, "armed": armed}, **settings)
+            assert not run.transitions
+            (warning,) = (one for one in run.warnings if one.code == "HS708" or where == "beyond")
+            assert (warning.code, warning.edge) == ("HS708", "trip")
+            assert float(warning.time) == pytest.approx(1, abs=1e-12)
+            assert warning.message.startswith(f"an input's jump carried mode a {where} the surface of trip at t = 1")
+            assert len(warning.message.split()) <= MOST_WORDS
+            assert as_json(run)["warnings"][-1]["code"] == "HS708"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("settings", MANNERS)
+def test_an_input_that_jumps_inside_or_comes_back_says_nothing(engine, settings):
+    settings = {"engine": engine} | settings
+    assert driven("samples", 0.5, **settings).warnings == ()
+    back = driven("samples", 2, parameters={"rate": 2 / 3}, **settings)  # x + 1 is 2 at t = 1.5, and the flow leads back
+    assert not back.transitions and back.warnings == ()
+    leaves = driven("samples", 1, parameters={"rate": 1e-3}, initial={"x": -1e-3}, **settings)
+    assert not leaves.transitions and leaves.warnings == ()
+    fires = driven("samples", 1, parameters={"rate": -1 / 8}, initial={"x": 1 / 8}, **settings)
+    assert [made.edge for made in fires.transitions] == ["trip"] and fires.warnings == ()
+
+
+def test_an_entry_at_a_jump_of_an_input_does_not_hide_that_another_surface_is_passed_by_it():
+    ticks = DRIVEN.replace("transitions: [", "transitions: [{name: tick, when: u - n >= 1, to: a, reset: {n: 3}}, ")
+    run = hsdsl.loads(ticks.replace("INPUT", INPUTS["samples"].replace("LEVEL", "2"))).simulate()
+    assert [made.edge for made in run.transitions] == ["tick"]
+    (warning,) = run.warnings
+    assert (warning.code, warning.edge, warning.time) == ("HS708", "trip", 1)
+
+
 def test_an_event_that_leaves_a_state_beyond_a_surface_does_not_enter_its_mode_anew():
     ticks = JUMPER.replace("    transitions:\n", "    transitions:\n      - {name: tick, event: v <= 0}\n")
     (warning,) = hsdsl.loads(ticks).simulate(until=2).warnings

@@ -96,34 +96,57 @@ def at_the_end(run: RunView) -> Iterator[Remark]:
 
 
 def _entered(run: RunView) -> Iterator[Remark]:
-    """Remarks about edges with an `if` beyond whose surface a mode was entered, and stayed while it lasted."""
-    program, table = run.problem.program, run.execution.arc_table
+    """Remarks about edges with an `if` whose surfaces a state came beyond without flow, and stayed while it lasted.
+
+    It enters a mode, or an input jumps, which may also carry it onto a surface.
+    """
+    program = run.problem.program
+    table, times = run.execution.arc_table, np.asarray(run.execution.times, dtype=float)
+    starts = np.array([arc.first for arc in run.flows], dtype=np.int64)
+    jumps = np.array([float(segment.start) for segment in run.problem.timeline.segments if segment.jump])
     for index, _, rows in run.rows_by_mode():
         mode = program.modes[index]
         conditional = [k for k, edge in enumerate(mode.edges) if may_be_passed(program, edge)]
         if mode.slides or not conditional or not len(rows):
             continue
-        jumps = table.jump[np.searchsorted(table.first, rows, "right") - 1]
-        first = _Steps(run, index, rows[np.r_[True, jumps[1:] != jumps[:-1]]])
+        first = _Steps(run, index, rows[np.isin(rows, starts)])
+        arc = np.searchsorted(table.first, first.rows, "right") - 1
+        jumped = np.isin(times[first.rows], jumps) & (arc > 0) & (table.jump[arc] == table.jump[arc - 1])
         for k in conditional:
             name = mode.edges[k].name
-            entered = f"part {name.rpartition('.')[0]}" if program.parts else f"mode {mode.name} was"
-            what = f"{entered} entered beyond the surface of {name}"
+            part = f"part {name.rpartition('.')[0]}" if program.parts else f"mode {mode.name}"
+            entered = f"{part} entered" if program.parts else f"{part} was entered"
             with suppress(Undecided, *DOMAIN_ERRORS):
-                for row in _entered_beyond(run, index, first, k):
-                    yield Remark("entered", what, run.times[row], edge=name)
+                side, before = first.sides(0.0, k), _sides_before(run, starts, first.rows, name)
+                beyond, onto = (side > 0) & (before <= 0), jumped & (side == 0) & (before < 0)
+                found = {row: "beyond" for row in _staying(run, index, first.rows[beyond].tolist(), k)}
+                found |= {row: "onto" for row in first.rows[onto].tolist() if _stays_on(run, index, row, k)}
+                by_input = dict(zip(first.rows.tolist(), jumped.tolist(), strict=True))
+                for row, where in sorted(found.items()):
+                    how = f"an input's jump carried {part}" if by_input[row] else entered
+                    yield Remark("entered", f"{how} {where} the surface of {name}", run.times[row], edge=name)
 
 
-def _entered_beyond(run: RunView, index: int, first: _Steps, k: int) -> Iterator[int]:
-    """The rows at which visits of a mode begin beyond surface k by more than round-off, and stay there."""
-    beyond = first.take(first.values(0.0, k) > 0)
-    if len(beyond.rows):
-        late = np.abs(beyond.rates(0.0, k)) * 2 * float(run.tie(run.execution.times[-1]))
-        beyond = beyond.take(beyond.values(0.0, k) > np.maximum(beyond.noise(0.0, k), late))
-    name = run.problem.program.modes[index].edges[k].name
-    visits = [row for row in beyond.rows.tolist() if not _was_beyond(run, run.arc_of(row).jump, name)]
-    for some in (visits[i : i + MANY] for i in range(0, len(visits), MANY)):
-        yield from _staying(run, index, some, k)
+def _sides_before(run: RunView, starts: NDArray[np.int64], rows: NDArray[np.int64], name: str) -> Array:
+    """On which side of the surface of an edge of this name states were at the end of the flow before rows.
+
+    They were inside where there was no such edge. ``starts`` are the first rows of all flows.
+    """
+    place = np.searchsorted(starts, rows) - 1
+    found, modes = np.full(len(rows), -1.0), np.array([run.index(run.flows[i].mode) if i >= 0 else -1 for i in place])
+    for index in set(modes[modes >= 0].tolist()):
+        which = modes == index
+        steps = _Steps(run, index, np.array([run.flows[i].last - 1 for i in place[which]], dtype=np.int64))
+        sides = [steps.sides(END, k) for k, edge in enumerate(steps.mode.edges) if edge.name == name]
+        found[which] = np.max([found[which], *sides], axis=0)
+    return found
+
+
+def _stays_on(run: RunView, index: int, row: int, k: int) -> bool:
+    """Whether a state stays on surface k, to round-off, until something else happens."""
+    arc = run.arc_of(row)
+    steps = _Steps(run, index, np.arange(arc.first, arc.last))
+    return not (steps.sides(0.0, k).any() or steps.sides(END, k).any())
 
 
 def _visit(run: RunView, row: int, k: int) -> NDArray[np.int64]:
@@ -142,6 +165,8 @@ def _staying(run: RunView, index: int, entries: Sequence[int], k: int) -> list[i
     """Those of the rows at which visits of a mode begin whose states are surely beyond surface k all along."""
     from hsdsl.engine.simulate.verdict.steps import Parts, high, low, parts_at, undecided  # few runs have such a visit
 
+    if not 0 < len(entries) <= MANY:
+        return [row for i in range(0, len(entries), MANY) for row in _staying(run, index, entries[i : i + MANY], k)]
     visits = [_visit(run, row, k) for row in entries]
     rows, of_visit = np.concatenate(visits), np.repeat(np.arange(len(visits)), [len(visit) for visit in visits])
     inside = np.zeros(len(visits), dtype=bool)
@@ -155,15 +180,6 @@ def _staying(run: RunView, index: int, entries: Sequence[int], k: int) -> list[i
     left, _ = undecided(parts_at(run, index, run.problem.program.modes[index].states, rows), decides, HALVINGS)
     inside[of_visit[np.searchsorted(rows, left.row)]] = True
     return [row for row, came_back in zip(entries, inside.tolist(), strict=True) if not came_back]
-
-
-def _was_beyond(run: RunView, jump: int, name: str) -> bool:
-    """Whether a state was beyond the surface of an edge of this name before what led to a visit."""
-    if not jump:
-        return False
-    place, _ = run.before(run.cascade(run.transitions[jump - 1])[0])
-    same = (k for k, edge in enumerate(place.mode.edges) if edge.name == name)
-    return any(place.value(k) > 0 and not run.is_on(place, k) for k in same)
 
 
 def _passings(run: RunView, *, walls_alone: bool) -> Iterator[Remark]:
@@ -235,6 +251,12 @@ class _Steps:
         for slope, size in zip(map(as_range, kernel.gradients[k](*point)), sizes, strict=True):
             total = total + np.maximum(np.abs(slope.low), np.abs(slope.high)) * size
         return BEYOND * ROUNDOFF_UNITS * max(float(self.run.arithmetic.unit), FLOAT64.unit) * total
+
+    def sides(self, share: float, k: int) -> Array:
+        """On which side of surface k states are: 1 beyond it, -1 inside, 0 on it to round-off or for a tie."""
+        late = np.abs(self.rates(share, k)) * 2 * float(self.run.tie(self.run.execution.times[-1]))
+        values, noise = self.values(share, k), np.maximum(self.noise(share, k), late)
+        return np.where(values > noise, 1.0, np.where(values < -noise, -1.0, 0.0))
 
     def take(self, which: NDArray[np.bool_]) -> _Steps:
         """Some of the steps."""
