@@ -207,6 +207,8 @@ def check(seed: int, settings: Any, engines: Any) -> int:
             assert told.keys() == passed.keys(), (what, told, passed)
             entries = {w.edge: float(w.time) for w in run.warnings if w.code == "HS708"}
             assert entries == pytest.approx(beyond, abs=10 * TANGENTIAL), what
+            ensemble = model.ensemble(scheme=scheme, engine=engine, **arguments)
+            assert ("HS708" in ensemble.warnings.item()) == bool(beyond), what
             for edge, times in passed.items():
                 sharp = scheme == "located" and min(times) > 0  # else late by strips, or within round-off for a while
                 assert told[edge].time == pytest.approx(min(times), abs=1e-7 if sharp else 10 * TANGENTIAL), what

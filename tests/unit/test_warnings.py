@@ -158,6 +158,17 @@ def test_a_mode_that_comes_back_inside_or_begins_on_a_surface_says_nothing(engin
     assert ball.transitions and "HS708" not in codes(ball)
 
 
+PARTS = """
+hsdsl: 1
+automata:
+  body:
+    parameters: {start: 0.75, speed: 0.5, last: 3}
+    MODES
+system:
+  a: {automaton: body, initial: {mode: ground, h: 1, v: 0, n: 0}}
+  b: {automaton: body, initial: {mode: ground, h: 1, v: 1/4, n: 0}, parameters: {speed: 1.5}}
+experiment: {until: 7}
+""".replace("MODES", JUMPER[JUMPER.index("modes:") : JUMPER.index("initial:")].replace("\n", "\n    "))
 # An input jumps at 1 and back at 4, or its ramps jump. The surface is that of u >= x + 1, and x moves from 0 at a rate.
 DRIVEN = """
 hsdsl: 1
@@ -205,12 +216,34 @@ def test_an_input_that_carries_a_state_beyond_a_surface_with_an_if_says_so(engin
 def test_an_input_that_jumps_inside_or_comes_back_says_nothing(engine, settings):
     settings = {"engine": engine} | settings
     assert driven("samples", 0.5, **settings).warnings == ()
-    back = driven("samples", 2, parameters={"rate": 2 / 3}, **settings)  # x + 1 is 2 at t = 1.5, and the flow leads back
+    back = driven(
+        "samples", 2, parameters={"rate": 2 / 3}, **settings
+    )  # x + 1 is 2 at t = 1.5, and the flow leads back
     assert not back.transitions and back.warnings == ()
     leaves = driven("samples", 1, parameters={"rate": 1e-3}, initial={"x": -1e-3}, **settings)
     assert not leaves.transitions and leaves.warnings == ()
     fires = driven("samples", 1, parameters={"rate": -1 / 8}, initial={"x": 1 / 8}, **settings)
     assert [made.edge for made in fires.transitions] == ["trip"] and fires.warnings == ()
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("settings", [{}, {"method": "dop853"}, {"method": "rk4", "step": 0.05, "tolerance": None},
+                                      {"scheme": "relaxed", "relaxation": 1e-6}])  # fmt: skip
+@pytest.mark.parametrize("samples", [None, 7])
+def test_ensembles_tell_without_a_verdict_what_came_beyond_a_surface_with_an_if(engine, settings, samples):
+    settings = {"engine": engine, "samples": samples} | settings
+    many = 70 if engine == "c" else 1  # so many follow in lanes, where they can
+    jumper = hsdsl.loads(JUMPER).ensemble(parameters={"speed": np.tile([0.5, 1.5], many)}, **settings)
+    assert jumper.warnings.tolist() == ["HS708", ""] * many
+    for kind in INPUTS:
+        for level, expected in ((2, ["HS708", "HS708", ""]), (1, ["HS708", "", ""]), (1 / 2, ["", "", ""])):
+            model = hsdsl.loads(DRIVEN.replace("INPUT", INPUTS[kind].replace("LEVEL", str(level))))
+            rates = np.tile([0, 1 / 8, 2 / 3], many)  # the last comes back
+            ensemble = model.ensemble(parameters={"rate": rates, "armed": 0}, initial={"x": 0 * rates}, **settings)
+            assert ensemble.warnings.tolist() == expected * many, (kind, level)
+    if engine == "c":
+        parts = hsdsl.loads(PARTS).ensemble(parameters={"a.start": np.tile([0.75, 2], many)}, **settings)
+        assert parts.warnings.tolist() == ["HS708", ""] * many
 
 
 def test_an_entry_at_a_jump_of_an_input_does_not_hide_that_another_surface_is_passed_by_it():
@@ -231,19 +264,7 @@ def test_an_event_that_leaves_a_state_beyond_a_surface_does_not_enter_its_mode_a
 
 
 def test_a_part_that_enters_beyond_a_surface_says_so_and_others_do_not():
-    modes = JUMPER[JUMPER.index("modes:") : JUMPER.index("initial:")].replace("\n", "\n    ")
-    text = f"""
-hsdsl: 1
-automata:
-  body:
-    parameters: {{start: 0.75, speed: 0.5, last: 3}}
-    {modes}
-system:
-  a: {{automaton: body, initial: {{mode: ground, h: 1, v: 0, n: 0}}}}
-  b: {{automaton: body, initial: {{mode: ground, h: 1, v: 1/4, n: 0}}, parameters: {{speed: 1.5}}}}
-experiment: {{until: 7}}
-"""
-    run = hsdsl.loads(text).simulate()
+    run = hsdsl.loads(PARTS).simulate()
     assert {made.edge for made in run.transitions} == {"a.jump", "a.again", "b.jump", "b.touch"}
     (warning,) = run.warnings
     assert (warning.code, warning.edge) == ("HS708", "a.touch") and warning.message.startswith(

@@ -17,13 +17,17 @@ from hsdsl.engine.simulate.compiled import MOST_TRANSITIONS, CompiledPlan, task_
 from hsdsl.engine.simulate.control import FIRST_PART, LARGEST_SHARE
 from hsdsl.engine.simulate.input_segments import Timeline
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.stops import codes_of
+from hsdsl.engine.simulate.stops import codes_of, may_be_passed
 
 TIMELINE, SETTINGS = np.dtype(structures.Timeline), np.dtype(structures.Settings)
 LONGEST = f"U{max(map(len, REASONS))}"
 NOTICED = {"in contact": "held", "replaced": "replaced", "unsettled": "rough", "crowded": "crowded"}
-SLID = 16  # the bit of `HS_SLID`
-KINDS_OF_NOTICES = [(SLID, "sliding"), *((structures.NOTICES.index(word), kind) for word, kind in NOTICED.items())]
+SLID, ENTERED = 16, 17  # the bits of `HS_SLID` and `HS_ENTERED`
+KINDS_OF_NOTICES = [
+    (SLID, "sliding"),
+    (ENTERED, "entered"),
+    *((structures.NOTICES.index(word), kind) for word, kind in NOTICED.items()),
+]
 FEWEST_IN_LANES = 64  # instances: fewer leave most lanes empty
 UNDER_WAY = 2  # runs for each lane: others wait for their crossings
 IN_MODES = 3  # the same where they are in several modes
@@ -103,6 +107,7 @@ class CompiledEnsemble:
         self._names, self._layouts = names, plan.layouts
         modes = plan.problem.program.modes
         self._slides = np.array([bool(mode.slides) for mode in modes] * any(mode.slides for mode in modes), np.int32)
+        self._watched = _watched(plan)
         self._stop = np.zeros(1, np.int32)
         self._lanes: Any = None
 
@@ -141,7 +146,7 @@ class CompiledEnsemble:
             return before
         room, lanes = LOG_ROOM if self._kept.logs else 0, self._lanes
         places = [
-            ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1], room)
+            ThreadWorkspace(self._plan, self._names, self._layouts, self._time.shape[1], room, self._watched)
             for _ in range(self._together if lanes else 1)
         ]
         if lanes:
@@ -166,7 +171,13 @@ class ThreadWorkspace:
     """One thread's memory."""
 
     def __init__(
-        self, plan: CompiledPlan, names: tuple[str, ...], layouts: StateLayouts, samples: int, log_room: int
+        self,
+        plan: CompiledPlan,
+        names: tuple[str, ...],
+        layouts: StateLayouts,
+        samples: int,
+        log_room: int,
+        watched: Array,
     ) -> None:
         self.table = structures.Ensemble()
         self.workspace = plan.workspaces.new(self.table.task)
@@ -187,6 +198,15 @@ class ThreadWorkspace:
             np.empty((log_room, model.width)),
             np.empty((log_room, model.width)),
         )
+        watch, count = self.table.watch, int(watched.max(initial=-1)) + 1
+        self._watch = (
+            np.zeros(count + model.states + 2 * model.surfaces + 2 * model.width + 1),
+            np.zeros(count, np.int32),
+        )
+        watch.names, watch.name, watch.came = count, watched.ctypes.data, self._watch[1].ctypes.data
+        watch.side = self._watch[0].ctypes.data
+        watch.sizes = watch.side + 8 * count
+        watch.memory = watch.sizes + 8 * model.states
         self._full: list[Logged] = []
         self.others: list[ThreadWorkspace] = []
         self.team: Any = None
@@ -236,6 +256,17 @@ class ThreadWorkspace:
         first, second, third = (np.concatenate(column)[:count] for column in zip(*self._full, strict=True))
         self._full.clear()
         return first, second, third
+
+
+def _watched(plan: CompiledPlan) -> Array:
+    """For each mode and surface the number of the name of an edge with an `if`, -1 where that is not watched."""
+    program, numbers = plan.problem.program, dict[str, int]()
+    watched = np.full((len(program.modes), plan.compiled.table.surfaces), -1, np.int32)
+    for row, mode in zip(watched, program.modes, strict=True):
+        for k, edge in enumerate(() if mode.slides else mode.edges):
+            if may_be_passed(program, edge):
+                row[k] = numbers.setdefault(edge.name, len(numbers))
+    return watched
 
 
 def _row(array: Any, row: int) -> int:

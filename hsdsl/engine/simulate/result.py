@@ -18,7 +18,7 @@ from hsdsl.engine.simulate.compiled import CompiledRun
 from hsdsl.engine.simulate.output_buffers import arcs_of, last_arc, transitions_of
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.settings import Settings
-from hsdsl.engine.simulate.stops import LEFT_OUT, TWO_STEP, Diagnostics, noted, warnings_of
+from hsdsl.engine.simulate.stops import LEFT_OUT, TWO_STEP, Diagnostics, warnings_of
 
 if TYPE_CHECKING:
     from hsdsl.engine.simulate.run import Run
@@ -35,7 +35,7 @@ def from_recorder(known: dict[str, Any], run: Run, stop: Stop, seconds: dict[str
         stop=stop,
         seconds=seconds,
         assessment=partial(_assessment, run, lambda: run.diagnostics),
-        noted=partial(noted, run.program, run.diagnostics),
+        noted=partial(_noted, run, run.diagnostics),
         settings=described(run.settings, run.program.left_out),
         transitions=transitions,
         final=_final(columns["arcs"][-1], columns, run.program.outputs, run.tails.states(run.program.modes)),
@@ -187,6 +187,12 @@ def described(settings: Settings, left_out: tuple[str, ...] = ()) -> dict[str, A
         **({} if settings.method_chosen is None else {"method_chosen": settings.method_chosen}),
         **({"left_out": {"states": list(left_out), "reason": LEFT_OUT}} if left_out else {}),
     }
+
+
+def _noted(problem: Problem, diagnostics: Diagnostics, execution: Execution) -> str:
+    from hsdsl.engine.simulate.verdict import RunView, noted  # of ensembles by the Python loop
+
+    return noted(RunView(problem, execution), diagnostics)
 
 
 def _assessment(

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from hsdsl.base.defaults import MOST_WAITING
 from hsdsl.base.names import without_memory
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.execution import Execution, RunWarning, Stop
+from hsdsl.engine.execution import RunWarning, Stop
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 
@@ -156,15 +156,6 @@ def loop_remarks(program: Program, diagnostics: Diagnostics, stop: Stop) -> Iter
             yield Remark("rough", wall_of(modes[name], k), time)
 
 
-def noted(program: Program, diagnostics: Diagnostics, execution: Execution) -> str:
-    """The codes of what the loop itself has remarked of a run, with a space between two."""
-    slide, times = {mode.name for mode in program.modes if mode.slides}, execution.times
-    kinds = {remark.kind for remark in loop_remarks(program, diagnostics, execution.stop)}
-    if any(times[arc.last] > times[arc.first] for arc in execution.arcs if arc.mode in slide):
-        kinds.add("sliding")
-    return codes_of(kinds)
-
-
 def codes_of(kinds: Iterable[str]) -> str:
     """The codes of kinds of remarks, with a space between two."""
     return " ".join(sorted({SENTENCES[kind][0] for kind in kinds}))
@@ -178,11 +169,14 @@ def may_be_passed(program: Program, edge: EdgeProgram) -> bool:
     return edge.conditional and not edge.of_event and not program.modes[edge.target].slides
 
 
+def may_come_beyond(program: Program) -> bool:
+    """Whether a mode has an edge with an `if`, beyond whose surface states may come without flow."""
+    return any(may_be_passed(program, edge) for mode in program.modes if not mode.slides for edge in mode.edges)
+
+
 def has_remarks_at_rows(program: Program) -> bool:
     """Whether a run may end in a wall, or enter a mode beyond the surface of an edge with an `if`."""
-    own = [mode for mode in program.modes if not mode.slides]
-    entered = any(may_be_passed(program, edge) for mode in own for edge in mode.edges)
-    return entered or any(mode.final and mode.walls for mode in own)
+    return may_come_beyond(program) or any(mode.final and mode.walls for mode in program.modes)
 
 
 def wall_of(mode: ModeProgram, k: int) -> str:

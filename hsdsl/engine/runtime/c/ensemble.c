@@ -62,10 +62,139 @@ static int shown_alike(hs_time a, hs_time b) {
   return !strcmp(one, other);
 }
 
+enum { CAME_BEYOND = 1, CAME_ONTO = 2, PARTS_OF_STEP = 8, WATCHED_UNITS = 4 * ROUNDOFF_UNITS };
+
+/* The state at a share of the step from a row of the chunk, and what surfaces are there. */
+static int surfaces_at(hs_ensemble *e, const hs_mode *mode, int64_t row, double share, const double *p, double *values) {
+  const hs_chunk *chunk = &e->task.chunk;
+  const int w = e->task.model->width, degree = e->task.method->degree;
+  const double *const x = chunk->values + row * w, *const c = chunk->pieces + (row + 1) * degree * w;
+  const double length = row + 1 < chunk->rows ? chunk->times[row + 1] - chunk->times[row] : 0.0;
+  double *const at = values + e->task.model->surfaces;
+  for (int s = 0; s < mode->dimension; s++) {
+    double moved = share > 0 && !degree ? (x[w + s] - x[s]) * share : 0.0;
+    for (int m = share > 0 ? degree - 1 : -1; m >= 0; m--) moved = (moved + c[m * w + s]) * share;
+    at[s] = share == 1.0 ? x[w + s] : x[s] + moved;
+  }
+  return mode->values(p, chunk->times[row] + share * length, at, values);
+}
+
+/* On which side of surface k states are, by its value there: to round-off, or for a tie, they are on it. */
+static double side_of(hs_ensemble *e, const hs_mode *mode, int k, double t, const double *p, const double *values) {
+  const hs_model *const model = e->task.model;
+  const double *const x = values + model->surfaces;
+  double *const slopes = e->watch.memory + model->surfaces + model->width, *const magnitudes = slopes + model->width + 1;
+  double rate, total;
+  const hs_sparse *const row = &mode->gradients[k];
+  if (mode->magnitudes(p, t, x, magnitudes) || hs_call(&mode->rates[k], p, t, x, &rate)) return values[k] > 0 ? 1 : -1;
+  total = magnitudes[k];
+  if (!hs_call(&row->values, p, t, x, slopes))
+    for (int i = 0; i < row->count; i++) {
+      const int s = row->place[i] - 1;
+      total += fabs(slopes[i]) * (s < 0 ? fabs(t) : hs_max(fabs(x[s]), e->watch.sizes[mode->state[s]]));
+    }
+  const double noise = hs_max(WATCHED_UNITS * HS_UNIT * total, fabs(rate) * 2 * HS_TIE * e->task.settings.until);
+  return values[k] > noise ? 1 : values[k] < -noise ? -1 : 0;
+}
+
+/* Begin to watch an arc of flow: see _entered() in hsdsl/engine/simulate/verdict/remarks.py. */
+static void begin_watching(hs_ensemble *e, const hs_arc *arc, int64_t row, const int32_t *name) {
+  const hs_model *const model = e->task.model;
+  const hs_mode *const mode = &model->mode[arc->mode];
+  const hs_timeline *const timeline = e->task.timeline;
+  hs_watch *const watch = &e->watch;
+  double *const values = watch->memory;
+  const double t = e->task.chunk.times[row];
+  const int64_t segment = segment_at(timeline, t);
+  const double *const p = timeline->data + segment * model->data;
+  const int jumped = watch->arc && watch->jump == arc->jump && timeline->jump[segment] && timeline->start[segment] == t;
+  const int known = !surfaces_at(e, mode, row, 0.0, p, values), same = watch->arc && watch->mode == arc->mode;
+  for (int k = 0; k < mode->edges; k++) {
+    const int i = name[k];
+    if (i < 0 || !known) continue;
+    int32_t *const came = &watch->came[i];
+    if (*came == CAME_BEYOND && same && values[k] > 0) continue;
+    if (*came) e->notices[e->done] |= HS_ENTERED;
+    const double side = side_of(e, mode, k, t, p, values);
+    *came = side > 0 && !(watch->side[i] > 0) ? CAME_BEYOND : jumped && side == 0 && watch->side[i] < 0 ? CAME_ONTO : 0;
+  }
+  for (int i = 0; !same && i < watch->names; i++) {
+    int here = 0;
+    for (int k = 0; k < mode->edges; k++) here |= name[k] == i;
+    if (!here && watch->came[i]) e->notices[e->done] |= HS_ENTERED, watch->came[i] = 0;
+  }
+  watch->arc = arc->first + 1, watch->jump = arc->jump, watch->mode = arc->mode;
+}
+
+/* Watch states that have come beyond a surface or onto it along the step from a row: whether they stay there. */
+static void watch_step(hs_ensemble *e, const hs_mode *mode, int64_t row, const double *p, const int32_t *name) {
+  double *const values = e->watch.memory, *const times = e->task.chunk.times;
+  for (int part = 1; part <= PARTS_OF_STEP; part++) {
+    if (surfaces_at(e, mode, row, part / (double)PARTS_OF_STEP, p, values)) continue;
+    for (int k = 0; k < mode->edges; k++) {
+      int32_t *const came = name[k] < 0 ? 0 : &e->watch.came[name[k]];
+      if (came && *came == CAME_BEYOND && values[k] <= 0) *came = 0;
+      if (came && *came == CAME_ONTO && part == PARTS_OF_STEP && side_of(e, mode, k, times[row + 1], p, values)) *came = 0;
+    }
+  }
+}
+
+/* Watch the steps of an arc of flow from a row to another, and see where states are then. */
+static void watch_steps(hs_ensemble *e, const hs_mode *mode, int64_t first, int64_t last, const int32_t *name) {
+  const hs_model *const model = e->task.model;
+  const hs_timeline *const timeline = e->task.timeline;
+  const hs_chunk *const chunk = &e->task.chunk;
+  hs_watch *const watch = &e->watch;
+  const double *p = 0;
+  for (int64_t row = first; row < last; row++) {
+    const double *const x = chunk->values + row * model->width;
+    int pending = 0;
+    for (int s = 0; s < mode->dimension; s++) {
+      double *const size = &watch->sizes[mode->state[s]];
+      *size = hs_max(*size, hs_max(fabs(x[s]), fabs(x[model->width + s])));
+    }
+    for (int i = 0; i < watch->names; i++) pending |= watch->came[i];
+    if (!pending && row + 1 < last) continue;
+    p = timeline->data + segment_at(timeline, chunk->times[row]) * model->data;
+    if (pending) watch_step(e, mode, row, p, name);
+  }
+  for (int i = 0; i < watch->names; i++) watch->side[i] = -1;
+  if (surfaces_at(e, mode, last - 1, 1.0, p, watch->memory)) return;
+  for (int k = 0; k < mode->edges; k++)
+    if (name[k] >= 0) watch->side[name[k]] = side_of(e, mode, k, chunk->times[last], p, watch->memory);
+}
+
+/* Watch the chunk's arcs of flow: whether a state comes beyond the surface of an edge with an `if` without flow, as it
+   enters a mode or an input jumps, or by such a jump onto it, and stays there while the flow lasts. */
+static void watch(hs_ensemble *e, int ended) {
+  const hs_chunk *const chunk = &e->task.chunk;
+  const hs_model *const model = e->task.model;
+  hs_watch *const watch = &e->watch;
+  for (int64_t a = 0; a < chunk->arcs; a++) {
+    const hs_arc *const arc = &chunk->arc[a];
+    const hs_mode *const mode = &model->mode[arc->mode];
+    const int32_t *const name = watch->name + (int64_t)arc->mode * model->surfaces;
+    const int64_t first = arc->first > e->base ? arc->first - e->base : 0, made = arc->jump - e->made;
+    const int64_t last = (a + 1 < chunk->arcs ? chunk->arc[a + 1].first - e->base : chunk->rows) - 1;
+    if (arc->kind != HS_FLOW || mode->final) continue;
+    if (last > first && chunk->times[last] > chunk->times[first]) {
+      if (watch->arc != arc->first + 1) begin_watching(e, arc, first, name);
+      watch_steps(e, mode, first, last, name);
+    }
+    if (watch->arc == arc->first + 1 && made >= 0 && made < chunk->transitions) { /* it is left by its own edge */
+      const int i = name[chunk->transition[made].edge];
+      if (i >= 0) watch->came[i] = 0;
+    }
+  }
+  for (int i = 0; ended && i < watch->names; i++)
+    if (watch->came[i]) e->notices[e->done] |= HS_ENTERED;
+}
+
 /* Which kinds of notices the chunk has, and whether it slides; a wall that ends the run was not followed roughly. */
 static void keep_notices(hs_ensemble *e, int ended) {
   const hs_chunk *chunk = &e->task.chunk;
   int32_t *notices = &e->notices[e->done];
+  if (e->watch.names) watch(e, ended);
   for (int64_t i = 0; i < chunk->notes; i++) {
     const hs_note *note = &chunk->note[i];
     if (note->kind == HS_IN_CONTACT && shown_alike(note->time, note->other)) continue;
@@ -131,6 +260,9 @@ static void keep(hs_ensemble *e) {
 static void begin_instance(hs_ensemble *e) {
   hs_task *const task = &e->task;
   e->base = e->made = e->next = e->layout = 0;
+  e->watch.arc = 0;
+  for (int i = 0; i < e->watch.names; i++) e->watch.came[i] = 0, e->watch.side[i] = -1;
+  for (int s = 0; e->watch.names && s < task->model->states; s++) e->watch.sizes[s] = 0;
   task->timeline = &e->timeline[e->done];
   task->settings = e->settings[e->done];
   task->x = e->start + e->done * task->dimension;

@@ -113,6 +113,7 @@ typedef enum {
 } hs_notice;
 
 #define HS_SLID (1 << 16) /* beside the bits of notices: the run slid between two modes */
+#define HS_ENTERED (1 << 17) /* and came beyond the surface of an edge with an `if` without flow */
 
 /* A diagnostic: see hsdsl/engine/simulate/stops.py. `surface` is an edge, but for HS_UNSETTLED. */
 typedef struct {
@@ -282,6 +283,18 @@ HS_EXPORT int64_t hs_sample(const hs_sampling *sampling);
 HS_EXPORT int64_t hs_sample_record(const hs_sampling *shared, const hs_record *record, const int32_t *layout,
                                    int64_t samples, double *memory);
 
+/* What ensembles watch of edges with an `if`, by the names of these: see watch() in ensemble.c. */
+typedef struct {
+  int32_t names;         /* 0 where nothing is watched */
+  const int32_t *name;   /* (modes, surfaces of the mode with most): -1 where it is not watched */
+  double *side;          /* (names): where states were as the last arc of flow ended; beyond is 1, on it 0, inside -1 */
+  int32_t *came;         /* (names): whether they have come beyond a surface, or onto it, and stay there */
+  double *sizes;         /* (states of all modes): the largest they have had */
+  double *memory;        /* 2 surfaces and 2 widths, and one more */
+  int64_t arc, jump;     /* of the last arc of flow: its first row, counted from 1, and its number of transitions */
+  int32_t mode;
+} hs_watch;
+
 /* Many instances of one model: `task` must come first; of each run only the results below are kept. */
 typedef struct hs_ensemble {
   hs_task task;
@@ -296,7 +309,8 @@ typedef struct hs_ensemble {
   int32_t *reason, *mode;      /* (instances) */
   int32_t *kind;               /* (instances): layout of the last arc */
   const int32_t *slides;       /* (modes): whether one is motion between two modes; 0 where none is */
-  int32_t *notices;            /* (instances): kinds of notices, a bit each, and HS_SLID */
+  int32_t *notices;            /* (instances): kinds of notices, a bit each, HS_SLID and HS_ENTERED */
+  hs_watch watch;
   int64_t *transitions;        /* (instances): how many were made */
   double *ended;               /* (instances): the last time */
   double *final;               /* (instances, width) */

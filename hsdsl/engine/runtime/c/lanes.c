@@ -167,7 +167,7 @@ static int begin_next(hs_team *team, hs_seat *seat, int *outcome) {
   begin_instance(e);
   open_run(&seat->run, &e->task);
   seat->run.lanes.parks = 1;
-  seat->run.lanes.bare = !e->samples && !e->slides;
+  seat->run.lanes.bare = !e->samples && !e->slides && !e->watch.names;
   *outcome = begin_run(&seat->run, &e->task, 0.0);
   return 1;
 }
@@ -366,7 +366,7 @@ static void share(hs_ensemble *e, const hs_ensemble *first) {
   const hs_ensemble own = *e;
   if (e == first) return;
   *e = *first;
-  e->task = own.task, e->sampling = own.sampling, e->layouts = own.layouts;
+  e->task = own.task, e->sampling = own.sampling, e->layouts = own.layouts, e->watch = own.watch;
 }
 
 void hs_run_team(hs_team *team) {

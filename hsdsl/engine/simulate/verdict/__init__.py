@@ -38,13 +38,13 @@ from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.stops import Diagnostics, show
 from hsdsl.engine.simulate.verdict.commutation import choices, first_of_many, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
-from hsdsl.engine.simulate.verdict.remarks import WARNINGS, remarked, told
+from hsdsl.engine.simulate.verdict.remarks import WARNINGS, noted, remarked, told
 from hsdsl.engine.simulate.verdict.run_view import Finding, RunView
 from hsdsl.engine.simulate.verdict.screen import Margins, screens_of
 from hsdsl.engine.simulate.verdict.shadow import has_shadow, is_compiled
 from hsdsl.mathematics.program import Program
 
-__all__ = ["RunView", "assess", "assess_compiled"]
+__all__ = ["RunView", "assess", "assess_compiled", "noted"]
 
 MANY = 10_000  # steps
 
@@ -97,10 +97,10 @@ def _judged(run: RunView, diagnostics: Diagnostics) -> tuple[Verdict, RunView]:
         if diagnostics.departures:
             return Verdict("left", _once(diagnostics.departures)), run
         return Verdict("unknown", _once(diagnostics.undecided, _unchecked(run))), run
-    noted = diagnostics.departures or diagnostics.undecided
-    if not noted and (matters := first_of_many(run)):
+    told_so = diagnostics.departures or diagnostics.undecided
+    if not told_so and (matters := first_of_many(run)):
         return Verdict("left", (matters,)), run
-    if not (noted or run.against or run.followed) and has_shadow(run.problem, run.execution):
+    if not (told_so or run.against or run.followed) and has_shadow(run.problem, run.execution):
         by_shadow = replace(run, by_shadow=True)
         if by_shadow.screen is not None or not is_compiled(run.execution):
             found = _assessed(by_shadow, diagnostics)

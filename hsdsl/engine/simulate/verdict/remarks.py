@@ -25,9 +25,11 @@ from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import (
     Diagnostics,
     Remark,
+    codes_of,
     has_remarks_at_rows,
     loop_remarks,
     may_be_passed,
+    may_come_beyond,
     of_edge,
     wall_of,
     warnings_of,
@@ -73,6 +75,14 @@ def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:
     return found
 
 
+@np.errstate(all="ignore")
+def noted(run: RunView, diagnostics: Diagnostics) -> str:
+    """The codes of what needs no verdict, with a space between two, as the compiled loop finds them of ensembles."""
+    kinds = {remark.kind for remark in loop_remarks(run.problem.program, diagnostics, run.stop)}
+    kinds |= {"sliding" for _ in sliding_spans(run)}
+    return codes_of(kinds | {remark.kind for remark in _entered(run)})
+
+
 def at_rows(run: RunView) -> Iterator[Remark]:
     """Remarks about states at rows, which no hypothesis of the theorem concerns."""
     yield from at_the_end(run)
@@ -101,6 +111,8 @@ def _entered(run: RunView) -> Iterator[Remark]:
     It enters a mode, or an input jumps, which may also carry it onto a surface.
     """
     program = run.problem.program
+    if not may_come_beyond(program):
+        return
     table, times = run.execution.arc_table, np.asarray(run.execution.times, dtype=float)
     starts = np.array([arc.first for arc in run.flows], dtype=np.int64)
     jumps = np.array([float(segment.start) for segment in run.problem.timeline.segments if segment.jump])
@@ -132,11 +144,13 @@ def _sides_before(run: RunView, starts: NDArray[np.int64], rows: NDArray[np.int6
 
     They were inside where there was no such edge. ``starts`` are the first rows of all flows.
     """
-    place = np.searchsorted(starts, rows) - 1
-    found, modes = np.full(len(rows), -1.0), np.array([run.index(run.flows[i].mode) if i >= 0 else -1 for i in place])
+    places: list[int] = (np.searchsorted(starts, rows) - 1).tolist()
+    before = [run.flows[i] if i >= 0 else None for i in places]
+    last = np.array([arc.last - 1 if arc else -1 for arc in before], dtype=np.int64)
+    found, modes = np.full(len(rows), -1.0), np.array([run.index(arc.mode) if arc else -1 for arc in before])
     for index in set(modes[modes >= 0].tolist()):
         which = modes == index
-        steps = _Steps(run, index, np.array([run.flows[i].last - 1 for i in place[which]], dtype=np.int64))
+        steps = _Steps(run, index, last[which])
         sides = [steps.sides(END, k) for k, edge in enumerate(steps.mode.edges) if edge.name == name]
         found[which] = np.max([found[which], *sides], axis=0)
     return found
