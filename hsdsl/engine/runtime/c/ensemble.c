@@ -79,13 +79,15 @@ static int surfaces_at(hs_ensemble *e, const hs_mode *mode, int64_t row, double 
   return mode->values(p, chunk->times[row] + share * length, at, values);
 }
 
-/* On which side of surface k states are, by its value there: to round-off, or for a tie, they are on it. */
+/* On which side of surface k states are, by its value there: to round-off, or for a tie, they are on it. Where no input
+   jumps, on it is as good as inside. */
 static double side_of(hs_ensemble *e, const hs_mode *mode, int k, double t, const double *p, const double *values) {
   const hs_model *const model = e->task.model;
   const double *const x = values + model->surfaces;
   double *const slopes = e->watch.memory + model->surfaces + model->width, *const magnitudes = slopes + model->width + 1;
   double rate, total;
   const hs_sparse *const row = &mode->gradients[k];
+  if (values[k] <= 0 && e->task.timeline->segments == 1) return -1;
   if (mode->magnitudes(p, t, x, magnitudes) || hs_call(&mode->rates[k], p, t, x, &rate)) return values[k] > 0 ? 1 : -1;
   total = magnitudes[k];
   if (!hs_call(&row->values, p, t, x, slopes))
