@@ -23,22 +23,14 @@ __all__ = ["DEEPEST", "FEATURE", "imported", "is_sbml", "placed"]
 
 _HINTS = {"the package 'comp'": HINT}
 FEATURE = "HS334"  # the code of what a model cannot keep
-
-
 DEEPEST = 256  # elements of a file in each other
 
 
 def imported(root: Element, until: str | None = None, outputs: Mapping[str, str] | None = None) -> str:
-    """The text of a model for the root of a file.
+    """The text of a model for the root of an SBML file, Level 2 or 3.
 
-    Parameters
-    ----------
-    root : Element
-        Of an SBML file, Level 2 or 3.
-    until : str
-        The end of the run, which SBML does not say.
-    outputs : mapping of str to str
-        What is recorded: names, each with ``value``, ``amount`` or ``concentration``.
+    The file does not say when a run ends, at ``until``. ``outputs`` are what is recorded: names, each with ``value``,
+    ``amount`` or ``concentration``.
 
     Raises ModelError: what a model cannot keep, with its place.
     Raises UsageError: no end of the run.
@@ -50,9 +42,5 @@ def imported(root: Element, until: str | None = None, outputs: Mapping[str, str]
             converter = Converter(model_of(root))
             return written(converter, converter.document(outputs or {}, end), root.file.path)
     except NotExpressible as feature:
-        raise _refused(feature, root) from None
-
-
-def _refused(feature: NotExpressible, element: Element) -> ModelError:
-    place = feature.element or element
-    return ModelError([place.fault(FEATURE, feature.message, _HINTS.get(str(feature)))])
+        place = feature.element or root
+        raise ModelError([place.fault(FEATURE, feature.message, _HINTS.get(str(feature)))]) from None

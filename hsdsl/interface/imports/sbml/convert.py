@@ -49,8 +49,7 @@ class Converter(Facts):
     @cached_property
     def running(self) -> Writer:
         """Writes formulas that are evaluated while a run goes on."""
-        rate = self.rate
-        return Writer(lambda node: self.named(node.name, node), rate, self.flag, function=self.called)
+        return Writer(lambda node: self.named(node.name, node), self.rate, self.flag, function=self.called)
 
     @cached_property
     def initially(self) -> Writer:
@@ -72,9 +71,7 @@ class Converter(Facts):
             raise NotExpressible(NOTHING if name in self.unset else ENDLESS, element)
         if name not in self.quantities and name not in self.reactions:
             raise Undefined(f"nothing in this file is called '{name}'", element)
-        if name in self.references and self.is_number(name):
-            return self.start(name)
-        return self.spelled(name)
+        return self.start(name) if name in self.references and self.is_number(name) else self.spelled(name)
 
     def flag(self, writer: Writer, condition: Node) -> str:
         """The state that is 1 while a condition holds."""
@@ -91,25 +88,21 @@ class Converter(Facts):
         if name in self.unknowns:
             raise NotExpressible("an initial value by an algebraic rule", self.quantities[name].element)
         if name in self.reactions or name in self.model.assigned:
-            return self._written_first(name)
+            if name not in self._first:
+                self._first[name] = None
+                rule = self.model.assigned.get(name)
+                text = self.law(name, self.initially) if rule is None else f"({self.initially.number(rule)})"
+                if len(text) > LONGEST:
+                    feature = f"an initial value of more than {LONGEST:,} characters"
+                    raise NotExpressible(feature, self.model.element)
+                self._first[name] = text
+            found = self._first[name]
+            if found is None:
+                raise NotExpressible("assignment rules in a circle", self.model.element)
+            return found
         if self.held_amount(name):
             return f"({self.own(name)}/{self.initial_name(self.volume(name) or '')})"
         return self.named(name, node)
-
-    def _written_first(self, name: str) -> str:
-        """The initial value of a rule's variable, or of a reaction's rate."""
-        if name not in self._first:
-            self._first[name] = None
-            rule = self.model.assigned.get(name)
-            text = self.law(name, self.initially) if rule is None else f"({self.initially.number(rule)})"
-            if len(text) > LONGEST:
-                feature = f"an initial value of more than {LONGEST:,} characters"
-                raise NotExpressible(feature, self.model.element)
-            self._first[name] = text
-        found = self._first[name]
-        if found is None:
-            raise NotExpressible("assignment rules in a circle", self.model.element)
-        return found
 
     def law(self, name: str, writer: Writer) -> str:
         """The rate of a reaction."""
@@ -155,9 +148,7 @@ class Converter(Facts):
         total = " + ".join(reactions)
         factor = self.species[name].factor or self.model.factor
         total = f"({total})*{self._known(factor, writer)}" if factor else total
-        if volume is None or self.held_amount(name):
-            return total
-        return f"({total})/{self._known(volume, writer)}"
+        return total if volume is None or self.held_amount(name) else f"({total})/{self._known(volume, writer)}"
 
     def stoichiometry(self, reference: Reference) -> str:
         """How much of a species a reaction takes or makes."""
@@ -293,7 +284,10 @@ class Converter(Facts):
         """The transition of an event."""
         changes = {name: self.whole(node) for name, node in event.changes}
         values = {name: self.running.number(node) for name, node in changes.items()}
-        reset = {self.own(name): self.assigned_value(name, text) for name, text in values.items()}
+        reset = {
+            self.own(name): (f"({text})*{self.named(self.volume(name) or '')}" if self.held_amount(name) else text)
+            for name, text in values.items()
+        }
         transition: Document = {"name": self.spelled(event.name)}
         transition["event"] = self.running.condition(self.whole(event.trigger))
         if reset:
@@ -339,10 +333,6 @@ class Converter(Facts):
         others = {name for other in self.model.events if other is not event for name, _ in other.changes}
         again = others & self.deep(self.whole(event.trigger))
         return bool(used & (others | {name for name, _ in event.changes if again}))
-
-    def assigned_value(self, name: str, text: str) -> str:
-        """What an event assigns to the state of a quantity; an amount is that in the compartment before."""
-        return f"({text})*{self.named(self.volume(name) or '')}" if self.held_amount(name) else text
 
     def sorted_lets(self, let: dict[str, str]) -> dict[str, str]:
         """Definitions behind those that they use."""

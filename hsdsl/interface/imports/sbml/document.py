@@ -134,7 +134,13 @@ def _node(element: Element) -> Node:
         case "csymbol":
             return Node(_symbol(element), element)
         case "apply":
-            return _applied(element)
+            if not element.children:
+                raise NotExpressible("an empty <apply>", element)
+            head, *rest = element.children
+            arguments = tuple(_node(part.children[0] if part.tag in ("logbase", "degree") else part) for part in rest)
+            if head.tag == "ci":
+                return Node("call", element, arguments, name=_word(head))
+            return Node(_symbol(head) if head.tag == "csymbol" else head.tag, element, arguments)
         case "piecewise":
             parts = (part for piece in element.children for part in piece.children)
             return Node("piecewise", element, tuple(map(_node, parts)))
@@ -144,16 +150,6 @@ def _node(element: Element) -> Node:
             return Node(tag, element)
         case tag:
             raise NotExpressible(f"the formula <{tag}>", element)
-
-
-def _applied(element: Element) -> Node:
-    if not element.children:
-        raise NotExpressible("an empty <apply>", element)
-    head, *rest = element.children
-    arguments = tuple(_node(part.children[0] if part.tag in ("logbase", "degree") else part) for part in rest)
-    if head.tag == "ci":
-        return Node("call", element, arguments, name=_word(head))
-    return Node(_symbol(head) if head.tag == "csymbol" else head.tag, element, arguments)
 
 
 def _symbol(element: Element) -> str:

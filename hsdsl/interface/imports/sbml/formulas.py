@@ -6,7 +6,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 from hsdsl.base.names import SINCE
@@ -62,18 +62,13 @@ _INDICATOR = {  # 1 where the sign of left - right says that the comparison hold
 }
 
 
-def instant(conditions: Writer, node: Node) -> str:
-    """The number of a condition where it is evaluated once, as in initial values."""
-    return conditions.indicator(node)
-
-
 @dataclass(frozen=True)
 class Writer:
     """How formulas are written: the text of names, of rates of change, and the number (0 or 1) of a condition."""
 
     name: Callable[[Node], str]
     rate: Callable[[Node], str]
-    chooses: Callable[[Writer, Node], str] = instant
+    chooses: Callable[[Writer, Node], str] = lambda writer, node: writer.indicator(node)  # where evaluated once
     time: str = "t"
     function: Callable[[str], str] = str
 
@@ -83,6 +78,8 @@ class Writer:
             return self.chooses(self, node)
         if node.kind in _FUNCTIONS:
             return _FUNCTIONS[node.kind].format(self.number(_one(node)))
+        if node.kind in _OF_NUMBERS:
+            return _OF_NUMBERS[node.kind](*map(self.number, node.arguments))
         if node.kind not in _SPECIAL:
             raise NotExpressible(_UNKNOWN.get(node.kind, f"the formula <{node.kind}>"), node.element)
         return _SPECIAL[node.kind](self, node)
@@ -191,22 +188,6 @@ def _listed(sign: str, empty: str) -> Callable[[Writer, Node], str]:
     return lambda writer, node: f"({sign.join(map(writer.number, node.arguments)) or empty})"
 
 
-def _minus(writer: Writer, node: Node) -> str:
-    if len(node.arguments) == 1:
-        return f"(-{writer.number(node.arguments[0])})"
-    return f"({' - '.join(map(writer.number, node.arguments))})"
-
-
-def _root(writer: Writer, node: Node) -> str:
-    *degree, base = map(writer.number, node.arguments)
-    return f"sqrt({base})" if degree in ([], ["2"]) else f"({base}**(1/{degree[0]}))"
-
-
-def _log(writer: Writer, node: Node) -> str:
-    *base, value = map(writer.number, node.arguments)
-    return f"(log({value})/log({base[0] if base else 10}))"
-
-
 def _piecewise(writer: Writer, node: Node) -> str:
     """Each value where its condition holds and none before it."""
     arguments = node.arguments
@@ -218,15 +199,13 @@ def _piecewise(writer: Writer, node: Node) -> str:
     return text
 
 
-def _quotient(writer: Writer, node: Node) -> str:
+def _quotient(a: str, b: str) -> str:
     """The quotient rounded towards zero."""
-    a, b = map(writer.number, node.arguments)
     return f"(sign({a}/{b})*floor(abs({a}/{b})))"
 
 
-def _remainder(writer: Writer, node: Node) -> str:
-    a, b = map(writer.number, node.arguments)
-    return f"({a} - {b}*{_quotient(writer, node)})"
+def _remainder(a: str, b: str) -> str:
+    return f"({a} - {b}*{_quotient(a, b)})"
 
 
 def _factorial(writer: Writer, node: Node) -> str:
@@ -236,13 +215,8 @@ def _factorial(writer: Writer, node: Node) -> str:
     return f"factorial({writer.number(given)})"
 
 
-def _call(writer: Writer, node: Node) -> str:
-    return f"{writer.function(node.name)}({', '.join(map(writer.number, node.arguments))})"
-
-
-def _extreme(writer: Writer, node: Node) -> str:
-    texts = list(map(writer.number, node.arguments))
-    return texts[0] if len(texts) == 1 else f"{node.kind}({', '.join(texts)})"
+def _extreme(name: str, *texts: str) -> str:
+    return texts[0] if len(texts) == 1 else f"{name}({', '.join(texts)})"
 
 
 _UNKNOWN = {
@@ -250,24 +224,25 @@ _UNKNOWN = {
     "infinity": "infinity or not-a-number as a value",
     "notanumber": "infinity or not-a-number as a value",
 }
+_OF_NUMBERS: dict[str, Callable[..., str]] = {  # of texts of arguments; a base or degree comes first
+    "minus": lambda *given: f"(-{given[0]})" if len(given) == 1 else f"({' - '.join(given)})",
+    "root": lambda *given: f"sqrt({given[-1]})" if given[:-1] in ((), ("2",)) else f"({given[-1]}**(1/{given[0]}))",
+    "log": lambda *given: f"(log({given[-1]})/log({given[0] if len(given) > 1 else 10}))",
+    "quotient": _quotient,
+    "rem": _remainder,
+    **{name: partial(_extreme, name) for name in ("min", "max")},
+}
 _SPECIAL: dict[str, Callable[[Writer, Node], str]] = {
     "number": _constant,
     "name": lambda writer, node: writer.name(node),
-    "call": _call,
+    "call": lambda writer, node: f"{writer.function(node.name)}({', '.join(map(writer.number, node.arguments))})",
     "plus": _listed(" + ", "0"),
     "times": _listed("*", "1"),
-    "minus": _minus,
     "divide": _listed("/", "1"),
     "power": _listed("**", "1"),
-    "root": _root,
-    "log": _log,
     "piecewise": _piecewise,
-    "quotient": _quotient,
-    "rem": _remainder,
     "factorial": _factorial,
     "rateOf": lambda writer, node: writer.rate(_one(node)),
-    "max": _extreme,
-    "min": _extreme,
     "time": lambda writer, node: writer.time,
     "avogadro": lambda writer, node: AVOGADRO,
     "exponentiale": lambda writer, node: "exp(1)",

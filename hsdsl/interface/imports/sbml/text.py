@@ -36,7 +36,12 @@ def written(converter: Converter, document: dict[str, Any], path: str) -> str:
     notes += [f"Renamed, since the language has words of that spelling: {', '.join(renamed)}."] if renamed else []
     endless = [f"{name} = {value}" for name, value in converter.endless.items()]
     notes += [f"Left out, since every number is finite here: {', '.join(endless)}."] if endless else []
-    remarks, units = _remarks(converter), _units(converter)
+    elements = {name: one.element for name, one in converter.quantities.items()}
+    elements |= {name: one.element for name, one in converter.reactions.items()}
+    elements |= {event.name: event.element for event in converter.model.events}
+    found = {converter.spelled(name): _remark(name, element) for name, element in elements.items()}
+    found |= {converter.own(name): found[converter.spelled(name)] for name in converter.quantities}
+    remarks, units = {name: f"  # {remark}" for name, remark in found.items() if remark}, _units(converter)
     lines = ["hsdsl: 1", f"title: {_quoted(converter.model.name)}", f"source: {_quoted(Path(path).name)}", ""]
     lines += [f"# {visible(note)}" for note in notes]
     for key, value in document.items():
@@ -50,16 +55,6 @@ def written(converter: Converter, document: dict[str, Any], path: str) -> str:
         if key == "outputs" and units:
             lines += [*_entry("units", units, {}, str), ""]
     return "\n".join(lines).rstrip() + "\n"
-
-
-def _remarks(converter: Converter) -> dict[str, str]:
-    """What the file says of the things that the model has by name."""
-    elements = {name: one.element for name, one in converter.quantities.items()}
-    elements |= {name: one.element for name, one in converter.reactions.items()}
-    elements |= {event.name: event.element for event in converter.model.events}
-    found = {converter.spelled(name): _remark(name, element) for name, element in elements.items()}
-    found |= {converter.own(name): found[converter.spelled(name)] for name in converter.quantities}
-    return {name: f"  # {remark}" for name, remark in found.items() if remark}
 
 
 def _remark(name: str, element: Element) -> str:
@@ -118,7 +113,13 @@ def _units(converter: Converter) -> dict[str, str]:
     attributes = model.element.attributes
 
     def meant(unit: str) -> str | None:
-        return _unit(unit, model.units, model.level)
+        if unit in model.units:
+            parts = [part for list_ in model.units[unit].all("listOfUnits") for part in list_.all("unit")]
+            texts = [_part(part) for part in parts]
+            return "*".join(text for text in texts if text) or None if all(texts) else None
+        if unit in _BASE:
+            return _SHORT.get(unit, _BASE[unit])
+        return _OLD.get(unit) if model.level < 3 else None
 
     for name, one in converter.quantities.items():
         if isinstance(one, Species):
@@ -137,24 +138,12 @@ def _units(converter: Converter) -> dict[str, str]:
 
 def _size(converter: Converter, compartment: str) -> str:
     given = converter.quantities[compartment].unit
-    words = {3.0: "volume", 2.0: "area", 1.0: "length"}
-    word = words.get(converter.model.dimensions.get(compartment, 3.0), "")
+    word = {3.0: "volume", 2.0: "area", 1.0: "length"}.get(converter.model.dimensions.get(compartment, 3.0), "")
     return given or converter.model.element.attributes.get(f"{word}Units", word)
 
 
 def _factor(unit: str | None) -> str:
     return f"({unit})" if unit and re.search(r"[*/]", unit) else unit or ""
-
-
-def _unit(unit: str, definitions: dict[str, Element], level: int) -> str | None:
-    """A unit in the language; None where it is not known."""
-    if unit in definitions:
-        parts = [part for list_ in definitions[unit].all("listOfUnits") for part in list_.all("unit")]
-        texts = [_part(part) for part in parts]
-        return "*".join(text for text in texts if text) or None if all(texts) else None
-    if unit in _BASE:
-        return _SHORT.get(unit, _BASE[unit])
-    return _OLD.get(unit) if level < 3 else None
 
 
 def _part(element: Element) -> str | None:

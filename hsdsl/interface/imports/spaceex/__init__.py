@@ -37,19 +37,10 @@ def imported(
 ) -> str:
     """The text of a model for a SpaceEx model.
 
-    Parameters
-    ----------
-    path : path
-        The model, XML.
-    cfg : path, optional
-        The configuration; left out, the file of the same name that ends in ``.cfg``, where there is one.
-    until : str, optional
-        The end of the run; left out, the configuration's ``time-horizon``.
-    urgent : bool
-        Whether a transition whose guard holds off the end of the invariant is made as soon as it does, not refused.
-    at : sequence of str
-        The point of an initial set: ``centre``, ``lower`` or ``upper``, and values as ``NAME=VALUE``. Without a word
-        for it, an initial box is kept.
+    Its configuration ``cfg``, left out, is the file of the same name that ends in ``.cfg``, where there is one; the end
+    of the run is the configuration's ``time-horizon``. With ``urgent`` a transition whose guard holds off the end of
+    the invariant is made as soon as it does, not refused. ``at`` is the point of an initial set: ``centre``, ``lower``
+    or ``upper``, and values as ``NAME=VALUE``. Without a word for it, an initial box is kept.
 
     Raises ModelError: a file that is none of SpaceEx, or what a model cannot keep.
     Raises UsageError: a file that cannot be read, no end of the run, or a point that is none.

@@ -97,25 +97,21 @@ def components(path: str, data: bytes) -> dict[str, Component]:
         raise ModelError([root.fault("HS331", f"expected <sspaceex> or <sbml>, got <{shown(root.tag, 40)}>")])
     found: dict[str, Component] = {}
     for element in root.all("component"):
-        _once(found, element.attribute("id"), _component(element), element)
+        component = Component(element.attribute("id"), _note(element), element)
+        for child in element.all("param"):
+            _once(component.params, _name(child, "name"), _param(child), child)
+        for child in element.all("location"):
+            _once(component.locations, child.attribute("id"), _location(child), child)
+        component.jumps += [_jump(child, component) for child in element.all("transition")]
+        component.binds += [_bind(child) for child in element.all("bind")]
+        if component.locations and component.binds:
+            raise ModelError(
+                [component.binds[0].element.fault("HS331", "a component has locations or instances, not both")]
+            )
+        _once(found, element.attribute("id"), component, element)
     if not found:
         raise ModelError([root.fault("HS331", "the file has no <component>")])
     return found
-
-
-def _component(element: Element) -> Component:
-    component = Component(element.attribute("id"), _note(element), element)
-    for child in element.all("param"):
-        _once(component.params, _name(child, "name"), _param(child), child)
-    for child in element.all("location"):
-        _once(component.locations, child.attribute("id"), _location(child), child)
-    component.jumps += [_jump(child, component) for child in element.all("transition")]
-    component.binds += [_bind(child) for child in element.all("bind")]
-    if component.locations and component.binds:
-        raise ModelError(
-            [component.binds[0].element.fault("HS331", "a component has locations or instances, not both")]
-        )
-    return component
 
 
 def _once(found: dict[str, T], name: str, entry: T, element: Element) -> None:
@@ -177,8 +173,7 @@ def _jump(element: Element, component: Component) -> Jump:
         hint = f"did you mean '{near}'?" if near else "declare it as a <param> of type label"
         raise ModelError([label.fault("HS331", f"no label is called '{shown(name)}'", hint)])
     guard, assignment = element.passage_of("guard"), element.passage_of("assignment")
-    never = guard is not None and guard.text.strip() == "false"
-    if never and guard is not None:
+    if guard is not None and guard.text.strip() == "false":
         raise ModelError([guard.fault("HS332", "a transition whose guard is `false` is never made", "remove it")])
     urgent = element.attributes.get("asap", "false") == "true"
     return Jump(ends[0], ends[1], name, _note(element), _checked(guard), _checked(assignment), urgent, element)
@@ -269,8 +264,7 @@ def _conjunction(passage: Passage, start: int, end: int) -> Iterator[Relation]:
             continue
         if mark is not None and depth:
             continue
-        stops = mark.start() if mark else end
-        part = passage.text[begins:stops]
+        part = passage.text[begins : (mark.start() if mark else end)]
         first, last = begins + len(part) - len(part.lstrip()), begins + len(part.rstrip())
         opened = [at for at in closing if first < at]
         if part.strip().startswith("(") and opened[:1] == [last] and _OF_SET.search(passage.text, first, last):
@@ -394,19 +388,6 @@ def configuration(path: str, data: bytes) -> Configuration:
             quoted = match[2][:1] in ("'", '"') and match[2]
             entries[match[1]] = _passage(file, text, match.start(2) + bool(quoted), match.end(2) - bool(quoted))
         at = match.end()
-    return _meaning(entries)
-
-
-def _passage(file: Text, text: str, start: int, end: int) -> Passage:
-    """A part of the file: a piece a line."""
-    starts: list[tuple[int, int, int]] = []
-    for offset in (start, *(m.end() for m in re.finditer("\n", text[:end]) if m.end() > start)):
-        line = text.count("\n", 0, offset) + 1
-        starts.append((offset - start, line, offset - (text.rfind("\n", 0, offset) + 1) + 1))
-    return Passage(file, text[start:end], tuple(starts))
-
-
-def _meaning(entries: dict[str, Passage]) -> Configuration:
     used = ("system", "initially", "time-horizon")
     others = {key: shown(entry.text, None) for key, entry in entries.items() if key not in used}
     found = {key: entries.get(key) for key in used}
@@ -419,6 +400,15 @@ def _meaning(entries: dict[str, Passage]) -> Configuration:
     bare = _QUALIFIED.sub(lambda m: m[0].replace(".", DOT), bare)
     values = tuple(map(checked, relations(Passage(initially.file, bare, initially.starts))))
     return Configuration(found["system"], initially, found["time-horizon"], places, values, others)
+
+
+def _passage(file: Text, text: str, start: int, end: int) -> Passage:
+    """A part of the file: a piece a line."""
+    starts: list[tuple[int, int, int]] = []
+    for offset in (start, *(m.end() for m in re.finditer("\n", text[:end]) if m.end() > start)):
+        line = text.count("\n", 0, offset) + 1
+        starts.append((offset - start, line, offset - (text.rfind("\n", 0, offset) + 1) + 1))
+    return Passage(file, text[start:end], tuple(starts))
 
 
 DOT = "__dot__"

@@ -37,7 +37,14 @@ def mode_drafts(
         leaving.setdefault(arrow.source, []).append(arrow)
     drafts = {key: _draft(network, place, leaving.get(key, []), constants) for key, place in places.items()}
     for arrow in arrows:
-        _refuse_loose(arrow, drafts[arrow.source], drafts[arrow.target])
+        # Refuse an arrow that leaves a state of its target without a value.
+        source = drafts[arrow.source]
+        for name in drafts[arrow.target].states:
+            if name not in {*source.states, *source.lets, *arrow.reset}:
+                message = (
+                    f"'{name}' has no derivative in location {source.place.name}, and no value after this transition"
+                )
+                raise ModelError([arrow.element.fault("HS332", message, f"assign a value: {name} := ...")])
     return drafts
 
 
@@ -60,7 +67,11 @@ def _draft(network: Network, place: Place, arrows: list[Arrow], constants: Mappi
     draft = ModeDraft(place, states, lets, flow, {}, [], values)
     for relation in rest:
         if relation.operator == "==":
-            _keep(draft, relation)
+            rate = lie_derivative(draft.excess(relation), draft.flow)
+            if not all(decide([*draft.inside, beyond]).never for beyond in (positive(rate), negative(rate))):
+                message = "the flow does not keep this equation of the invariant: time cannot pass"
+                raise relation.refusal(message)
+            draft.comments.append(f"`{relation.text}` holds all along")
             draft.equalities.append(draft.excess(relation))
         else:
             draft.facets.setdefault(draft.excess(relation), relation)
@@ -101,24 +112,6 @@ def _refuse_free(network: Network, place: Place, arrows: list[Arrow], known: set
                 message = f"'{name}' has no derivative in location {place.name}: it may change in any way there"
                 hint = f"give it one, or an equation `{name} == ...` in the invariant, or a value by --at {name}=NUMBER"
                 raise relation.refusal(message, hint)
-
-
-def _refuse_loose(arrow: Arrow, source: ModeDraft, target: ModeDraft) -> None:
-    """Refuse an arrow that leaves a state of its target without a value."""
-    for name in target.states:
-        if name not in {*source.states, *source.lets, *arrow.reset}:
-            message = f"'{name}' has no derivative in location {source.place.name}, and no value after this transition"
-            raise ModelError([arrow.element.fault("HS332", message, f"assign a value: {name} := ...")])
-
-
-def _keep(draft: ModeDraft, relation: Relation) -> None:
-    """Refuse an equation of states that the flow does not keep."""
-    rate = lie_derivative(draft.excess(relation), draft.flow)
-    held = [c for c in draft.inside]
-    if not all(decide([*held, beyond]).never for beyond in (positive(rate), negative(rate))):
-        message = "the flow does not keep this equation of the invariant: time cannot pass"
-        raise relation.refusal(message)
-    draft.comments.append(f"`{relation.text}` holds all along")
 
 
 @dataclass
@@ -199,7 +192,10 @@ class Judge:
         eager = self.eager or arrow.urgent or not source.place.passing
         facet, witness = self.facet(relations, source, guard) if source.place.passing else (None, None)
         if facet is None and not eager:
-            self.refuse_waiting(arrow, witness)
+            where = f" ({point(witness)})" if witness and witness.point else ""
+            message = f"the guard can hold where the invariant does not end{where}: SpaceEx may jump there or go on"
+            hint = "end the invariant where the guard begins, or give --urgent: jump as soon as the guard holds"
+            self.refuse(arrow, message, hint)
             return []
         if facet is not None:
             drafts = self.on_facet(arrow, source, facet, guard, relations)
@@ -224,13 +220,6 @@ class Judge:
                 return facet, None
             witness = answer if answer.somewhere or witness is None else witness
         return None, witness
-
-    def refuse_waiting(self, arrow: Arrow, witness: Answer | None) -> None:
-        """Refuse an arrow whose guard can hold while time goes on."""
-        where = f" ({point(witness)})" if witness and witness.point else ""
-        message = f"the guard can hold where the invariant does not end{where}: SpaceEx may jump there or go on"
-        hint = "end the invariant where the guard begins, or give --urgent: jump as soon as the guard holds"
-        self.refuse(arrow, message, hint)
 
     def on_facet(
         self, arrow: Arrow, source: ModeDraft, facet: Any, guard: list[Constraint], relations: Sequence[Relation]
@@ -268,8 +257,7 @@ class Judge:
         draft = TransitionDraft(arrow, None, [], guard, None, comments, [r.text for r in others] or [ALWAYS])
         if len(others) == 1 and source.place.passing:
             (excess,) = (c.expr for r, c in open_ if r is others[0])
-            rate = lie_derivative(excess, source.flow)
-            if decide([*source.inside, zero(excess), at_most_zero(-rate)]).never:
+            if decide([*source.inside, zero(excess), at_most_zero(-lie_derivative(excess, source.flow))]).never:
                 return [replace(draft, when=others[0], event=[])]
         return [draft]
 
@@ -330,8 +318,7 @@ class Judge:
     def refuse(self, arrow: Arrow, message: str, hint: str | None = None, relation: Relation | None = None) -> None:
         """Gather a refusal, at the guard where there is one."""
         place = relation or (arrow.guard[0] if arrow.guard else None)
-        fault = place.fault(message, hint) if place else arrow.element.fault("HS332", message, hint)
-        self.findings.add(fault)
+        self.findings.add(place.fault(message, hint) if place else arrow.element.fault("HS332", message, hint))
 
 
 def _sides(relation: Relation, source: ModeDraft) -> list[Relation]:

@@ -59,7 +59,10 @@ def _decided(constraints: tuple[Constraint, ...]) -> Answer:
         not row[1:].any() and not _constant(row[0], relation) for row, relation in zip(rows, relations, strict=True)
     ):
         return NEVER
-    point = _interior(*_split(rows, relations, len(names)))
+    size = len(names)
+    pairs = [(row, relation) for row, relation in zip(rows, relations, strict=True) if row[1:].any()]
+    weak = [sign * row for row, relation in pairs if relation != "< 0" for sign in (1, -1)[: 1 + (relation == "= 0")]]
+    point = _interior(matrix(weak, 1 + size), matrix((row for row, relation in pairs if relation == "< 0"), 1 + size))
     if point is None:
         return NEVER
     return Answer("somewhere", "symbolic", {name: float(v) for name, v in zip(names, point, strict=True)})
@@ -87,13 +90,6 @@ def _row(expr: Any, names: Sequence[Any]) -> Exact | None:
             return None
         row[1 + names.index(atom.head)] += factor
     return row
-
-
-def _split(rows: Sequence[Exact], relations: Sequence[str], size: int) -> tuple[Exact, Exact]:
-    """Rows that hold weakly, and those that hold strictly; those without names do not count."""
-    pairs = [(row, relation) for row, relation in zip(rows, relations, strict=True) if row[1:].any()]
-    weak = [sign * row for row, relation in pairs if relation != "< 0" for sign in (1, -1)[: 1 + (relation == "= 0")]]
-    return matrix(weak, 1 + size), matrix((row for row, relation in pairs if relation == "< 0"), 1 + size)
 
 
 def _interior(weak: Exact, strict: Exact) -> Exact | None:

@@ -242,8 +242,7 @@ class _Solving:
 
     def choose(self, name: str, low: str, high: str) -> None:
         """Take a point between two bounds, or keep them as a range."""
-        centre = CORNERS[self.corner or "centre"].format(within(low), within(high))
-        self.give(name, centre)
+        self.give(name, CORNERS[self.corner or "centre"].format(within(low), within(high)))
         if self.corner is not None:
             self.chosen.append(name)
             return
