@@ -48,7 +48,12 @@ def unplaced(path: str | os.PathLike[str]) -> Generator[New]:
     """
     target = Path(os.path.realpath(path))
     try:
-        _refuse_special(target, path)
+        mode = stat.S_IFREG
+        with suppress(FileNotFoundError):
+            mode = target.stat().st_mode
+        if not stat.S_ISREG(mode):
+            kind = "it is a folder" if stat.S_ISDIR(mode) else "it is not a regular file"
+            raise UsageError(f"cannot write {os.fspath(path)}: {kind}")
         with part_in(target.parent) as (part, descriptor), os.fdopen(descriptor, "wb") as file:
             yield New(file, part, target)
     except OSError as error:
@@ -66,15 +71,6 @@ def replacing(path: str | os.PathLike[str]) -> Generator[BinaryIO]:
         yield new.file
         new.finish()
         new.place()
-
-
-def _refuse_special(target: Path, path: str | os.PathLike[str]) -> None:
-    mode = stat.S_IFREG
-    with suppress(FileNotFoundError):
-        mode = target.stat().st_mode
-    if not stat.S_ISREG(mode):
-        kind = "it is a folder" if stat.S_ISDIR(mode) else "it is not a regular file"
-        raise UsageError(f"cannot write {os.fspath(path)}: {kind}")
 
 
 try:

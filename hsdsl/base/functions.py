@@ -120,8 +120,7 @@ class solution(sp.Function):
         if place < 0:
             return sp.S.Zero
         r, c = divmod(place, n) if place < n * n else (place - n * n, None)
-        unit = [sp.S.One if k == r else sp.S.Zero for k in range(n)]
-        inverse = solution(*self.args[: 2 + n * n], *unit)
+        inverse = solution(*self.args[: 2 + n * n], *[sp.S.One if k == r else sp.S.Zero for k in range(n)])
         return inverse if c is None else -inverse * solution(sp.Integer(c), *self.args[1:])
 
 

@@ -23,9 +23,7 @@ def is_multiprecision(x: Any) -> bool:
 
 def is_finite(x: Any) -> bool:
     """Whether a number is neither infinite nor not-a-number."""
-    if is_multiprecision(x):
-        return bool(x.context.isfinite(x))
-    return math.isfinite(x)
+    return bool(x.context.isfinite(x)) if is_multiprecision(x) else math.isfinite(x)
 
 
 def number_of(text: str) -> float | None:

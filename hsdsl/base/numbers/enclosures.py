@@ -4,9 +4,6 @@ Every result contains every value that the formula takes there, rounding include
 where nothing is rounded. Where it has no value somewhere in a box the result of `ENCLOSED` is everything, so that
 nothing is concluded from it. `RESTRICTED` encloses the values that there are. A sum or a product of numbers that are
 nowhere negative is nowhere negative.
-
-Last come matrices of the Bernstein form on [0, 1]: a polynomial lies between the least and the largest of its
-coefficients there.
 """
 
 from __future__ import annotations
@@ -60,7 +57,7 @@ class Range:
         if (value := _exactly(mul, self, other)) is not None:
             return value
         if other is self:
-            return _square(self)
+            return square(self)
         products = [x * y for x in (self.low, self.high) for y in (other.low, other.high)]
         low, high = reduce(np.minimum, products), reduce(np.maximum, products)
         if np.isnan(low).any():  # zero times an unbounded end
@@ -143,7 +140,8 @@ def _corners(function: Callable[[Any, Any], Any], a: Range, b: Range, steps: int
     return _outwards(reduce(np.minimum, values), reduce(np.maximum, values), steps)
 
 
-def _square(x: Range) -> Range:
+def square(x: Range) -> Range:
+    """The square, which is nowhere negative."""
     a, b = x.low * x.low, x.high * x.high
     least = np.where((x.low <= 0) & (x.high >= 0), 0.0, np.minimum(a, b))
     low = _outwards(least, np.maximum(a, b))
@@ -194,8 +192,7 @@ def _holds_whole(low: Any, high: Any) -> Any:
 
 def _tangent(value: Any) -> Range:
     x = as_range(value)
-    pole = _holds_whole(*_turns(x, 1 / np.pi, 0.5))
-    return _unless(pole, _outwards(np.tan(x.low), np.tan(x.high), STEPS))
+    return _unless(_holds_whole(*_turns(x, 1 / np.pi, 0.5)), _outwards(np.tan(x.low), np.tan(x.high), STEPS))
 
 
 def _absolute(value: Any) -> Range:

@@ -118,8 +118,7 @@ class Roundoff:
         """A smooth function of the library."""
         functions, values = self.base.functions, [a.value for a in arguments]
         value, error, off = functions[name](*values), self.base.zero, self.base.zero
-        slopes = SLOPES[name](functions, value, values[0], values[-1])
-        for a, slope in zip(arguments, slopes, strict=True):
+        for a, slope in zip(arguments, SLOPES[name](functions, value, values[0], values[-1]), strict=True):
             error = error + slope * a.error if a.error != 0 else error
             off = off + a.off * self._steepest(name, a, slope) if a.off > 0 else off
         return Rounded(self, value, error, off + abs(value) * (LIBRARY * self.base.unit))

@@ -75,14 +75,7 @@ _LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: _margins_o
 def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     """Decide whether the theorem's hypotheses hold for a run, are left, or are unknown.
 
-    Where a shadow run shows that they hold, there is no finer run.
-
-    Parameters
-    ----------
-    run : RunView
-        What was recorded.
-    diagnostics : Diagnostics
-        What the loop itself noted.
+    ``diagnostics`` are what the loop itself noted. Where a shadow run shows that they hold, there is no finer run.
     """
     verdict, judged = _judged(run, diagnostics)
     crowded = _crowded_steps(run.problem, run.execution)
@@ -119,7 +112,20 @@ def _assessed(run: RunView, diagnostics: Diagnostics) -> Verdict:
     if not unknown and screen is not None and not screen.undecided() and entered_inside:
         run.remarks = []
         return Verdict("holds", _margins_of(run.problem.program, run.execution.made, screen.margins, screen.commuting))
-    found, margins = _findings_of(run)
+    from hsdsl.engine.simulate.verdict.flows import flows, reliability
+    from hsdsl.engine.simulate.verdict.misses import misses
+    from hsdsl.engine.simulate.verdict.resets import (
+        entries,  # of few runs
+        landings,
+    )
+
+    found, margins = list(reliability(run)), list[str]()
+    for hypothesis in (crossings, choices, entries, landings, misses, flows):
+        if found and run.by_shadow:
+            break
+        findings, reasons = hypothesis(run)
+        found += findings
+        margins += reasons
     left += _named(found, "left")
     unknown += _named(found, "unknown")
     unknown += _unchecked(run)
@@ -141,25 +147,6 @@ def _departures(run: RunView, diagnostics: Diagnostics) -> Iterator[str]:
         yield from accumulations(run)
     if run.stop.reason in LEFT:
         yield run.stop.message
-
-
-def _findings_of(run: RunView) -> tuple[list[Finding], list[str]]:
-    """What is found of a run that the screen leaves undecided, and the margins of what holds."""
-    from hsdsl.engine.simulate.verdict.flows import flows, reliability
-    from hsdsl.engine.simulate.verdict.misses import misses
-    from hsdsl.engine.simulate.verdict.resets import (
-        entries,  # of few runs
-        landings,
-    )
-
-    found, margins = list(reliability(run)), list[str]()
-    for hypothesis in (crossings, choices, entries, landings, misses, flows):
-        if found and run.by_shadow:
-            break
-        findings, reasons = hypothesis(run)
-        found += findings
-        margins += reasons
-    return found, margins
 
 
 def _margins_of(program: Program, made: int, margins: Margins, commuting: Sequence[float]) -> tuple[str, ...]:

@@ -36,8 +36,7 @@ def choices(run: RunView) -> tuple[list[Finding], list[str]]:
     commuting: list[Number] = []
     tied = [made for made in run.reliable_transitions if made.alternatives]
     for i, made in enumerate(tied):
-        place = run.before(made)[0]
-        error = tuple(abs(x) for x in place.x) if run.errors is None else run.error_before(made)
+        error = tuple(abs(x) for x in run.before(made)[0].x) if run.errors is None else run.error_before(made)
         rivals, matters = _choice(run, made, error)
         if matters:
             enough = len(found) == MOST_CHOICES or run.by_shadow  # which a finer run confirms

@@ -51,24 +51,15 @@ def times(margin: Number) -> str:
 class Errors:
     """What two runs of one model show of the coarser one.
 
-    Attributes
-    ----------
-    run, finer : Execution
-    tolerance : float
-        Of the run, 0 for fixed steps; no error is smaller, relative to the size of the state, once a step is made.
-    unit : float
-        Unit round-off of the run's numbers.
-    tie : float
-        Times closer than this are the same instant.
-    view : RunView or None
-        The run with its problem, by which resets are followed; None where they are not.
+    With a ``tolerance``, 0 for fixed steps, no error is smaller, relative to the size of the state, once a step is
+    made. ``view`` is the run with its problem, by which resets are followed; None where they are not.
     """
 
     run: Execution
     finer: Execution
     tolerance: float
-    unit: float
-    tie: float
+    unit: float  # round-off of the run's numbers
+    tie: float  # times closer than this are the same instant
     view: RunView | None = None
 
     @cached_property
@@ -182,8 +173,7 @@ class Errors:
     @cached_property
     def _jumps(self) -> NDArray[np.int64]:
         table = self.run.arc_table
-        lengths = np.diff([*table.first, len(self._times)])
-        return np.repeat(table.jump, lengths)
+        return np.repeat(table.jump, np.diff([*table.first, len(self._times)]))
 
     @cached_property
     def _values(self) -> Array:
@@ -354,8 +344,7 @@ class _Resets:
                 moved = place.kernel.resets[k](place.t, *(x + e for x, e in zip(place.x, by, strict=True)))
                 off = [float(a - r) for a, r in zip(moved, after, strict=True)]
             if place.mode.curved[k]:
-                bent = self._bent(made, place, k, after)
-                off = [e + copysign(b, e) for e, b in zip(off, bent, strict=True)]
+                off = [e + copysign(b, e) for e, b in zip(off, self._bent(made, place, k, after), strict=True)]
         except DOMAIN_ERRORS:
             pass
         return off

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from hsdsl.base.numbers.arithmetic import NOTHING, Arithmetic
 from hsdsl.base.numbers.bernstein import Array, around_middle
-from hsdsl.base.numbers.enclosures import CONTINUOUS, ENCLOSED, Range, as_range
+from hsdsl.base.numbers.enclosures import CONTINUOUS, ENCLOSED, Range, as_range, square
 from hsdsl.engine.simulate.moving import ERROR_UNITS
 from hsdsl.engine.simulate.stops import show
 from hsdsl.engine.simulate.verdict.errors import SAFE
@@ -226,24 +226,12 @@ RESOLVED = 8  # terms are so many times what is beyond them; what moves a state 
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """Functions along parts, element by element.
+    """Functions along N parts, element by element."""
 
-    Attributes
-    ----------
-    terms : array, shape (4, N)
-        Coefficients of 1, u, u**2 and u**3.
-    remainder : array, shape (N,)
-        How far the function may be from these; infinite where nothing is known.
-    unresolved : array, shape (N,)
-        How much of that no smooth function explains.
-    error : array, shape (N,)
-        How much the errors of states change it, where no terms cancel.
-    """
-
-    terms: Array
-    remainder: Array
-    unresolved: Array
-    error: Array
+    terms: Array  # (4, N): coefficients of 1, u, u**2 and u**3
+    remainder: Array  # how far the function may be from these; infinite where nothing is known
+    unresolved: Array  # how much of that no smooth function explains
+    error: Array  # how much the errors of states change it, where no terms cancel
 
     @property
     def variation(self) -> Array:
@@ -287,15 +275,11 @@ class Expansion:
 
     def __mul__(self, other: Expansion) -> Expansion:
         if other is self:
-            return at_most(product(self, self), _square, self)
+            return at_most(product(self, self), square, self)
         return at_most(product(self, other), Range.__mul__, self, other)
 
     def __truediv__(self, other: Expansion) -> Expansion:
         return at_most(product(self, reciprocal(other)), Range.__truediv__, self, other)
-
-
-def _square(value: Range) -> Range:
-    return value * value
 
 
 def line(value: Any, slope: Any) -> Expansion:
@@ -441,10 +425,6 @@ def _odd(function: Callable[[Expansion], Expansion]) -> Callable[[Expansion], Ex
     return expand
 
 
-def _hyperbolic(a: Expansion) -> Expansion:
-    return product(_TWO, reciprocal(_ONE + _exponential(product(-_TWO, a)))) - _ONE
-
-
 def _arc_sine(a: Expansion) -> Expansion:
     return FUNCTIONS["atan"](a / _root((_ONE - a) * (_ONE + a)))
 
@@ -474,22 +454,9 @@ def _repeated(times: Callable[[Any, Any], Any], exponent: int, base: Any) -> Any
     return times(square, base) if exponent % 2 else square
 
 
-def _unknown(_: Expansion) -> Expansion:
-    """A function of steps: constant between them."""
-    return NOTHING_KNOWN
-
-
-def _absolute(a: Expansion) -> Expansion:
-    return chosen(np.abs(a.terms[0]) > a.deviation, chosen(a.terms[0] < 0, -a, a), NOTHING_KNOWN)
-
-
 def _least(one: Expansion, other: Expansion) -> Expansion:
     apart, more = one.deviation + other.deviation, other.terms[0] - one.terms[0]
     return chosen(np.abs(more) > apart, chosen(more > 0, one, other), NOTHING_KNOWN)
-
-
-def _most(one: Expansion, other: Expansion) -> Expansion:
-    return -_least(-one, -other)
 
 
 def _below(number: Expansion, bound: Expansion, one: Expansion, other: Expansion) -> Expansion:
@@ -525,7 +492,7 @@ _OF_ONE: dict[str, Callable[[Expansion], Expansion]] = {
     "cos": partial(_sine, quarter=1),
     "tan": lambda a: FUNCTIONS["sin"](a) / FUNCTIONS["cos"](a),
     "atan": _angle,
-    "tanh": _odd(_hyperbolic),
+    "tanh": _odd(lambda a: product(_TWO, reciprocal(_ONE + _exponential(product(-_TWO, a)))) - _ONE),
     "asin": _arc_sine,
     "acos": lambda a: _PI * _HALF - _arc_sine(a),
     "sinh": lambda a: (FUNCTIONS["exp"](a) - FUNCTIONS["exp"](-a)) * _HALF,
@@ -533,15 +500,15 @@ _OF_ONE: dict[str, Callable[[Expansion], Expansion]] = {
     "asinh": _odd(lambda a: FUNCTIONS["log"](a + _root(a * a + _ONE))),
     "acosh": lambda a: FUNCTIONS["log"](a + _root(a * a - _ONE)),
     "atanh": lambda a: FUNCTIONS["log"]((_ONE + a) / (_ONE - a)) * _HALF,
-    "abs": _absolute,
-    **dict.fromkeys(("sign", "floor", "heaviside"), _unknown),
+    "abs": lambda a: chosen(np.abs(a.terms[0]) > a.deviation, chosen(a.terms[0] < 0, -a, a), NOTHING_KNOWN),
+    **dict.fromkeys(("sign", "floor", "heaviside"), lambda _: NOTHING_KNOWN),  # of steps
 }
 FUNCTIONS: dict[str, Any] = {name: _bounded(name, series) for name, series in _OF_ONE.items()} | {
     "atan2": _bounded("atan2", _turned),
     "pow": _power,
     "below": _bounded("below", _below),
     "min": _folded("min", _least),
-    "max": _folded("max", _most),
+    "max": _folded("max", lambda one, other: -_least(-one, -other)),
     "pi": _PI,
     "e": _E,
     "nan": NOTHING_KNOWN,

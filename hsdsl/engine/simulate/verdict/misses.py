@@ -383,8 +383,7 @@ def _at_its_end(run: RunView, arc: Arc, crossed: int | None) -> Iterator[Finding
     for k in place.mode.surfaces:
         if k == crossed or k in tied or place.value(k) > place.roundoff_bound(k) or not place.rate(k) > 0:
             continue
-        finding = near_surface(run, place, k, arc.last, "is about to reach")
-        if finding is None:
+        if near_surface(run, place, k, arc.last, "is about to reach") is None:
             continue
         edge = k < len(place.mode.edges)
         if crossed is None:
@@ -434,8 +433,7 @@ def _at_the_end(run: RunView) -> Iterator[Finding]:
                 continue
     if run.transitions:
         made, length = run.transitions[-1], float(run.times[-1] - run.times[0])
-        late = run.errors.time_error_at(made.time) + run.errors.tolerance * length
-        if until - made.time < SAFE * late:
+        if until - made.time < SAFE * (run.errors.time_error_at(made.time) + run.errors.tolerance * length):
             names.append(made.edge)
     for name in names:
         what = f"a transition of {name} within the error of the end is undecided, and the last state with it"

@@ -45,33 +45,18 @@ MOST_PARTS = 1 << 15  # of steps, evaluated together
 class RunView:
     """What a run recorded, the problem that it is a run of, and how wrong it is.
 
-    Attributes
-    ----------
-    problem : Problem
-    execution : Execution
-    against : Execution or None
-        A finer run that shows the errors of this one. Where it is None and steps are chosen by a tolerance, the same
-        run is repeated, finer.
-    reliable_until : float
-        Until when the run can be relied on.
-    followed : bool
-        Whether motion along surfaces counts as the flow of a mode of the system, as for derivatives.
-    by_shadow : bool
-        Whether errors are those that a shadow run shows, not a finer run.
-    screen_made : Screen or None
-        The screen of a run with a shadow run, where it was made already.
-    remarks : list of Remark or None
-        What `misses` remarks of surfaces that were passed along steps; None where it did not take place.
+    Errors are those that a run ``against`` it shows, which is finer. Without one, where steps are chosen by a
+    tolerance, the same run is repeated, finer.
     """
 
     problem: Problem
     execution: Execution
     against: Execution | None = None
-    reliable_until: float = inf
-    followed: bool = False
-    by_shadow: bool = False
-    screen_made: Screen | None = None
-    remarks: list[Remark] | None = None
+    reliable_until: float = inf  # until when the run can be relied on
+    followed: bool = False  # whether motion along surfaces counts as the flow of a mode, as for derivatives
+    by_shadow: bool = False  # whether errors are those that a shadow run shows
+    screen_made: Screen | None = None  # of a run with a shadow run, where it was made already
+    remarks: list[Remark] | None = None  # of `misses`, on surfaces passed along steps; None where it has not looked
 
     def __post_init__(self) -> None:
         self._tails = 0, Tails(self.problem.waits)
@@ -151,8 +136,7 @@ class RunView:
         if key not in self._bound:
             self._bound[key] = self.problem.kernel.bind(index, segment.data)
         program, kernel = self.problem.program.modes[index], self._bound[key]
-        scale = tuple(abs(a) for a in x)
-        surfaces = Surfaces(kernel, program.edges, scale, self.arithmetic)
+        surfaces = Surfaces(kernel, program.edges, tuple(abs(a) for a in x), self.arithmetic)
         return Place(program, kernel, surfaces, t, x, partial(self._enclosing, index, t))
 
     def _enclosing(self, index: int, t: Number) -> ModeKernel:
@@ -394,8 +378,7 @@ class RunView:
         """How wrong the time may be at which the step to a row reaches surface k, as often as a margin must be."""
         rate, shift = abs(float(place.rate(k))), SAFE * float(self.surface_error(place, k, row))
         step = float(self.times[row] - self.times[row - 1]) if row else 0.0
-        moved = shift / rate if rate * step > shift else step
-        return max(self.late(place.t), moved)
+        return max(self.late(place.t), shift / rate if rate * step > shift else step)
 
     def conditions(self, place: Place, k: int, row: int) -> set[bool]:
         """What the condition of edge k is at a place and where the error moves that to."""
@@ -410,8 +393,7 @@ class RunView:
         assert self.errors is not None
         columns = self.errors.columns
         sizes = tuple(float(self.errors.sizes[row, columns[name]]) for name in place.mode.states)
-        surfaces = replace(place.surfaces, scale=sizes)
-        return surfaces.roundoff_bound(k, place.t, place.x, entry=True)
+        return replace(place.surfaces, scale=sizes).roundoff_bound(k, place.t, place.x, entry=True)
 
 
 @dataclass(frozen=True)
@@ -465,8 +447,7 @@ class Place:
         for moved in self.moved_by(error):
             x = moved
             for _ in range(GUARD_ROUNDS):
-                value = self.kernel.surfaces(self.t, *x)[k]
-                x = moved_onto(x, self.kernel.gradients[k](self.t, *x)[1:], value)
+                x = moved_onto(x, self.kernel.gradients[k](self.t, *x)[1:], self.kernel.surfaces(self.t, *x)[k])
             yield x
 
     def conditions(self, k: int, error: State, late: float) -> set[bool]:
@@ -544,21 +525,9 @@ def moved_onto(x: Sequence[Number], along: Sequence[Number], value: Number) -> S
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that keeps the theorem from holding, or from being known to hold.
+    """One thing that keeps the theorem from holding, or from being known to hold."""
 
-    Attributes
-    ----------
-    kind : str
-        Findings of one kind are named together.
-    theorem : {"left", "unknown"}
-        What it makes of the verdict.
-    sentence : str
-        For a person.
-    wall : tuple of str and number, or None
-        A wall that the run was beyond, and when.
-    """
-
-    kind: str
-    theorem: Literal["left", "unknown"]
+    kind: str  # those of one kind are named together
+    theorem: Literal["left", "unknown"]  # what it makes of the verdict
     sentence: str
-    wall: tuple[str, Number] | None = None
+    wall: tuple[str, Number] | None = None  # a wall that the run was beyond, and when

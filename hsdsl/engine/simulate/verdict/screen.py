@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
-from functools import cache, cached_property
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -100,15 +100,10 @@ class Screen:
         counts = {"crossing": run.transitions, "landing": run.arcs, "ending": run.arcs}
         return self._found(name, counts.get(name, run.rows), np.int32)
 
-    @cached_property
-    def first_rows(self) -> Array:
-        """The first row of each arc."""
-        assert self.columns is not None
-        return self.columns["arc"]["first"]
-
     def arcs(self, name: str) -> set[int]:
         """The first rows of the arcs that are marked."""
-        return set(self.first_rows[self.marked(name) != 0].tolist())
+        assert self.columns is not None
+        return set(self.columns["arc"]["first"][self.marked(name) != 0].tolist())
 
     @property
     def margins(self) -> Margins:

@@ -68,20 +68,11 @@ INSIDE = (6 - sqrt(6)) / 10  # where a polynomial by Radau IIA is compared with 
 
 
 class ShadowErrors(NamedTuple):
-    """How far a run is from its shadow run.
+    """How far a run is from its shadow run."""
 
-    Attributes
-    ----------
-    state_errors : array, shape (rows, states of the largest mode)
-    time_errors : array, shape (transitions,)
-        How far the times of transitions are apart, up to each.
-    lost : float or None
-        From when on it could not follow.
-    """
-
-    state_errors: Array
-    time_errors: Array
-    lost: float | None = None
+    state_errors: Array  # (rows, states of the largest mode)
+    time_errors: Array  # (transitions,): how far the times of transitions are apart, up to each
+    lost: float | None = None  # from when on it could not follow
 
 
 @dataclass(frozen=True)
@@ -300,14 +291,9 @@ class ShadowRun:
 
 
 def corrected(defect: Callable[[float, Array, Array], Array], apart: Array, slopes: Array) -> tuple[Array, Array]:
-    """Return how far p is off inside, and d(1).
+    """Return how far p is off inside, and d(1); ``apart`` and ``slopes`` are e and h J.
 
-    Parameters
-    ----------
-    defect : callable
-        ``defect(s, away, rate)``: how badly p, moved by ``away`` and its slope by ``rate``, solves the equation at s.
-    apart, slopes : array
-        e and h J.
+    ``defect(s, away, rate)`` is how badly p, moved by ``away`` and its slope by ``rate``, solves the equation at s.
     """
     (nodes, weights, bulge, rates), w = correction(), np.linalg.inv(np.eye(len(slopes)) - POLE * slopes)
     zero = np.zeros(len(apart))
@@ -322,15 +308,10 @@ def corrected(defect: Callable[[float, Array, Array], Array], apart: Array, slop
 
 @cache
 def correction() -> tuple[Array, Array, Array, Array]:
-    """Make the coefficients of a correction.
+    """The coefficients of a correction: four nodes, weights (6, 4), and m and M at the nodes.
 
-    Returns
-    -------
-    nodes : array, shape (4,)
-    weights : array, shape (6, 4)
-        d(1) is the sum of W**(m + 1) times the sum of ``weights[m, i]`` g at node i, W the inverse of 1 - h J/5.
-    bulge, slope : array, shape (4,)
-        m and M at the nodes, for M = 1 where the polynomial is compared with the flow.
+    d(1) is the sum of W**(m + 1) times the sum of ``weights[m, i]`` g at node i, W the inverse of 1 - h J/5. M is 1
+    where the polynomial is compared with the flow.
     """
     from numpy.polynomial import Legendre, Polynomial  # few runs need them
 

@@ -25,34 +25,17 @@ CUTTING = 2.0**-48  # of the largest coefficient: what cutting and changing the 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Parts of steps in one mode.
-
-    Attributes
-    ----------
-    mode : int
-    row : array of int, shape (N,)
-        The row each step begins at.
-    start, width : array, shape (N,)
-        Which share of the step each part is.
-    time, length : array, shape (N,)
-        When the step begins and how long it takes.
-    bernstein : array, shape (N, n, degree + 1)
-        The states along the part.
-    error : array, shape (N, n)
-        How wrong the states may be, as often as a margin must be.
-    data : array, shape (N or 1, numbers)
-        Parameters and input segments; one row where they are the same for all.
-    """
+    """Parts of steps in one mode: N of them."""
 
     mode: int
-    row: NDArray[np.int64]
-    start: Array
-    width: Array
-    time: Array
-    length: Array
-    bernstein: Array
-    error: Array
-    data: Array
+    row: NDArray[np.int64]  # at which each step begins
+    start: Array  # which share of the step each part is: from where,
+    width: Array  # and how much
+    time: Array  # when the step begins,
+    length: Array  # and how long it takes
+    bernstein: Array  # (N, n, degree + 1): the states along the part
+    error: Array  # (N, n): how wrong the states may be, as often as a margin must be
+    data: Array  # (N or 1, numbers): parameters and input segments; one row where they are the same for all
 
     def __len__(self) -> int:
         return len(self.row)
@@ -158,8 +141,7 @@ def undecided(
         if not left.any() or left.sum() > MOST_PARTS // 2:
             break
         parts = parts.take(left).halves()
-        open_before = np.concatenate([open_[left]] * 2)
-        open_ = open_before & decides(parts)
+        open_ = np.concatenate([open_[left]] * 2) & decides(parts)
     left = open_.any(axis=1)
     return parts.take(left), open_[left]
 
