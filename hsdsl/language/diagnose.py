@@ -104,12 +104,8 @@ def as_sarif(
 ) -> dict[str, Any]:
     """A log with one run, in the Static Analysis Results Interchange Format 2.1.0 (OASIS standard, 2020).
 
-    Parameters
-    ----------
-    ignored : iterable of (Diagnostic, str or None)
-        Findings that a comment in the file ignores, with its reason: results with a suppression.
-    titles, pages : mapping
-        For every code a line about it, and its page in Markdown.
+    Findings that a comment in the file ignores, with its reason, are results with a suppression. ``titles`` and
+    ``pages`` have for every code a line about it, and its page in Markdown.
     """
     results = [_result(diagnostic) for diagnostic in diagnostics]
     for diagnostic, reason in ignored:

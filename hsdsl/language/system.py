@@ -79,9 +79,7 @@ class SampledInput:
     @property
     def jump_times(self) -> tuple[Fraction | sp.Expr, ...]:
         """The times at which it jumps: of an input with ramps, where it has two samples at one time."""
-        if self.hold == "zero":
-            return self.times
-        return tuple(a for a, b in pairwise(self.times) if a == b)
+        return self.times if self.hold == "zero" else tuple(a for a, b in pairwise(self.times) if a == b)
 
 
 @dataclass(frozen=True)

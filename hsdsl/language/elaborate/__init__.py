@@ -152,8 +152,7 @@ def _system(symbols: SymbolTable) -> HybridSystem:
         modes, scene, initial, of_parts = whole.modes, whole.scene, whole.initial, whole.units
     else:
         define_lets(symbols)
-        outputs = elaborate_outputs(symbols)
-        modes = elaborate_modes(symbols, outputs)
+        modes = elaborate_modes(symbols, elaborate_outputs(symbols))
         scene, numbers = elaborate_scene(symbols)
         modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
         initial, ranges = elaborate_initial(symbols)

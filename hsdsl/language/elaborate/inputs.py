@@ -104,8 +104,7 @@ def read_samples(symbols: SymbolTable, name: Key, entry: InputFile) -> Samples |
     if file.value == ABSENT or (column is not None and column.value == ABSENT):
         return None
     try:
-        data = symbols.content(file.value)
-        lines = data.decode("utf-8-sig").splitlines()
+        lines = symbols.content(file.value).decode("utf-8-sig").splitlines()
     except DataRefused as refusal:
         symbols.report(file.place, refusal.code, refusal.message, refusal.hint)
         return None

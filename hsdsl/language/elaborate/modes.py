@@ -161,8 +161,7 @@ def surface(symbols: SymbolTable, scalar: Scalar, scope: Scope, key: str) -> Sur
     if sides is None:
         return None
     left, right = sides[0].expr, sides[2].expr
-    greater = sides[1] in (">", ">=")
-    residual = left - right if greater == (key == "when") else right - left
+    residual = left - right if (sides[1] in (">", ">=")) == (key == "when") else right - left
     return Surface(left, right, residual, scalar.value)
 
 

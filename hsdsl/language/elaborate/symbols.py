@@ -172,8 +172,7 @@ class ExpressionResolver:
         cut = scalar.plain and scalar.value.count("(") > scalar.value.count(")")
         if cut and text.lines[line][column:].lstrip().startswith("#"):
             hint = "YAML begins a comment at ` #`: quote this expression"
-        span = scalar.span(error.start, error.end)
-        self.findings.add(text.diagnostic(error.code, error.message, span, hint))
+        self.findings.add(text.diagnostic(error.code, error.message, scalar.span(error.start, error.end), hint))
 
 
 def _tree(text: str, expected: Expected, scope: Scope) -> Tree:

@@ -162,8 +162,7 @@ def moving(expr: sp.Basic) -> frozenset[Any]:
         return frozenset((expr,))
     if isinstance(expr, (sign, floor)):
         return frozenset()
-    parts = expr.args[2:] if isinstance(expr, below) else expr.args
-    return frozenset().union(*map(moving, parts))
+    return frozenset().union(*map(moving, expr.args[2:] if isinstance(expr, below) else expr.args))
 
 
 @lru_cache(maxsize=1 << 14)  # the modes of a large model have most of their derivatives in common

@@ -71,9 +71,7 @@ def power(base: Any, exponent: Any) -> Any:
     """A real power; NaN where there is none."""
     if base is None or exponent is None:
         return None
-    if not base and exponent < 0:
-        return NAN
-    return _guarded(_context.power, [base, exponent])
+    return NAN if not base and exponent < 0 else _guarded(_context.power, [base, exponent])
 
 
 def apply(function: str, arguments: list[Any]) -> Any:

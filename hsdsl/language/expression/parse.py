@@ -220,8 +220,7 @@ def _value(match: re.Match[str], at: int) -> Fraction:
             hint = "write it with an exponent: 2.5e20"
             raise ExpressionError("HS124", "a whole number is at most 1e18", at, match.end(), hint)
         return Fraction(value)
-    power = int(exponent[1:]) if exponent else 0
-    return _scaled(Fraction(digits), power, at, match.end())
+    return _scaled(Fraction(digits), int(exponent[1:]) if exponent else 0, at, match.end())
 
 
 def _scaled(mantissa: Fraction, power: int, start: int, end: int) -> Fraction:
@@ -373,8 +372,7 @@ class _Parser:
                 if self.tokens[self.at].text != ",":
                     break
                 self.at += 1
-        end = self.close(opened)
-        return Call(function.text, tuple(arguments), function.start, end)
+        return Call(function.text, tuple(arguments), function.start, self.close(opened))
 
     def close(self, opened: Token) -> int:
         """Take the closing parenthesis of ``opened``."""
@@ -410,6 +408,5 @@ def _chain(binding: int, operators: list[str], operands: list[Tree], start: int,
         return Logic(word, tuple(operands), start, end)
     if binding == _COMPARE:
         return Comparison(tuple(operands), tuple(operators), start, end)
-    inverted = [False, *(operator in ("-", "/") for operator in operators)]
-    pairs = tuple(zip(inverted, operands, strict=True))
+    pairs = tuple(zip([False, *(operator in ("-", "/") for operator in operators)], operands, strict=True))
     return Sum(pairs, start, end) if binding == _ADD else Product(pairs, start, end)

@@ -57,8 +57,7 @@ def number(tree: Tree, scope: Scope, text: str) -> Value:
         if depth > numeric.MOST_LEVELS:
             raise ExpressionError(*numeric.TOO_DEEP[:2], tree.start, tree.end, numeric.TOO_DEEP[2])
         waiting.extend((child, depth) for child in children(node))
-    builder = _Builder(scope, text)
-    return builder.number(tree)
+    return _Builder(scope, text).number(tree)
 
 
 def condition(tree: Tree, scope: Scope, text: str) -> Any:

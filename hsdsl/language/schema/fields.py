@@ -148,9 +148,7 @@ def _name(key: Any) -> Key:
 
 def _argument(value: Any) -> Key:
     scalar = _single(value, "a name")
-    if scalar.value == ABSENT:
-        return Key.at(ABSENT, scalar.place)
-    return _name(Key.at(scalar.value, scalar.place))
+    return Key.at(ABSENT, scalar.place) if scalar.value == ABSENT else _name(Key.at(scalar.value, scalar.place))
 
 
 def _state_name(key: Any) -> Key:

@@ -31,13 +31,7 @@ class _Generator(GenerateJsonSchema):
 
 
 def json_schema() -> dict[str, Any]:
-    """The JSON Schema of a model file, as plain data.
-
-    Returns
-    -------
-    dict
-        A draft-7 schema: shared parts are under ``definitions``, and a ``$ref`` has no siblings.
-    """
+    """The JSON Schema of a model file, draft 7: shared parts are under ``definitions``, and a ``$ref`` is alone."""
     made = SystemDocument.model_json_schema(
         by_alias=True, ref_template="#/definitions/{model}", schema_generator=_Generator
     )

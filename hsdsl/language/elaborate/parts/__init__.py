@@ -32,15 +32,8 @@ __all__ = ["FINAL", "MODE", "Parts"]
 class Parts:
     """The parts of a document with a `system`, parameters and inputs of the file being known.
 
-    Attributes
-    ----------
-    parameters : tuple of Parameter
-        Those of the instances, by their full names.
-    parts : tuple of Part
-    modes : tuple of Mode
-        None of them where something is wrong, which is reported.
-    units : dict
-        The units of names of instances that their automata give.
+    ``parameters`` are those of the instances, by their full names. There are no ``modes`` where something is wrong,
+    which is reported. ``units`` are those of names of instances that their automata give.
     """
 
     def __init__(self, symbols: SymbolTable, document: SystemDocument) -> None:
@@ -130,8 +123,7 @@ class Parts:
         for one in self.roster.instances.values():
             for name in dict.fromkeys((*one.kind.outputs, *(key for _, mode in one.modes for key in mode.outputs))):
                 values[one.full(name)] = self._output_of(one, name)
-        exprs = tuple(None if value is None else value.expr for value in values.values())
-        return tuple(values), exprs
+        return tuple(values), tuple(None if value is None else value.expr for value in values.values())
 
     def _output_of(self, one: Instance, name: Key) -> Value | None:
         """An output of an instance, that of the mode first; without a value in modes that lack one of its names."""

@@ -72,8 +72,7 @@ class Board:
             return self._known[key]
         way = [name for _, name in self._active]
         if (str(key), label) in self._active:
-            first = way.index(label)
-            shown = " -> ".join((*way[first:], label))
+            shown = " -> ".join((*way[way.index(label) :], label))
             message = f"'{label}' is defined by itself: {shown}"
             self.symbols.report(scalar.place, "HS352", message, "make one of them a state")
             self._known[key] = None
@@ -424,8 +423,7 @@ class Names(Mapping[str, Meaning]):
             message = f"`{tree.function}` ranges over the instances of one automaton, not of {', '.join(sorted(bases))}"
             raise ExpressionError("HS113", message, tree.start, tree.end)
         (base,) = bases
-        several = group(base) or []
-        terms = [_of_instance(inner, base, one.name) for one in several]
+        terms = [_of_instance(inner, base, one.name) for one in group(base) or []]
         if tree.function == "sum":
             return Sum(tuple((False, term) for term in terms), tree.start, tree.end)
         return replace(tree, arguments=tuple(terms)) if len(terms) > 1 else terms[0]
