@@ -73,8 +73,7 @@ def find(files: ModelFiles, part: Part = ()) -> tuple[Program, ModelFiles] | Non
 
 def is_kept(files: ModelFiles) -> bool:
     """Whether there seems to be an entry of a model: :func:`find` looks closer."""
-    supposed = files.with_data({}), files
-    return any((store.folder() / KIND / key_of(each)).is_dir() for each in supposed)
+    return any((store.folder() / KIND / key_of(each)).is_dir() for each in (files.with_data({}), files))
 
 
 def _verified(entry: dict[str, Any], files: ModelFiles) -> tuple[Program, ModelFiles]:
@@ -163,8 +162,7 @@ def _decoder(kind: Any) -> Decoder:
         one = _decoder(arguments[0])
 
         def read(value: Any, pieces: list[Any]) -> tuple[Any, ...]:
-            items = pieces[value] if type(value) is int else value
-            return tuple([one(item, pieces) for item in items])
+            return tuple([one(item, pieces) for item in (pieces[value] if type(value) is int else value)])
 
         return read
     if origin in (Union, types.UnionType):

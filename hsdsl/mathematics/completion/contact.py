@@ -382,9 +382,7 @@ class _Branch:
             return side * (expr.args[0] if isinstance(expr, absolute) else sp.S.One)
         if isinstance(expr, (maximum, minimum)) and (side := self._side(expr.args[0] - expr.args[1])):
             return expr.args[0 if (side > 0) == isinstance(expr, maximum) else 1]
-        if expr.is_Pow and _is_root(expr):
-            return self._power(*expr.args)
-        return expr
+        return self._power(*expr.args) if expr.is_Pow and _is_root(expr) else expr
 
     def _power(self, base: sp.Expr, exponent: sp.Expr) -> sp.Expr:
         """A power; of what is zero at rest it is that to the first order."""

@@ -186,8 +186,7 @@ def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:
             if any(_same(e, edge) for e in seen):
                 continue
             seen.append(edge)
-            taken = {e.name for e in found}
-            label = edge.name if edge.name not in taken else f"{edge.name}_{mode.name}"
+            label = edge.name if edge.name not in {e.name for e in found} else f"{edge.name}_{mode.name}"
             found.append(replace(edge, name=label, source=name))
     return found
 

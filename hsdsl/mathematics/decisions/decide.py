@@ -91,7 +91,21 @@ class Decider:
         point = witness(reduced, ranges)
         if point is not None:
             return Answer("somewhere", "symbolic", point)
-        return self._numerically(constraints, ranges, reduced, prove)
+        solved: dict[Any, Any] = {}  # what was eliminated, in the names that are left
+        for symbol, p in reversed(reduced.solved):
+            solved[symbol] = replaced(expression(p), dict(solved), {})
+        rest = self._rest(constraints, reduced, solved)
+        names = sorted({s for c in rest for s in c.expr.free_symbols}, key=lambda s: s.name)
+        search = self._search(rest, ranges, reduced, names)
+        if search is None:
+            return UNKNOWN
+        never = Answer("never", "interval", {}, _searched(names, reduced, ranges))
+        if excluded(search.program, search.relations, search.low, search.high, 1):
+            return never
+        found = search.point()
+        if found is not None:
+            return self._somewhere(dict(zip(names, map(float, found), strict=True)), solved, reduced, ranges)
+        return never if prove and self._excluded(search) else UNKNOWN
 
     def vanishes(self, expr: Any, given: Sequence[Constraint], ranges: Ranges) -> Decided | None:
         """Say how it is known that an expression is zero wherever constraints hold; None where it is not known."""
@@ -108,8 +122,7 @@ class Decider:
         points = self.sample(given, ranges)
         if len(points) < FEWEST_POINTS:
             return None
-        program = StraightLine([expr, *(expr.diff(s) for s in ranges)], list(ranges))
-        value, *slopes = program.at(points)
+        value, *slopes = StraightLine([expr, *(expr.diff(s) for s in ranges)], list(ranges)).at(points)
         size = np.abs(np.array(slopes)).T * np.maximum(np.abs(points), 1e-3)
         return "sampled" if (np.abs(value) <= 1e-9 * np.maximum(size.sum(axis=1), 1e-6)).all() else None
 
@@ -125,21 +138,6 @@ class Decider:
     def _reduced(self, given: Sequence[Constraint], ranges: Ranges) -> Reduced | None:
         key = ("reduced", tuple(given), id(ranges))
         return self.remembered(key, lambda: reduced_by(given, self.normal_forms, ranges))
-
-    def _numerically(self, constraints: Sequence[Constraint], ranges: Ranges, reduced: Reduced, prove: bool) -> Answer:
-        solved = _solutions(reduced)
-        rest = self._rest(constraints, reduced, solved)
-        names = sorted({s for c in rest for s in c.expr.free_symbols}, key=lambda s: s.name)
-        search = self._search(rest, ranges, reduced, names)
-        if search is None:
-            return UNKNOWN
-        never = Answer("never", "interval", {}, _searched(names, reduced, ranges))
-        if excluded(search.program, search.relations, search.low, search.high, 1):
-            return never
-        found = search.point()
-        if found is not None:
-            return self._somewhere(dict(zip(names, map(float, found), strict=True)), solved, reduced, ranges)
-        return never if prove and self._excluded(search) else UNKNOWN
 
     def _rest(self, constraints: Sequence[Constraint], reduced: Reduced, solved: dict[Any, Any]) -> list[Constraint]:
         """What exact reasoning has left, written as it was given where that is possible: bounds are better so."""
@@ -187,14 +185,6 @@ class Decider:
         if not all(np.isfinite(v) for v in whole.values()):
             return UNKNOWN
         return Answer("somewhere", "sampled", {s: whole[s] for s in ranges})
-
-
-def _solutions(reduced: Reduced) -> dict[Any, Any]:
-    """What was eliminated, in the names that are left."""
-    found: dict[Any, Any] = {}
-    for symbol, p in reversed(reduced.solved):
-        found[symbol] = replaced(expression(p), dict(found), {})
-    return found
 
 
 def _box(names: Sequence[Any], reduced: Reduced, ranges: Ranges) -> tuple[Array, Array]:

@@ -330,9 +330,7 @@ def at(dynamics: Dynamics, mode: Mode, answer: Answer, about: Iterable[Any]) -> 
 
 def number(value: float) -> str:
     """Six digits; what is within round-off of a shorter number as that."""
-    if abs(value) < 1e-12:
-        return "0"
-    return f"{value:.6g}"
+    return "0" if abs(value) < 1e-12 else f"{value:.6g}"
 
 
 def within(searched: Iterable[tuple[Any, float, float]]) -> str:

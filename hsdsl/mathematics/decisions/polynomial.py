@@ -195,9 +195,7 @@ class NormalForms:
         arguments = tuple(self.substituted(argument, values) for argument in atom.arguments)
         if atom.kind == "sum":
             return arguments[0]
-        if atom.kind == "root":
-            return self.root(arguments[0], atom.degree)
-        return self._call(atom.head, arguments)
+        return self.root(arguments[0], atom.degree) if atom.kind == "root" else self._call(atom.head, arguments)
 
     def root(self, p: Polynomial, degree: int) -> Polynomial:
         """The root of a number where it is exact, else an atom."""
@@ -229,9 +227,7 @@ class NormalForms:
             if expr.exp.q != 1:
                 base = self.root(base, int(expr.exp.q))
             return self.power(base, int(expr.exp.p)) if base.terms or expr.exp.p > 0 else self._opaque(expr)
-        if expr.is_Atom:
-            return alone(self.atom("constant", expr))
-        return self._opaque(expr)
+        return alone(self.atom("constant", expr)) if expr.is_Atom else self._opaque(expr)
 
     def _opaque(self, expr: Any) -> Polynomial:
         return self._call(expr.func, tuple(self.of(argument) for argument in expr.args))
@@ -245,9 +241,7 @@ class NormalForms:
         return alone(self.atom("call", head, arguments))
 
     def _whole(self, p: Polynomial) -> Polynomial:
-        if len(p.terms) == 1:
-            return p
-        return alone(self.atom("sum", None, (p,)))
+        return p if len(p.terms) == 1 else alone(self.atom("sum", None, (p,)))
 
     def _monomial_power(self, p: Polynomial, exponent: int) -> Polynomial:
         if not p.terms and exponent < 0:
@@ -292,9 +286,7 @@ def _expression(atom: Atom) -> Any:
     arguments = [expression(argument) for argument in atom.arguments]
     if atom.kind == "sum":
         return arguments[0]
-    if atom.kind == "root":
-        return sp.Pow(arguments[0], sp.Rational(1, atom.degree))
-    return atom.head(*arguments)
+    return sp.Pow(arguments[0], sp.Rational(1, atom.degree)) if atom.kind == "root" else atom.head(*arguments)
 
 
 def _rational(value: Any) -> Any:

@@ -287,8 +287,7 @@ class NewtonSearch:
     def point(self) -> Array | None:
         """A point where everything holds, with plain coordinates where that is possible."""
         if not len(self.low):
-            found = self._good(np.zeros((1, 0)))
-            return np.zeros(0) if found[0] else None
+            return np.zeros(0) if self._good(np.zeros((1, 0)))[0] else None
         with quiet():
             points = self._starts()
             for _ in range(ROUNDS):
@@ -349,8 +348,7 @@ class NewtonSearch:
         room = 0.1 * np.abs(slopes * np.maximum(np.abs(points), 1e-1)).sum(axis=-1)
         beyond = values > np.where(strict, -_ROOM * room, 0.0)
         goal = np.where(equal, values, np.where(beyond, values + room, 0.0))
-        active = goal != 0
-        matrix = np.where(active[..., None], slopes, 0.0).transpose(1, 0, 2)
+        matrix = np.where((goal != 0)[..., None], slopes, 0.0).transpose(1, 0, 2)
         usable: Any = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(goal).all(axis=0)
         matrix, right = np.where(usable[:, None, None], matrix, 0.0), np.where(usable[:, None], goal.T, 0.0)
         try:
@@ -394,8 +392,7 @@ def excluded(
         bounds = program.over(first, last)
         equal, strict = _kinds(relations)
         below, above = np.asarray(bounds.low), np.asarray(bounds.high)
-        possible = np.where(strict, below < 0, below <= 0) & (~equal | (above >= 0))
-        left = np.logical_and.reduce(possible)
+        left = np.logical_and.reduce(np.where(strict, below < 0, below <= 0) & (~equal | (above >= 0)))
         first, last = first[left], last[left]
         widths = (last - first) / whole
         if len(first) and (not first.shape[1] or widths.max(axis=1).min() < _SMALLEST):

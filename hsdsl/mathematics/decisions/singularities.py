@@ -40,9 +40,7 @@ class Part(NamedTuple):
 
 def parts(expr: Any) -> list[Any]:
     """Every different part of an expression; none where there are too many."""
-    if too_large([expr], MOST_PARTS):
-        return []
-    return list(dict.fromkeys(sp.preorder_traversal(expr)))
+    return [] if too_large([expr], MOST_PARTS) else list(dict.fromkeys(sp.preorder_traversal(expr)))
 
 
 def jumps(expr: Any) -> Iterator[Part]:
@@ -89,9 +87,7 @@ def discontinuities(expr: Any) -> tuple[Clause, ...] | None:
 def breaks(expr: Any) -> tuple[Clause, ...] | None:
     """Where an expression without kinks may not have derivatives of every order, as alternatives."""
     jumping = discontinuities(expr)
-    if jumping is None:
-        return None
-    return (*jumping, *((zero(end),) for part in parts(expr) for end in _ends(part)))
+    return None if jumping is None else (*jumping, *((zero(end),) for part in parts(expr) for end in _ends(part)))
 
 
 def _ends(part: Any) -> tuple[Any, ...]:

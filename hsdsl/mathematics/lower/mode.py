@@ -122,20 +122,15 @@ class LoweredMode:
             ),
             **others,
         )
-        bounded = program.jumps or may_hide(self.flow, self._places)
-        if not bounded:
+        if not (program.jumps or may_hide(self.flow, self._places)):
             return program
-        return replace(program, terms=self._terms())
-
-    def _terms(self) -> lowered.Routines:
-        """The bounds of the terms of the flow."""
         sizes = dict(zip(self.states, self._sizes, strict=True))
 
         def bounds(*flow: sp.Expr) -> Definition:
             terms = Terms(flow, sizes)
             return Definition("terms", (), terms.bounds, terms.statements)
 
-        return print_each("terms", self.flow, bounds, sizes, self._given, self.names.data)
+        return replace(program, terms=print_each("terms", self.flow, bounds, sizes, self._given, self.names.data))
 
     def _surface(self, residual: sp.Basic) -> _Surface:
         """What is known of a surface: once for all that have one shape together with the flow of their states."""

@@ -83,8 +83,7 @@ class KernelPrinter(PythonCodePrinter):
         if exponent == sp.Rational(1, 2):
             return self.call("sqrt", [self._print(base)])
         if exponent.is_Integer and 2 <= exponent <= LARGEST_PRODUCT:
-            factor = self.parenthesize(base, PRECEDENCE["Pow"])
-            return "(" + "*".join([factor] * int(exponent)) + ")"
+            return "(" + "*".join([self.parenthesize(base, PRECEDENCE["Pow"])] * int(exponent)) + ")"
         if exponent.is_Number and exponent < 0:
             return f"({self.written(Fraction(1))}/{self.parenthesize(base**-exponent, PRECEDENCE['Pow'])})"
         return self.call("pow", [self._print(base), self._print(exponent)])

@@ -281,8 +281,7 @@ class Cut:
     def _narrow(self, operation: type, parts: list[tuple[sp.Basic, int]]) -> list[tuple[sp.Basic, int]]:
         """Name the first operands together, as long as the rest is too wide or too large."""
         while len(parts) > WIDEST or (len(parts) > 2 and sum(size for _, size in parts) > LARGEST):
-            sizes = accumulate(size for _, size in parts[:WIDEST])
-            fit = max(2, sum(size < LARGEST for size in sizes))
+            fit = max(2, sum(size < LARGEST for size in accumulate(size for _, size in parts[:WIDEST])))
             parts = [(self.name(operation(*(part for part, _ in parts[:fit]))), 1), *parts[fit:]]
         return parts
 
@@ -326,8 +325,7 @@ class Gradient:
             return self._row_of_solution(expr)
         present = moving(expr)
         direct = {a: derivative(expr, a) for a in present & self._order.keys()}
-        through = present & self._slopes.keys()
-        for symbol in sorted(through, key=lambda s: s.name):
+        for symbol in sorted(present & self._slopes.keys(), key=lambda s: s.name):
             slope = self._cut.name(derivative(expr, symbol))
             for argument, inner in self._slopes[symbol].items():
                 direct[argument] = direct.get(argument, sp.S.Zero) + slope * inner

@@ -126,10 +126,6 @@ class _Writer:
                 self._moving.add(symbol)
         return self.line(unknown.xreplace(fixed))
 
-    def is_moving(self, symbol: sp.Symbol) -> bool:
-        """Whether a symbol is time or a state."""
-        return symbol in self._moving
-
     def _is_constant(self, expr) -> bool:
         if not expr.args:
             return expr not in self._moving
@@ -139,11 +135,6 @@ class _Writer:
 
     def operation(self, kind: str, *lines: int, constant=None) -> int:
         """The line of an operation on lines; the same one is written once."""
-        line = self._line_of(kind, lines, constant)
-        self.calls.append((kind, lines, constant, line))
-        return line
-
-    def _line_of(self, kind: str, lines: tuple[int, ...], constant) -> int:
         number = None
         if constant is not None:
             if constant not in self._numbers:
@@ -155,7 +146,9 @@ class _Writer:
             self._written[operation] = self._first + len(self.operations)
             self.operations.append(operation)
             self._degrees.append(self._degree(operation))
-        return self._written[operation]
+        line = self._written[operation]
+        self.calls.append((kind, lines, constant, line))
+        return line
 
     def _shortest(self, kind: str, lines: tuple[int, ...], constant: int | None) -> Operation:
         """Choose how an operation is summed: along a polynomial of time where there is one."""
@@ -290,8 +283,7 @@ class _Writer:
 
     def atan2(self, y: int, x: int) -> int:
         """Z' = (x y' - y x') / (x**2 + y**2)."""
-        squares = (self.operation("mul", x, x), self.operation("mul", y, y))
-        radius = self.operation("add", *squares)
+        radius = self.operation("add", self.operation("mul", x, x), self.operation("mul", y, y))
         by_y = self.operation("div", x, radius)
         by_x = self.operation("neg", self.operation("div", y, radius))
         return self.operation("atan2", y, x, by_y, by_x, self.slope(y), self.slope(x))
@@ -315,7 +307,7 @@ class _Trace(NamedTuple):
     @classmethod
     def of(cls, writer: _Writer, expr, shape: Shape) -> _Trace:
         """Trace how a writer without lines writes an expression."""
-        places = {writer.line(symbol): place for symbol, place in shape.symbols.items() if writer.is_moving(symbol)}
+        places = {writer.line(symbol): place for symbol, place in shape.symbols.items() if symbol in writer._moving}
         end = writer.line(expr)
         plain = all(kind in _PLAIN for kind, *_ in writer.calls)
         found = []
