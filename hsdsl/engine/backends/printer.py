@@ -53,35 +53,16 @@ def stored(values: Iterable[str]) -> list[str]:
 
 @dataclass(frozen=True)
 class Language:
-    """How a language writes the operations of a routine.
+    """How a language writes the operations of a routine."""
 
-    Attributes
-    ----------
-    literal : callable
-        Writes a number without loss.
-    assign : str
-        A statement, with ``{name}`` and ``{value}``.
-    results : callable
-        The statements that hand back a routine's values, given as text.
-    divide, choose : str
-        With ``{left}`` and ``{right}``; with ``{test}``, ``{body}`` and ``{other}``.
-    call, fold : str
-        A function that may have no value, with ``{name}`` and ``{arguments}``; `min` and `max` of two, with ``{name}``,
-        ``{left}`` and ``{right}``.
-    truths : pair of str
-        False and true.
-    operators : mapping
-        Signs by node.
-    """
-
-    literal: Callable[[float], str]
-    assign: str
-    results: Callable[[Sequence[str]], list[str]]
-    divide: str
-    choose: str
-    call: str
-    fold: str
-    truths: tuple[str, str]
+    literal: Callable[[float], str]  # writes a number without loss
+    assign: str  # a statement, with ``{name}`` and ``{value}``
+    results: Callable[[Sequence[str]], list[str]]  # the statements that hand back a routine's values, given as text
+    divide: str  # with ``{left}`` and ``{right}``
+    choose: str  # with ``{test}``, ``{body}`` and ``{other}``
+    call: str  # of a function that may have no value, with ``{name}`` and ``{arguments}``
+    fold: str  # `min` and `max` of two, with ``{name}``, ``{left}`` and ``{right}``
+    truths: tuple[str, str]  # false and true
     operators: Mapping[type[ast.AST], str]
 
     def body(self, definition: ast.FunctionDef, names: Mapping[str, str]) -> list[str]:
@@ -108,11 +89,7 @@ class Language:
 
         Raises ValueError: it is none.
         """
-        return self.expression_of(ast.parse(text, "<hsdsl tape>", mode="eval").body, names)
-
-    def expression_of(self, node: ast.expr, names: Mapping[str, str]) -> str:
-        """Print the tree of one such expression, likewise."""
-        return _Printer(self, names).expression(node)
+        return _Printer(self, names).expression(ast.parse(text, "<hsdsl tape>", mode="eval").body)
 
 
 class _Printer:

@@ -240,8 +240,7 @@ def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> C
         namespace[match[0]] = value
         return match[0]
 
-    text = _CONSTANT.sub(replace, routines.source)
-    exec(compile(text, f"<hsdsl {name}>", "exec"), namespace)
+    exec(compile(_CONSTANT.sub(replace, routines.source), f"<hsdsl {name}>", "exec"), namespace)
     return namespace["bind"]
 
 

@@ -133,32 +133,16 @@ SHORT_COEFFICIENT = "{call}few(k, {V}, {G}, {last}) * {call}inverse[k]"
 
 
 class TapeLanguage(NamedTuple):
-    """How one language names things.
+    """How one language names things."""
 
-    Attributes
-    ----------
-    series : callable
-        A line's coefficients, as a whole.
-    value, newest : callable
-        Coefficient 0 of a line, and coefficient k where k is what is being computed.
-    constant : callable
-        A constant of the tape.
-    zero : str
-        The number.
-    call, bad : str
-        Prefix of the name of a recurrence; its last argument where it may have no value.
-    least : callable
-        The lesser of k and a number.
-    """
-
-    series: Callable[[int], str]
-    value: Callable[[int], str]
-    newest: Callable[[int], str]
-    constant: Callable[[int], str]
+    series: Callable[[int], str]  # a line's coefficients, as a whole,
+    value: Callable[[int], str]  # coefficient 0,
+    newest: Callable[[int], str]  # and coefficient k, where k is what is being computed
+    constant: Callable[[int], str]  # of the tape
     zero: str
-    call: str
-    bad: str
-    least: Callable[[int], str]
+    call: str  # before the name of a recurrence
+    bad: str  # its last argument where it may have no value
+    least: Callable[[int], str]  # the lesser of k and a number
 
 
 def value_of(operation: Operation, language: TapeLanguage) -> str:

@@ -169,8 +169,6 @@ class Ensemble:
 
         Raises UsageError: pandas is not installed, or the ensemble has kept no samples or transitions.
         """
-        from hsdsl.engine.execution.ensemble import frame
-
         return frame(self, what)
 
     @property

@@ -385,8 +385,7 @@ class Samples(Deferred):
         """
         values = [self.time, self.mode, self.jump, *self.state_columns.T, *self.output_columns.T]
         computed = [column == column for column in self.output_columns.T]
-        present = [None, None, None, *self.present.T, *computed]
-        yield from zip(self.labels, values, present, strict=True)
+        yield from zip(self.labels, values, [None, None, None, *self.present.T, *computed], strict=True)
 
     def to_pandas(self) -> Any:
         """Make a pandas DataFrame of the table's columns.

@@ -40,13 +40,8 @@ Side = Literal["right", "left"]
 class Evaluated(Protocol):
     """The result of a sampler at n times; all fields except the first may be computed at first use.
 
-    Attributes
-    ----------
-    outside : int
-        The number of the first time that is outside the run; -1 where none is, and only then the rest is there.
-    times : array, shape (n,)
-        Those outside the run by no more than the tie tolerance moved to its ends.
-    states, outputs : array, shape (n, number of them)
+    ``outside`` is the number of the first time that is outside the run; -1 where none is, and only then the rest is
+    there. Of the ``times``, those outside the run by no more than the tie tolerance are moved to its ends.
     """
 
     @property
@@ -87,8 +82,7 @@ def within(execution: Execution, times: Any) -> tuple[Array, Array]:
     instants = _as_times(execution, times)
     start, end = execution.time_span
     slack = TIE * max(abs(float(start)), abs(float(end)))
-    inside = np.asarray((instants >= start - slack) & (instants <= end + slack), dtype=bool)
-    return instants, inside
+    return instants, np.asarray((instants >= start - slack) & (instants <= end + slack), dtype=bool)
 
 
 def _as_floats(times: Any) -> Array:
@@ -106,11 +100,7 @@ def _as_times(execution: Execution, times: Any) -> Array:
 def find(execution: Execution, times: Any, side: Side) -> tuple[Array, Array]:
     """Find the first row of the piece that contains each time (the row itself if the time is that of a row).
 
-    Of several rows at one time ``right`` takes the last and ``left`` the first.
-
-    Returns
-    -------
-    rows, times : array, shape (n,)
+    Of several rows at one time ``right`` takes the last and ``left`` the first. Returns rows and times.
 
     Raises ValueError: for a time that is not :func:`within` the run, or a ``side`` that is neither.
     """
@@ -216,14 +206,9 @@ def _arcs(execution: Execution, rows: Array) -> Array:
 
 
 def evaluate(execution: Execution, rows: Array, times: Array) -> Samples:
-    """Evaluate at ``times``, each in the piece that begins at its row.
+    """Evaluate at ``times``, each in the piece that begins at its row, as :func:`find` gives them.
 
-    Parameters
-    ----------
-    rows : array of int, shape (n,)
-        As :func:`find` gives them.
-    times : array, shape (n,)
-        Of the execution's number type, not before the row's time; equal to it for an arc's last row.
+    No time is before that of its row; one in an arc's last row is equal to it.
     """
     at, table = _places(execution, rows, times), execution.arc_table
     with np.errstate(invalid="ignore", over="ignore"):
@@ -526,9 +511,7 @@ class Execution(Deferred):
 
     def estimated(self) -> Execution:
         """Return the same execution with a verdict that uses the finer run, also if steps are fixed."""
-        if self.assessment is None:
-            return self
-        return replace(self, verdict=self.assessment(self, self.finer))
+        return self if self.assessment is None else replace(self, verdict=self.assessment(self, self.finer))
 
     def sensitivity(self, wrt: str | Sequence[str]) -> Any:
         """Return the derivatives of this run with respect to parameters and initial states (see `Model.sensitivity`).
@@ -582,8 +565,7 @@ class Execution(Deferred):
 
     def rows(self) -> Samples:
         """Return the recorded rows, two at each jump, without rows that repeat the row above."""
-        rows = np.arange(len(self.times))
-        return evaluate(self, rows[_changes(self)], self.times[_changes(self)])
+        return evaluate(self, np.arange(len(self.times))[_changes(self)], self.times[_changes(self)])
 
     def to_pandas(self) -> Any:
         """Make a pandas DataFrame of :meth:`rows`: ``time``, ``mode``, ``j``, and :attr:`shown`.
