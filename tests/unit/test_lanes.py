@@ -63,6 +63,11 @@ class Together:
         """The share of crossings that lanes have found."""
         return sum(team.team.located for team in self.teams) / sum(team.team.crossed for team in self.teams)
 
+    @property
+    def jumped(self) -> float:
+        """The share of these at which they have made the transition."""
+        return sum(team.team.jumped for team in self.teams) / sum(team.team.located for team in self.teams)
+
 
 @pytest.fixture
 def together(monkeypatch: pytest.MonkeyPatch) -> Together:
@@ -112,6 +117,21 @@ def test_crossings_are_found_in_lanes(together: Together, name: str, share: floa
     for seed in range(2):
         together.compare(model, initial=varied(model, seed), samples=7 * seed or None, tolerance=1e-10)
     assert together.located > share
+
+
+@pytest.mark.parametrize(
+    ("name", "call", "share"),
+    [
+        ("oscillator-with-stop-1", {"until": 25}, 0.9),
+        ("thermostat", {}, 0.9),  # from mode to mode
+        ("bouncing-ball", {"tolerance": 1e-8}, 0.5),  # to where it stays on the ground
+    ],
+)
+def test_transitions_are_made_in_lanes(together: Together, name: str, call: dict[str, Any], share: float) -> None:
+    model = hsdsl.load(MODELS / f"{name}.yaml")
+    for samples in (None, 9):
+        together.compare(model, initial=varied(model), samples=samples, **call)
+    assert together.jumped > share
 
 
 def test_four_lanes(together: Together, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,11 +5,14 @@ number a vector of them. A mode whose routines choose by numbers, or whose flow 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from typing import TypeVar
 
 from hsdsl.engine.backends.c.series import is_large
 from hsdsl.engine.backends.c.source import DEFINITION, Writer
 from hsdsl.mathematics.program import ModeProgram, Program
 
+Written = TypeVar("Written")
 _NUMBER = re.compile(r"\(\(hs_real\)([^()]*)\)")
 _PLAIN = re.compile(r"(?<== )\d\.\d(?=;)|(?<=\(p, )0\.0(?=, 0, c)")
 _CHOICE = re.compile(r"(?<!k % 2 )\?|\bhs_below\b")  # by numbers
@@ -30,7 +33,7 @@ static const int32_t lanes_are_for[] = {{{eligible}}};
 def lane_source(program: Program) -> str | None:
     """Write a program's lanes as C; None where no mode has any."""
     writer = Writer(program)
-    modes = [_mode(writer, mode) for mode in program.flows]
+    modes = [_mode(writer, mode) for mode in program.modes]
     if not any(modes):
         return None
     functions = "".join(map(_wide, writer.functions.values()))
@@ -47,21 +50,39 @@ def _mode(writer: Writer, mode: ModeProgram) -> str | None:
     tape, n = mode.tape, len(mode.states)
     if tape is None or mode.final or mode.derived or is_large(tape, n) or not n or None in tape.surfaces:
         return None
-    kept = dict(writer.functions)
     texts = dict[str, str](DEFINITION.findall(mode.routines.source))
-    flow, surfaces, magnitudes = (writer.function(texts[name]) for name in ("flow", "surfaces", "magnitudes"))
-    gradients = [writer.sparse(writer.few(texts[f"gradient_{k}"]), mode.slopes[k]) for k in mode.surfaces]
-    rates = [writer.few(texts[f"rate_{k}"]) for k in mode.surfaces]
-    series, surface_series, lines = writer.series(tape, n, False)
-    new = (text for name, text in writer.functions.items() if name not in kept)
-    if any(map(_CHOICE.search, new)):
+
+    def own() -> tuple[list[str], list[str], list[str]]:
+        routines = [writer.function(texts[name]) for name in ("flow", "surfaces", "magnitudes")]
+        gradients = [writer.sparse(writer.few(texts[f"gradient_{k}"]), mode.slopes[k]) for k in mode.surfaces]
+        rates = [writer.few(texts[f"rate_{k}"]) for k in mode.surfaces]
+        return [*routines, *writer.series(tape, n, False)], gradients, rates
+
+    found = _without_choices(writer, own)
+    if found is None:
+        return None
+    routines, gradients, rates = found
+    pairs = [(texts[f"reset_{k}"], texts[f"spread_{k}"]) for k in range(len(mode.edges))]
+    edges = [
+        _without_choices(writer, lambda reset=reset, spread=spread: f"{{{writer.few(reset)}, {writer.few(spread)}}}")
+        for reset, spread in pairs
+    ]
+    tables = (
+        writer.table("hs_sparse", "gradients", gradients),
+        writer.table("hs_local", "locals", rates),
+        writer.table("hs_lane_edge", "edges", [edge or "{{0}}" for edge in edges]),
+    )
+    return f"{{{', '.join((f'{n}, {len(mode.surfaces)}, {len(mode.edges)}', *routines, *tables))}}}"
+
+
+def _without_choices(writer: Writer, write: Callable[[], Written]) -> Written | None:
+    """Write something; None where its routines choose by numbers."""
+    kept = dict(writer.functions)
+    found = write()
+    if any(_CHOICE.search(text) for name, text in writer.functions.items() if name not in kept):
         writer.functions = kept
         return None
-    slopes, rates = writer.table("hs_sparse", "gradients", gradients), writer.table("hs_local", "locals", rates)
-    return (
-        f"{{{n}, {len(mode.surfaces)}, {flow}, {surfaces}, {series}, {surface_series}, {lines}, {len(mode.edges)}, "
-        f"{magnitudes}, {slopes}, {rates}}}"
-    )
+    return found
 
 
 def _wide(function: str) -> str:

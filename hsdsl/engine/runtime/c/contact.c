@@ -2,7 +2,6 @@
    See hsdsl/engine/simulate/contact.py, which defines holding and pushes.
    A status is 0, or RAISED where a routine has no value. */
 
-#define SAME_UNITS 4
 #define ZERO_UNITS 16
 #define FURTHER 16
 #define MOST_CORRECTIONS_TO_GUARD 4

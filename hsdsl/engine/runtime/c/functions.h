@@ -17,6 +17,7 @@ enum { WITHOUT_VALUE = -4 }; /* how first_event() ends, else GOES_ON, LANDED or 
 
 #define MOST_HALVINGS (16 + 2 * HS_BITS)
 #define ROUNDOFF_UNITS 32
+#define SAME_UNITS 4
 
 typedef int hs_functions(hs_run *run, hs_real s, hs_real *values);
 typedef int hs_allowed(hs_run *run, int k, hs_real *allowed);

@@ -40,6 +40,12 @@ HS_INLINE uint32_t bits_of(hs_mask mask) {
 #endif
 }
 
+HS_INLINE hs_mask mask_of(int32_t bits) {
+  hs_mask mask;
+  for (int i = 0; i < HS_WIDTH; i++) mask[i] = -(bits >> i & 1);
+  return mask;
+}
+
 HS_INLINE int hs_any(hs_mask mask) { return bits_of(mask) != 0; }
 
 /* By intrinsics what vectors of compilers say in three operations; of two numbers that are alike the first. */
@@ -205,20 +211,23 @@ typedef struct {
   const int *place;
 } hs_lane_sparse;
 
+typedef struct {
+  hs_lane_local reset, spread; /* without shapes where these choose by numbers */
+} hs_lane_edge;
+
 #define hs_routine hs_lane_routine
 #define hs_local hs_lane_local
 #define hs_sparse hs_lane_sparse
 
 typedef struct {
-  int dimension, surfaces;
-  hs_lane_routine *flow, *values;
+  int dimension, surfaces, edges;
+  hs_lane_routine *flow, *values, *magnitudes;
   int (*series)(const hs_real *p, int order, hs_real t, const hs_real *x, hs_real *lines);
   int (*surface_series)(const hs_real *p, int order, hs_real *lines);
   const int *surface_line;
-  int edges;
-  hs_lane_routine *magnitudes;
   const hs_lane_sparse *gradients;
   const hs_lane_local *rates;
+  const hs_lane_edge *edge;
 } hs_lane_mode;
 
 #endif

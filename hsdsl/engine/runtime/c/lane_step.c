@@ -1,8 +1,6 @@
-/* One step of Taylor's method in lanes, that of next_series() in located_steps.c, and the first crossing on such steps,
-   that of crossings_along() in crossings.c. Nothing is decided here that is not plain: in a lane where it is not, the loop
-   for one run decides. The text of a model's routines stands before this file, with the table `lane_modes`. */
-
-#include "lane_roots.c"
+/* One step of Taylor's method in lanes, that of next_series() in located_steps.c, and transitions, those of jump() in
+   located.c. Nothing is decided here that is not plain: in a lane where it is not, the loop for one run decides. The text
+   of a model's routines stands before this file, with the table `lane_modes`. */
 
 #define FAR 0x1p500 /* sums of some numbers below it are finite */
 #define MOST_SETTLINGS 8
@@ -70,21 +68,28 @@ static hs_real size_at(const hs_lanes *l, int n, hs_real share, int s) {
   return fabs(((hs_real *)l->x)[s]) + v;
 }
 
-/* The bound of surface k from its magnitude at a point: see bound_from(). Not 0 where its gradient has no value. */
-static int bound_of(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real t, const hs_real *x, hs_real magnitude,
-                    hs_real *bound) {
+/* The bound of surface k from its magnitude at a point, in lanes that stand on it by the sizes `scale`: see bound_from().
+   Not 0 where its gradient has no value. */
+static int bound_with(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real t, const hs_real *x,
+                      hs_real magnitude, const hs_real *scale, hs_mask standing, hs_real *bound) {
   const hs_lane_sparse *const row = &mode->gradients[k];
-  const hs_mask standing = ((hs_real *)l->standing)[k] != 0;
   hs_real *const g = (hs_real *)l->gradient, total = magnitude, sum = t * 0;
   if (row->values.shape(row->values.of, (hs_real *)l->p, t, x, g)) return 1;
   for (int i = 0; i < row->count; i++) {
     const int s = row->place[i] - 1;
-    const hs_real size = s < 0 ? fabs(t) : hs_choose(standing, fabs(((hs_real *)l->scale)[s]), t * 0);
+    const hs_real size = s < 0 ? fabs(t) : hs_choose(standing, fabs(scale[s]), t * 0);
     total = total + fabs(g[i]) * (s < 0 ? size : hs_max(fabs(x[s]), size));
     sum = sum + fabs(g[i]);
   }
   *bound = ROUNDOFF_UNITS * HS_UNIT * total;
   return hs_any(~(sum < FAR));
+}
+
+/* The same in the mode that the lanes are in. */
+static int bound_of(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real t, const hs_real *x, hs_real magnitude,
+                    hs_real *bound) {
+  const hs_mask standing = ((hs_real *)l->standing)[k] != 0;
+  return bound_with(mode, l, k, t, x, magnitude, (hs_real *)l->scale, standing, bound);
 }
 
 /* Forget the surfaces that some lanes stood on and have left; not 0 where that is not known: see leave(). */
@@ -193,107 +198,102 @@ static int step_lanes(hs_lanes *l) {
   return 0;
 }
 
-/* Find where each surface first rises that is not passed by: its share of the step, 2 for none, and its slope there. Not
-   0 where bounds have no value. The lanes are left that are plain. */
-static int first_rises(const hs_lane_mode *mode, const hs_lanes *l, hs_real *shares, hs_real *slopes, hs_mask *plain) {
-  const hs_real *const p = (hs_real *)l->p, *const x = (hs_real *)l->x, *const z = (hs_real *)l->z;
-  const hs_real t = *(hs_real *)l->t, t1 = *(hs_real *)l->t1, *const open = (hs_real *)l->open;
-  hs_real *const begun = (hs_real *)l->values, *const ended = (hs_real *)l->weights, low, high;
-  if (mode->magnitudes(p, t, x, begun) || mode->magnitudes(p, t1, z, ended)) return 1;
-  for (int k = 0; k < mode->surfaces; k++) {
-    const hs_mask on = open[k] != 0;
-    shares[k] = HS_ALL(2.0);
-    if (!hs_any(on)) continue;
-    hs_real *const c = (hs_real *)l->curves + k * (l->order + 1), root = t * 0;
-    const int n = degree_of_lanes(c, l->order);
-    if (bound_of(mode, l, k, t, x, begun[k], &low) || bound_of(mode, l, k, t1, z, ended[k], &high)) return 1;
-    c[0] = hs_choose(((hs_real *)l->standing)[k] != 0, c[0] * 0, c[0]);
-    const hs_mask found = rise_in_lanes(l->binomials, c, n, on & (c[n] != 0) & ~(c[0] > low), hs_max(low, high), &root);
-    slopes[k] = slope_of(c, n, root);
-    *plain &= ~on | (found & (slopes[k] != 0));
-    shares[k] = hs_choose(on, root, shares[k]);
-  }
+#include "lane_crossings.c"
+
+/* What an edge's routine makes of the values `before` of the states, to `out`: see hs_changed(). */
+static int changed(const hs_edge *edge, const hs_lane_local *routine, const hs_real *p, hs_real t, const hs_real *x,
+                   const hs_real *before, hs_real *out) {
+  if (routine->shape(routine->of, p, t, x, out)) return 1;
+  int i = edge->changes;
+  for (int k = edge->target_dimension; i < edge->target_dimension && k-- > 0;)
+    out[k] = i > 0 && edge->change[i - 1] == k ? out[--i] : before[k];
   return 0;
 }
 
-/* Surfaces and their magnitudes at a share of each lane's step, and the state there: see span_place(). */
-static int look_at(const hs_lane_mode *mode, const hs_lanes *l, hs_real share, hs_real *time, hs_real *q) {
-  const hs_real *const c = (hs_real *)l->piece, *const x = (hs_real *)l->x, *const z = (hs_real *)l->z;
-  const hs_real *const p = (hs_real *)l->p;
-  const int n = mode->dimension, last = l->order - 1;
-  const hs_mask at_end = share == 1, at_start = ~(share > 0);
-  *time = hs_choose(at_end, *(hs_real *)l->t1, *(hs_real *)l->t + share * *(hs_real *)l->h);
+/* The lanes in which a guard `on` which the state x stands, with these sizes, may hold it in a mode that is entered: see
+   contact_at() and keeps(). */
+static hs_mask may_hold(const hs_lanes *l, int entered, hs_real t, const hs_real *x, const hs_real *sizes,
+                        const hs_mask *on, hs_mask lanes) {
+  const hs_mode *const mode = &l->modes[entered];
+  hs_real out[mode->dimension];
+  hs_mask held = lanes & ~lanes;
+  for (int k = 0; l->contacts && mode->held >= 0 && k < mode->edges; k++) {
+    const hs_edge *const edge = &mode->edge[k];
+    const hs_lane_local *const reset = &lane_modes[entered].edge[k].reset;
+    hs_mask still = lanes & on[k];
+    if (edge->contact < 0 || !hs_any(still)) continue;
+    if (!edge->branched && reset->shape && !changed(edge, reset, (hs_real *)l->p, t, x, x, out)) {
+      for (int i = 0; i < edge->counts; i++) out[edge->count[i]] = x[edge->count[i]];
+      for (int s = 0; s < mode->dimension; s++) still &= fabs(out[s] - x[s]) <= SAME_UNITS * HS_UNIT * sizes[s];
+    }
+    held |= still;
+  }
+  return held;
+}
+
+/* Write a number in some lanes. */
+HS_INLINE void put_in(hs_mask lanes, double *column, hs_real number) {
+  *(hs_real *)column = hs_choose(lanes, number, *(hs_real *)column);
+}
+
+/* Make the transition of edge k in some lanes, and enter its target: see largest(), reset(), place() and enter(). The
+   lanes in which this is all: the state behind it is beyond no surface, and none may hold it. */
+static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lanes) {
+  const hs_mode *const own = &l->modes[l->mode];
+  const hs_edge *const edge = &own->edge[k];
+  const hs_mode *const to = &l->modes[edge->target];
+  const hs_lane_mode *const next = &lane_modes[edge->target];
+  const int n = mode->dimension, m = next->dimension;
+  const hs_real t = ((hs_real *)l->time)[k], *const q = (hs_real *)l->q + k * n, *const p = (hs_real *)l->p;
+  hs_real both[2 * n], after[m], spread[m], scales[m], sizes[m], noise;
+  hs_real *const values = (hs_real *)l->values, *const weights = (hs_real *)l->weights;
+  const hs_mask stood = ((hs_real *)l->standing)[k] != 0;
+  hs_mask on[next->surfaces + 1];
   for (int s = 0; s < n; s++) {
-    hs_real v = c[last * n + s] * share;
-    for (int m = last - 1; m >= 0; m--) v = (c[m * n + s] + v) * share;
-    q[s] = hs_choose(at_end, z[s], hs_choose(at_start, x[s], x[s] + v));
+    const hs_real x = ((hs_real *)l->x)[s], scale = ((hs_real *)l->scale)[s], entered = ((hs_real *)l->entered)[s];
+    const hs_real size = hs_max(hs_max(fabs(x), fabs(q[s])), ((hs_real *)l->sizes)[s]);
+    both[s] = q[s], both[n + s] = joined(hs_choose(stood | (q[s] == entered), scale, x * 0), size);
+    put_in(lanes, l->known + own->state[s] * HS_WIDTH, hs_max(((hs_real *)l->scales)[s], fabs(q[s])));
   }
-  return mode->values(p, *time, q, (hs_real *)l->values) || mode->magnitudes(p, *time, q, (hs_real *)l->weights);
-}
-
-/* Correct where surface k is crossed to round-off, in some lanes: see settled(). The lanes in which it is. */
-static hs_mask settle_lanes(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_mask lanes, hs_real next,
-                            hs_real slope) {
-  hs_real *const theta = (hs_real *)l->theta + k, *const time = (hs_real *)l->time + k;
-  hs_real *const q = (hs_real *)l->q + k * mode->dimension, least = HS_ALL(INFINITY), noise;
-  const hs_mask none = lanes & ~lanes;
-  hs_mask active = lanes, done = none;
-  for (int i = 0; i < MOST_SETTLINGS && hs_any(active); i++) {
-    *theta = next;
-    if (look_at(mode, l, next, time, q)) return none;
-    const hs_real r = ((hs_real *)l->values)[k];
-    if (bound_of(mode, l, k, *time, q, ((hs_real *)l->weights)[k], &noise)) return none;
-    active &= fabs(r) < least;
-    least = fabs(r);
-    done |= active & (least <= noise);
-    active &= ~done;
-    next = hs_choose(active, hs_min(HS_ALL(1.0), hs_max(next * 0, next - r / slope)), next);
+  if (changed(edge, &mode->edge[k].reset, p, t, q, q, after)) return lanes & ~lanes;
+  if (changed(edge, &mode->edge[k].spread, p, t, both, both + n, spread)) return lanes & ~lanes;
+  for (int s = 0; s < m; s++) {
+    scales[s] = hs_max(((hs_real *)l->known)[to->state[s]], fabs(after[s]));
+    sizes[s] = hs_max(scales[s], fabs(spread[s]));
+    lanes &= fabs(after[s]) + fabs(spread[s]) < FAR;
   }
-  return done;
+  if (next->values(p, t, after, values) || next->magnitudes(p, t, after, weights)) return lanes & ~lanes;
+  for (int j = 0; j < next->surfaces; j++) {
+    if (bound_with(next, l, j, t, after, weights[j], spread, lanes | ~lanes, &noise)) return lanes & ~lanes;
+    lanes &= (values[j] <= noise) & (values[j] > -FAR);
+    on[j] = values[j] >= -noise;
+  }
+  lanes &= ~may_hold(l, edge->target, t, after, sizes, on, lanes);
+  for (int s = 0; s < m; s++) {
+    const int i = s * HS_WIDTH;
+    put_in(lanes, l->x + i, after[s]), put_in(lanes, l->entered + i, after[s]), put_in(lanes, l->before + i, t * 0);
+    put_in(lanes, l->scale + i, spread[s]), put_in(lanes, l->scales + i, scales[s]);
+  }
+  for (int j = 0; j < next->surfaces; j++)
+    put_in(lanes, l->standing + j * HS_WIDTH, hs_choose(on[j], HS_ALL(1.0), t * 0));
+  put_in(lanes, l->t, t), put_in(lanes, l->since, t), put_in(lanes, l->made, t * 0);
+  return lanes;
 }
 
-/* The lanes in which surface k, beside the first one, is not crossed or is crossed with it: see mark_behind() and
-   with_unseen(). */
-static hs_mask agrees(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real share, hs_mask settled, hs_real theta,
-                      hs_real time, const hs_real *q) {
-  const hs_real r = ((hs_real *)l->values)[k], since = HS_TIE * fabs(time), own = ((hs_real *)l->time)[k];
-  hs_real *const open = (hs_real *)l->open + k, noise, rate;
-  const hs_mask rises = share < 2, tied = settled & (own >= time) & (own - time <= since);
-  const hs_mask below = k < mode->edges ? ~(r > 0) : rises | ~rises;
-  if (!hs_any(rises)) return below;
-  if (bound_of(mode, l, k, time, q, ((hs_real *)l->weights)[k], &noise)) return rises & ~rises;
-  if (mode->rates[k].shape(mode->rates[k].of, (hs_real *)l->p, time, q, &rate)) return rises & ~rises;
-  const hs_mask behind = rises & (share > theta) & (r < -hs_max(noise, fabs(rate) * since));
-  *open = hs_choose(behind, *open * 0, *open);
-  return (rises & ~behind & tied) | (~(rises & ~behind) & below);
-}
-
-static int locate_lanes(hs_lanes *l) {
+static int jump_lanes(hs_lanes *l) {
   const hs_lane_mode *const mode = &lane_modes[l->mode];
-  const int n = mode->dimension;
-  hs_real *const sizes = (hs_real *)l->sizes, *const shares = (hs_real *)l->shares, *const slopes = (hs_real *)l->slopes;
-  hs_real first = HS_ALL(-1.0), least = HS_ALL(2.0), theta = least, time = least, q[n];
-  hs_mask settled[mode->surfaces + 1], plain = first == first;
-  l->landed = 0;
-  if (first_rises(mode, l, shares, slopes, &plain) || !hs_any(plain)) return 0;
-  for (int k = 0; k < mode->surfaces; k++) {
-    settled[k] = plain & (shares[k] < 2);
-    if (!hs_any(settled[k])) continue;
-    settled[k] = settle_lanes(mode, l, k, settled[k], shares[k], slopes[k]);
-    const hs_mask earlier = shares[k] < least;
-    first = hs_choose(earlier, least * 0 + k, first), least = hs_choose(earlier, shares[k], least);
-    theta = hs_choose(earlier, ((hs_real *)l->theta)[k], theta);
-    plain &= ~earlier | settled[k];
+  const hs_real first = *(hs_real *)l->first;
+  const hs_mask lanes = mask_of(l->jumped);
+  uint32_t jumped = 0;
+  for (int k = 0; k < mode->edges; k++) {
+    const hs_edge *const edge = &l->modes[l->mode].edge[k];
+    const hs_mask own = lanes & (first == k);
+    const int plain = !edge->conditional && !edge->strict && !edge->of_event && mode->edge[k].reset.shape;
+    if (plain && lanes_are_for[edge->target] && hs_any(own)) jumped |= bits_of(jump_by(mode, l, k, own));
   }
-  plain &= (first >= 0) & (theta > 0);
-  if (!hs_any(plain)) return 0;
-  if (mode->surfaces > 1 && look_at(mode, l, theta, &time, q)) return 0;
-  for (int k = 0; mode->surfaces > 1 && k < mode->surfaces; k++)
-    plain &= (first == k) | agrees(mode, l, k, shares[k], settled[k], theta, time, q);
-  for (int s = 0; s < n; s++) sizes[s] = hs_max(((hs_real *)l->before)[s], size_at(l, n, theta, s));
-  l->landed = (int32_t)bits_of(plain);
+  l->jumped = (int32_t)jumped;
   return 0;
 }
 
 extern const hs_lane_program hs_the_lanes;
-HS_EXPORT const hs_lane_program hs_the_lanes = {HS_WIDTH, lanes_are_for, step_lanes, locate_lanes};
+HS_EXPORT const hs_lane_program hs_the_lanes = {HS_WIDTH, lanes_are_for, step_lanes, locate_lanes, jump_lanes};

@@ -10,13 +10,7 @@
 #define MOST_LOST 4096 /* but for so many */
 #define KEPT_OF_PLACE 64 /* rows, arcs and transitions that it keeps before it lets go: all places fit into a cache */
 
-typedef struct {
-  hs_ensemble *instance;
-  hs_run run;
-  hs_time limit;
-  int32_t *mode; /* in which it may make a step in a lane; -1 where it may not, or is there */
-  int unwritten; /* whether a step was made whose end is no row yet */
-} hs_seat;
+typedef struct hs_seat hs_seat;
 
 /* Lanes, and who has them: 0 where a lane is free. */
 typedef struct {
@@ -25,6 +19,15 @@ typedef struct {
   int lanes, count;
   hs_seat *seat[HS_MOST_LANES];
 } hs_row_of_lanes;
+
+struct hs_seat {
+  hs_ensemble *instance;
+  hs_run run;
+  hs_time limit;
+  int32_t *mode; /* in which it may make a step in a lane; -1 where it may not, or is there */
+  hs_row_of_lanes own; /* of one lane, with what the run brings along to the next one that it gets */
+  int unwritten; /* whether a step was made whose end is no row yet */
+};
 
 static hs_seat *seat_of(const hs_team *team, int64_t i) { return (hs_seat *)team->seats + i; }
 
@@ -39,8 +42,8 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   *row = none;
   hs_lanes *const l = &row->l;
   double **const one[] = {&l->t, &l->limit, &l->longest, &l->made, &l->since, &l->brief, 0};
-  double **const states[] = {&l->x, &l->scales, &l->scale, &l->before, 0};
-  double **const step[] = {&l->h, &l->t1, 0};
+  double **const states[] = {&l->x, &l->scales, &l->scale, &l->entered, &l->before, 0};
+  double **const step[] = {&l->h, &l->t1, &l->first, 0};
   double **const surfaces[] = {&l->starts, &l->ends, &l->open, 0};
   double **const found[] = {&l->values, &l->weights, &l->shares, &l->slopes, &l->theta, &l->time, 0};
   double **const scratch[] = {&l->end, &l->error, &l->sizes, 0};
@@ -48,6 +51,7 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   take_columns(store, lanes, one);
   l->p = numbers(store, (int64_t)model->data * lanes);
   take_columns(store, n * lanes, states);
+  l->known = numbers(store, (int64_t)model->states * lanes);
   l->standing = numbers(store, m * lanes);
   row->carried = (store->used - begun) / lanes;
   take_columns(store, lanes, step);
@@ -64,6 +68,7 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   l->inverse = numbers(store, (most + lanes - 1) / lanes * lanes);
   if (store->numbers) fill_binomials(l->inverse, (int)order);
   for (int64_t i = 0; store->numbers && i < most; i++) l->inverse[i] = 1 / l->inverse[i];
+  l->modes = model->mode;
   l->order = method->order;
   l->most = MOST_SHORT;
   row->lanes = (int)lanes;
@@ -72,8 +77,8 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
 int64_t hs_lane_memory(const hs_model *model, const hs_method *method, int64_t places, int32_t lanes) {
   hs_store store = {0, HS_MOST_LANES};
   hs_row_of_lanes row;
-  lay_out_lanes(&row, model, method, lanes, &store);
-  lay_out_lanes(&row, model, method, lanes, &store);
+  for (int i = 0; i < 2; i++) lay_out_lanes(&row, model, method, lanes, &store);
+  for (int64_t i = 0; i < places; i++) lay_out_lanes(&row, model, method, 1, &store);
   take(&store, places, sizeof(hs_seat));
   take(&store, model->flows, sizeof(int64_t));
   take(&store, places, sizeof(int32_t));
@@ -93,11 +98,11 @@ static void scatter(const hs_real *from, double *column, int n, int lanes, int l
   for (int i = 0; i < n; i++) column[i * lanes + lane] = from[i];
 }
 
-/* Put the run of a seat into a lane. */
-static void enter_lane(hs_row_of_lanes *row, int lane, hs_seat *seat) {
+/* Lay ready what the run of a seat brings along into a lane. */
+static void make_ready(hs_seat *seat) {
   hs_run *const run = &seat->run;
-  const hs_lanes *const l = &row->l;
-  const int n = run->here.dimension, lanes = row->lanes;
+  const hs_lanes *const l = &seat->own.l;
+  const int n = run->here.dimension, lane = 0, lanes = 1;
   l->t[lane] = run->here.t;
   l->limit[lane] = seat->limit;
   l->longest[lane] = run->control.tolerance > 0 ? run->control.largest : run->control.h;
@@ -106,10 +111,26 @@ static void enter_lane(hs_row_of_lanes *row, int lane, hs_seat *seat) {
   scatter(run->x, l->x, n, lanes, lane);
   scatter(run->sizes.scales, l->scales, n, lanes, lane);
   scatter(run->sizes.scale, l->scale, n, lanes, lane);
+  scatter(run->entered, l->entered, n, lanes, lane);
+  scatter(run->sizes.known, l->known, run->model->states, lanes, lane);
   for (int s = 0; s < n; s++) l->before[s * lanes + lane] = run->has_before ? span_size(run, &run->before, 1.0, s) : 0.0;
   for (int k = 0; k < run->here.table->surfaces; k++) l->standing[k * lanes + lane] = run->surfaces.active[k];
+  *seat->mode = run->here.mode;
+}
+
+/* Put it there. */
+static void enter_lane(hs_row_of_lanes *row, int lane, hs_seat *seat) {
+  copy_lane(&seat->own, 0, row, lane, row->carried);
   row->seat[lane] = seat, row->count++;
   *seat->mode = -1;
+}
+
+/* Take it out of a lane, to bring it along into another one that makes steps in its mode. */
+static void clear_lane(hs_row_of_lanes *row, int lane) {
+  hs_seat *const seat = row->seat[lane];
+  copy_lane(row, lane, &seat->own, 0, row->carried);
+  row->seat[lane] = 0, row->count--;
+  *seat->mode = seat->run.here.mode;
 }
 
 /* Have the run of a seat where a lane has taken it; `written`: its last row as well, if it has none. */
@@ -121,6 +142,9 @@ static void leave_lane(hs_row_of_lanes *row, int lane, hs_seat *seat, int writte
   run->pace.made = (int)l->made[lane], run->pace.since = l->since[lane];
   gather(l->x, run->x, n, lanes, lane);
   gather(l->scales, run->sizes.scales, n, lanes, lane);
+  gather(l->scale, run->sizes.scale, n, lanes, lane);
+  gather(l->entered, run->entered, n, lanes, lane);
+  gather(l->known, run->sizes.known, run->model->states, lanes, lane);
   gather(l->before, run->before.largest, n, lanes, lane);
   run->has_before = run->before.sized = 1;
   run->here.active = run->surfaces.has_starts = 0;
@@ -200,7 +224,7 @@ static void go_ahead(hs_team *team, hs_seat *seat, int outcome, int flows) {
       return;
     }
   }
-  *seat->mode = run->here.mode;
+  make_ready(seat);
 }
 
 /* Put the crossings that were found in a lane where crossings_along() writes its own; 0 where one may not count. */
@@ -238,13 +262,77 @@ static int behind_crossing(const hs_row_of_lanes *row, int lane, hs_seat *seat) 
   return behind_event(run, first_event(run));
 }
 
-/* Find the crossings of the runs that wait for it, and follow these on. */
+/* The edge that is crossed first in a lane, and when. */
+static int first_of_lane(const hs_row_of_lanes *row, int lane, hs_time *t) {
+  const int k = (int)row->l.first[lane];
+  *t = row->l.time[k * row->lanes + lane];
+  return k;
+}
+
+/* Whether a run may make the transition that is found in a lane there: see jump() and crowded(). */
+static int may_jump(const hs_row_of_lanes *row, int lane) {
+  hs_run *const run = &row->seat[lane]->run;
+  hs_real flight, ratio;
+  hs_time t;
+  first_of_lane(row, lane, &t);
+  if (limit_reached(run) || run->model->queues || run->task->settings.arcs) return 0;
+  return run->written.jump < FREE || contraction(run, &flight, &ratio) || flown(run, t) > run->epsilon;
+}
+
+/* Whether a run may be in a Zeno tail that is to end: see ends_tail(). */
+static int may_end(hs_run *run, hs_time t) {
+  hs_real flight, ratio;
+  if (!contraction(run, &flight, &ratio)) return run->written.jump >= FREE && !(flown(run, t) > run->epsilon);
+  return !(flight * ratio / (1 - ratio) > hs_max(run->epsilon, 2 * tie(t)));
+}
+
+/* Go on behind a transition that was made in a lane. */
+static void behind_jump(hs_team *team, hs_row_of_lanes *row, int lane) {
+  hs_seat *const seat = row->seat[lane];
+  hs_run *const run = &seat->run;
+  hs_crossing *const chosen = &run->event.chosen;
+  const hs_lanes *const l = &row->l;
+  const int mode = run->here.mode, k = chosen->edge = first_of_lane(row, lane, &chosen->time);
+  const hs_edge *const edge = &run->here.table->edge[k];
+  chosen->theta = l->theta[k * row->lanes + lane], chosen->state = run->event.crossings[k].state;
+  run->event.alternatives_count = 0;
+  if (!run->lanes.bare) {
+    gather(l->q + k * run->here.dimension * row->lanes, chosen->state, run->here.dimension, row->lanes, lane);
+    gather(l->x, run->event.after, edge->target_dimension, row->lanes, lane);
+    step_of_lane(row, lane, run);
+    write_crossing(run, chosen);
+  }
+  record(run, chosen, chosen->time, run->event.after, 0);
+  run->here = mode_at(run, edge->target, edge->target_dimension, chosen->time, 0);
+  begin(run, HS_FLOW);
+  gather(l->x, run->x, edge->target_dimension, row->lanes, lane);
+  begin_following(run);
+  comes_back(run, 1);
+  seat->unwritten = 1;
+  if (run->lanes.bare && !may_end(run, chosen->time) && !steps_alone(team, run)) {
+    clear_lane(row, lane);
+    return;
+  }
+  leave_lane(row, lane, seat, 1);
+  go_ahead(team, seat, ends_tail(run, mode, k), 0);
+}
+
+/* Find the crossings of the runs that wait for it, make the transitions there, and follow these on. */
 static void locate_together(hs_team *team, hs_row_of_lanes *waiting) {
   const int count = waiting->count;
   for (int lane = count; count && lane < waiting->lanes; lane++) copy_lane(waiting, 0, waiting, lane, waiting->columns);
   if (count) team->program->locate(&waiting->l);
+  waiting->l.jumped &= (1 << count) - 1;
+  for (int lane = 0; lane < count; lane++)
+    if (waiting->l.jumped >> lane & 1 && !may_jump(waiting, lane)) waiting->l.jumped ^= 1 << lane;
+  if (count && waiting->l.jumped) team->program->jump(&waiting->l);
   for (int lane = 0; lane < count; lane++) {
     hs_seat *const seat = waiting->seat[lane];
+    if (waiting->l.jumped >> lane & 1) {
+      team->located++, team->jumped++;
+      behind_jump(team, waiting, lane);
+      continue;
+    }
     leave_lane(waiting, lane, seat, 0);
     team->located += waiting->l.landed >> lane & 1;
     go_ahead(team, seat, behind_crossing(waiting, lane, seat), 1);
@@ -332,12 +420,8 @@ static int choose_mode(const hs_team *team, hs_row_of_lanes *row) {
     const int other = team->ready[i], count = other < 0 || other == mode ? 0 : count_in(team, row, other);
     if (count > most) most = count, mode = other;
   }
-  for (int lane = 0; mode != row->l.mode && lane < row->lanes; lane++) {
-    hs_seat *const seat = row->seat[lane];
-    if (!seat) continue;
-    leave_lane(row, lane, seat, 1);
-    *seat->mode = row->l.mode;
-  }
+  for (int lane = 0; mode != row->l.mode && lane < row->lanes; lane++)
+    if (row->seat[lane]) clear_lane(row, lane);
   row->l.mode = mode;
   return most;
 }
@@ -377,6 +461,7 @@ void hs_run_team(hs_team *team) {
   while ((uintptr_t)(store.numbers + store.used) % (HS_MOST_LANES * sizeof(double))) store.used++;
   lay_out_lanes(&row, task->model, task->method, team->program->lanes, &store);
   lay_out_lanes(&waiting, task->model, task->method, team->program->lanes, &store);
+  waiting.l.contacts = (int32_t)task->settings.contacts;
   team->seats = take(&store, team->count, sizeof(hs_seat));
   team->lost = take(&store, task->model->flows, sizeof(int64_t));
   team->ready = take(&store, team->count, sizeof(int32_t));
@@ -386,6 +471,7 @@ void hs_run_team(hs_team *team) {
     int outcome;
     hs_seat *const seat = seat_of(team, i);
     hs_ensemble *const e = seat->instance = team->places[i];
+    lay_out_lanes(&seat->own, task->model, task->method, 1, &store);
     seat->unwritten = 0;
     seat->mode = &team->ready[i];
     *seat->mode = -1;

@@ -272,8 +272,15 @@ static int crowded(hs_run *run, const hs_crossing *crossing) {
   return !(of_contacts(run) && run->here.table->edge[k].contact >= 0 && !keeps(run, t, crossing->state, k));
 }
 
-/* Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail. The Python
-   twin is `make_transition`. */
+/* Whether the transition of edge k of a mode, which was made, belongs to a Zeno tail that is to end: GOES_ON, or a stop. */
+static int ends_tail(hs_run *run, int mode, int k) {
+  if (run->here.mode != mode) return at_limit(run);
+  int closed = close_tail(run, k);
+  if (closed == GOES_ON) closed = at_limit(run);
+  return closed == GOES_ON ? unresolved(run, k) : closed;
+}
+
+/* Make a transition, at its own instant or behind a strip. The Python twin is `make_transition`. */
 static int jump(hs_run *run) {
   const hs_crossing *crossing = &run->event.chosen;
   const hs_time t = crossing->time, until = run->until;
@@ -312,11 +319,7 @@ static int jump(hs_run *run) {
   copy(run->sizes.scale, run->sizes.both, edge->target_dimension);
   const int entered = enter(run, edge->target, edge->target_dimension, resumed, 1, since, 0, t);
   if (entered != GOES_ON) return entered;
-  if (comes_back(run, flowed)) return slides(run, mode, k);
-  if (run->here.mode != mode) return at_limit(run);
-  int closed = close_tail(run, k);
-  if (closed == GOES_ON) closed = at_limit(run);
-  return closed == GOES_ON ? unresolved(run, k) : closed;
+  return comes_back(run, flowed) ? slides(run, mode, k) : ends_tail(run, mode, k);
 }
 
 /* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. The

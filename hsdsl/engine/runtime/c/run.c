@@ -60,9 +60,9 @@ static void bound_first_step(hs_run *run, int mode) {
   if (bound > 0) *reach = *reach > 0 ? hs_min(*reach, bound) : bound;
 }
 
-/* Enter a mode at (t, run->x): bind its routines to the input segment of this time and open an arc.
-   A final mode without a flow has the states, and so the outputs, of the mode before it. */
-static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode_state *before) {
+/* A mode at a time, its routines bound to the input segment there. A final mode without a flow has the states, and so the
+   outputs, of the mode before it. */
+static hs_mode_state mode_at(const hs_run *run, int mode, int dimension, hs_time t, const hs_mode_state *before) {
   hs_mode_state here;
   here.mode = mode;
   here.dimension = dimension;
@@ -77,6 +77,12 @@ static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode
   }
   here.active = here.emerging = 0;
   here.t = t;
+  return here;
+}
+
+/* Enter a mode at (t, run->x) and open an arc. */
+static void place(hs_run *run, int mode, int dimension, hs_time t, const hs_mode_state *before) {
+  const hs_mode_state here = mode_at(run, mode, dimension, t, before);
   hand_on_scales(run, run->here.table, here.table);
   run->here = here;
   if (run->task->settings.arcs) bound_first_step(run, mode);

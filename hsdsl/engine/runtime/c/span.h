@@ -18,6 +18,11 @@ typedef int hs_mask;
 #define LAST_TERM 4
 #define TERM_BEFORE 32
 
+/* The size of numbers of two sizes, of which the first is negative where a reset's terms gave it: see hs_sizes. */
+HS_INLINE hs_real joined(hs_real scale, hs_real size) {
+  return hs_choose(scale < 0, -hs_max(-scale, size), hs_max(scale, size));
+}
+
 /* End of a step of length h from t, which is stretched to the limit where it nearly gets there. */
 HS_INLINE hs_time end_of_step(hs_time t, hs_real *h, hs_time limit) {
   const hs_mask before = *h < (limit - t) * ALMOST;

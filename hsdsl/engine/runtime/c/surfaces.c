@@ -33,9 +33,6 @@ static void shortened(const hs_run *run, const hs_polynomial *piece, hs_real the
   }
 }
 
-/* The size of numbers of two sizes, of which the first is negative where a reset's terms gave it: see hs_run. */
-HS_INLINE hs_real joined(hs_real scale, hs_real size) { return scale < 0 ? -hs_max(-scale, size) : hs_max(scale, size); }
-
 /* Value of surface k at a point. */
 static int surface(hs_run *run, int k, hs_time t, const hs_real *x, hs_real *r) {
   if (run->here.table->values(run->here.p, t, x, run->surfaces.values)) return RAISED;
