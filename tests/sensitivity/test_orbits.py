@@ -409,9 +409,9 @@ experiment: {until: 4}
 """
 
 
-def apex_map(height: float, energy: float) -> float:
+def apex_map(height: float, energy: float, k: float = 20000) -> float:
     """The next apex of the runner by SciPy: apex height is the one coordinate of a level."""
-    m, k, g, attack = 80, 20000, 9.81, np.radians(68)
+    m, g, attack = 80, 9.81, np.radians(68)
     speed = np.sqrt(2 * energy / m - 2 * g * height)
     down = -np.sqrt(2 * g * (height - np.sin(attack)))
 
@@ -444,6 +444,56 @@ def test_stability_within_a_level() -> None:
         slope = (apex_map(apex + 1e-5, energy) - apex_map(apex - 1e-5, energy)) / 2e-5
         assert orbit.multipliers[0] == pytest.approx(slope, rel=1e-6)
     assert "within this level" in orbit.summary and orbit.as_json()["kept"] == orbit.kept
+
+
+def test_a_branch_within_a_level() -> None:
+    """Against the map from apex to apex at one energy, for other springs."""
+    branch = hsdsl.loads(RUNNER).continuation("liftoff", "k", 19500, 20500, keep="energy")
+    energy = 80 * (25 / 2 + 9.81)
+    assert len(branch.points) > 3 and not branch.bifurcations
+    for point in (branch.points[0], branch.points[-1]):
+        assert point.parameter in (19500, 20500) and len(point.multipliers) == 1
+        state = dict(zip(branch.states, point.state.tolist(), strict=True))
+        apex, k = state["z"] + state["vz"] ** 2 / (2 * 9.81), point.parameter
+        assert 80 * ((state["vx"] ** 2 + state["vz"] ** 2) / 2 + 9.81 * state["z"]) == pytest.approx(energy, rel=1e-9)
+        assert apex_map(apex, energy, k) == pytest.approx(apex, rel=1e-9)
+        slope = (apex_map(apex + 1e-5, energy, k) - apex_map(apex - 1e-5, energy, k)) / 2e-5
+        assert point.multipliers[0] == pytest.approx(slope, rel=1e-5)
+
+
+BALL = """hsdsl: 1
+parameters: {g: 1}
+modes:
+  air: {flow: {h: v, v: -g}, transitions: [{name: hit, when: h <= 0, to: air, reset: {v: -v}}]}
+initial: {mode: air, h: 1, v: 0}
+experiment: {until: 10}
+"""
+BALLS = """hsdsl: 1
+automata:
+  ball:
+    parameters: {g: 1}
+    modes:
+      air: {flow: {h: v, v: -g}, transitions: [{name: hit, when: h <= 0, to: air, reset: {v: -v}}]}
+system:
+  p: {automaton: ball, initial: {mode: air, h: 1, v: 0}}
+experiment: {until: 10}
+"""
+
+
+def test_a_branch_within_a_level_that_depends_on_the_parameter() -> None:
+    """A ball that rises to height 1 lands with v = sqrt(2 g) and takes 2 v/g."""
+    branch = hsdsl.loads(BALL).continuation("hit", "g", 1, 2, keep="h + v**2/(2*g)")
+    assert {1.0, 2.0} <= {point.parameter for point in branch.points}
+    for point in branch.points:
+        speed = np.sqrt(2 * point.parameter)
+        assert point.state[1] == pytest.approx(speed, rel=1e-8)
+        assert point.period == pytest.approx(2 * speed / point.parameter, rel=1e-8)
+
+
+def test_a_level_of_a_part() -> None:
+    orbit = hsdsl.loads(BALLS).orbit("p.hit", keep="p.v**2/2 + p.g*p.h")
+    assert orbit.kept == {"p.v**2/2 + p.g*p.h": pytest.approx(1)} and orbit.verdict == "stable"
+    assert orbit.state["p.v"] == pytest.approx(np.sqrt(2)) and orbit.period == pytest.approx(2 * np.sqrt(2))
 
 
 @pytest.mark.parametrize(

@@ -26,6 +26,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
+from hsdsl.analysis.orbits.level import Level
 from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, Orbit, multipliers_of
 from hsdsl.analysis.orbits.section import CLOSED, Closed, NoReturn, Return, gap
 from hsdsl.analysis.report.json_form import named, plain
@@ -37,6 +38,7 @@ from hsdsl.engine.simulate.verdict.run_view import RunView
 Passage = Callable[[Array, float, float], tuple[Return, float | None, float]]
 MOST_POINTS, MOST_CORRECTIONS = 400, 8
 FIRST, LEAST, LARGEST = 0.02, 1e-7, 0.05  # steps relative to the sizes of states and to the range of the parameter
+LEVEL_STEP = 1e-5  # of the parameter's range: over it a level is differentiated
 CLOSE = 1e-6  # of the sizes of states and of the parameter's range: solutions that are no further apart are one
 PRECISE = 1e-12
 NODES = 8  # of a step, where it is interpolated
@@ -85,11 +87,19 @@ class Bifurcation:
 class Follower:
     """The branch through an orbit; ``passage`` makes the return map at a point, a phase and a parameter.
 
-    It gives the passage, the time that an orbit of a forced system takes, and the derivative of that.
+    It gives the passage, the time that an orbit of a forced system takes, and the derivative of that. ``level`` is that
+    of a quantity which the orbits keep, by the parameter.
     """
 
-    def __init__(self, passage: Passage, first: Closed, value: float, range_: tuple[float, float]) -> None:
-        self.passage, self.first_orbit, self.range = passage, first, range_
+    def __init__(
+        self,
+        passage: Passage,
+        first: Closed,
+        value: float,
+        range_: tuple[float, float],
+        level: Callable[[float], Level] | None = None,
+    ) -> None:
+        self.passage, self.first_orbit, self.range, self.level = passage, first, range_, level
         n = len(first.point)
         _, self.multiple, _ = passage(first.point, first.phase, value)
         self.forced = self.multiple is not None
@@ -108,7 +118,20 @@ class Follower:
             matrix[n, n + 1] -= slope
         kept, scale = self.kept, self.scale[self.kept]
         missing = self._shown(gap(passage, unknowns[:n], multiple)) / scale[:-1]
-        return missing, self._shown(matrix)[:, kept] * scale / scale[:-1, None], passage
+        rows = self._shown(matrix)[:, kept] * scale / scale[:-1, None]
+        if self.level is not None:
+            off, row = self._off_level(self.level, unknowns)
+            missing, rows = np.append(missing, off), np.vstack([rows, row[kept]])
+        return missing, rows, passage
+
+    def _off_level(self, level: Callable[[float], Level], unknowns: Array) -> tuple[float, Array]:
+        """How far unknowns are off the level, and its slopes by them, of length one, relative to the sizes."""
+        point, at, step = unknowns[:-2], float(unknowns[-1]), LEVEL_STEP * float(self.scale[-1])
+        here, slopes = level(at).at(point)
+        behind, ahead = (level(at + way * step).at(point)[0] for way in (-1, 1))
+        row = np.concatenate([slopes, [0.0, (ahead - behind) / (2 * step)]]) * self.scale
+        length = float(np.linalg.norm(row)) or 1.0
+        return (here - level(at).value) / length, row / length
 
     def _shown(self, rows: Array) -> Array:
         """Rows of states and time but for shifts."""
@@ -186,7 +209,10 @@ class Follower:
 
     def multipliers(self, here: Solution) -> Array:
         """The multipliers of a solution, the largest first."""
-        return multipliers_of(self.first_orbit, here.passage.slopes, self.forced)
+        found = self.first_orbit
+        if self.level is not None:
+            found = found._replace(point=here.unknowns[:-2], level=self.level(float(here.unknowns[-1])))
+        return multipliers_of(found, here.passage.slopes, self.forced)
 
     def tests(self, here: Solution) -> dict[str, float]:
         """Numbers that change their sign at bifurcations."""

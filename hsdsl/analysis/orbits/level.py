@@ -35,10 +35,10 @@ class Level(NamedTuple):
         return row / length, (number - self.value) / length
 
 
-def quantity(system: HybridSystem, mode: Mode, text: str) -> sp.Expr:
-    """The expression of a text, or of an output with this name, in a mode.
+def quantity(system: HybridSystem, mode: Mode, states: tuple[str, ...], text: str) -> sp.Expr:
+    """The expression of a text, or of an output with this name, in a mode with states.
 
-    Raises UsageError: it is none, or not of the mode's states and of parameters alone.
+    Raises UsageError: it is none, or not of the states and of parameters alone.
     """
     outputs = dict(zip(system.outputs, mode.outputs, strict=True))
     if text in outputs and outputs[text] is None:
@@ -47,12 +47,12 @@ def quantity(system: HybridSystem, mode: Mode, text: str) -> sp.Expr:
         expr = outputs[text] if text in outputs else value(text)
     except ExpressionError as error:
         raise UsageError(f"--keep: '{shown(text)}' is no expression: {error}") from None
-    known = [*mode.states, *(parameter.name for parameter in system.parameters)]
+    known = [*states, *(parameter.name for parameter in system.parameters)]
     expr = expr.xreplace({symbol(name): of for name, of in outputs.items() if of is not None and name not in known})
     for name in sorted(str(each) for each in expr.free_symbols if str(each) not in known):
         hint = did_you_mean(name, known)
         raise UsageError(f"--keep: expected an expression of states and parameters, got '{name}' in it", hint)
-    if not any(str(each) in mode.states for each in expr.free_symbols):
+    if not any(str(each) in states for each in expr.free_symbols):
         raise UsageError(f"--keep: '{shown(text)}' depends on no state of mode {mode.name}")
     return expr
 

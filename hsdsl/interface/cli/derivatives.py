@@ -93,8 +93,6 @@ def orbit(
     """Find a periodic orbit near the model's run, with its Floquet multipliers."""
     with answer.reporting():
         check_target(plot, "--plot")
-        if keep is not None and follow is not None:
-            raise UsageError("--keep is for one orbit, and --continue follows a branch", "leave one out")
         call = located.settings(overrides, until=until, laps=laps, period=period)
         loaded = hsdsl.load(model)
         with progress(answer.hidden) as show:
@@ -102,7 +100,7 @@ def orbit(
                 found = loaded.orbit(section, keep=keep, progress=counted_runs(show), **call)
             else:
                 name, *ends = _range(follow)
-                found = loaded.continuation(section, name, *ends, progress=counted_runs(show, name), **call)
+                found = loaded.continuation(section, name, *ends, keep=keep, progress=counted_runs(show, name), **call)
         draw(found, plot)
         answer.give(found.as_json, lambda: found.summary)
 

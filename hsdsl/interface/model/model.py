@@ -133,6 +133,7 @@ class Model(Runs):
         *,
         laps: int = 1,
         period: Any = None,
+        keep: str | None = None,
         progress: Callable[[int, float | None], None] | None = None,
         **arguments: Any,
     ) -> Branch:
@@ -143,8 +144,8 @@ class Model(Runs):
 
         Parameters
         ----------
-        section, laps, period, progress, **arguments
-            As for :meth:`orbit`.
+        section, laps, period, keep, progress, **arguments
+            As for :meth:`orbit`; all orbits have the same value of what they ``keep``.
         parameter : str
         start, end : number or str
             The range of the parameter.
@@ -155,7 +156,7 @@ class Model(Runs):
 
         with in_notebook() as show:
             progress = progress or counted_runs(show, parameter)
-            orbits = Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments)
+            orbits = Orbits(self._sliding_for(arguments), section, laps, period, progress, arguments, keep)
             return orbits.continued(parameter, start, end)
 
     def orbital_stability(

@@ -111,11 +111,9 @@ class Orbits:
 
         name, states = guess.entered
         system = self.model.system
-        mode = next((mode for mode in system.modes if mode.name == name), None)
-        if mode is None:
-            raise UsageError("--keep: it is for models without parts")
+        mode = system.modes[0] if self.model.program.parts else next(m for m in system.modes if m.name == name)
         values = with_parameters(self.model.pipeline.values(FLOAT64), parameters)
-        expr = quantity(system, mode, self._keep)
+        expr = quantity(system, mode, states, self._keep)
         first = self._first
         begins = first is not None and first.arcs[0].mode == name  # its start has the value of the level
         start = first.values[0][: len(states)].astype(float) if first and begins else guess.point
@@ -288,6 +286,14 @@ class Orbits:
         self._parameters = self._parameters | {parameter: value}
         self.arguments["parameters"] = self._parameters
         first, self._followed = self.find(), parameter
+        kept = first.closed.level
+
+        def level(at: float) -> Level:
+            assert kept is not None and self._guess is not None
+            found = self._level(self._guess, self._parameters | {parameter: at})
+            assert found is not None
+            return found._replace(value=kept.value)
+
         multiple = None if first.phase is None else round(first.period / (self.forcing(self._parameters) or 1.0))
         lasted = first.period
 
@@ -311,7 +317,7 @@ class Orbits:
             return found, here, (behind - before) / (ends[1] - ends[0])
 
         try:
-            follower = Follower(passage, first.closed, value, (low, high))
+            follower = Follower(passage, first.closed, value, (low, high), level if kept else None)
             parts = [branch(follower, -1.0)]
             lasted = first.period
             parts.append(branch(follower, 1.0) if parts[0][-1] != CIRCLE else (parts[0][0][-1:], [], CIRCLE))
