@@ -452,6 +452,19 @@ def profiled(k: float, x: Any) -> float:
     return min(sums)
 
 
+def test_a_fit_of_several_values_follows_the_sum_along_a_jump() -> None:
+    """Measured with k = 0.45 and a first amount from which no dose would be taken, and with the dose."""
+    noise = 0.02 * np.array([1, -1, 0.5, -0.5, 1, -1])
+    x = 2.2 * np.exp(-0.45 * DOSES) + (DOSES > 1) * 3 * np.exp(-0.45 * (DOSES - 1)) + noise
+    found = hsdsl.loads(SKIPPED).fit({"t": DOSES, "A": x}, "k,initial.A")
+    grid = np.linspace(0.2, 0.9, 70_001)
+    sums = np.array([profiled(k, x) for k in grid])
+    assert found.values["k"] == pytest.approx(grid[int(np.argmin(sums))], abs=2e-5)
+    assert found.values["initial.A"] == pytest.approx(1.2 * np.exp(found.values["k"]), rel=1e-8)
+    assert float(np.sum(found.residuals["A"] ** 2)) == pytest.approx(float(sums.min()), rel=1e-6)
+    assert "where the run makes skip at t = 1" in found.summary
+
+
 def test_an_interval_follows_the_sum_along_a_jump() -> None:
     """The dose is taken while the first amount is at most 1.2 exp(k): the others follow that line to a low k."""
     x = dosed(0.53) + 0.1 * np.array([1, -1, 0.5, -0.5, 0.3, -0.3])

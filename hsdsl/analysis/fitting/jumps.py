@@ -7,6 +7,7 @@ transitions lead to a lower sum.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -26,6 +27,7 @@ HALVINGS = 8  # distances at which other values are tried, the largest the size 
 BESIDE = 1e-9  # of the size of a value: so far beside the values found is the other side of a jump
 Order = tuple[str, ...] | None
 MOST_SIDES = 3  # that are tried, and named
+ALONG, MOST_ALONG, LEVEL = 1e-3, 30, 1e-9  # the size of steps that show a jump's normal; steps along it; a last gain
 JUMP = 1e-8  # of the size of a column: less is no jump
 LONGER = 1.25  # of the time of measurements
 FURTHER, NARROW = 1.1, 1e-6  # so many times as far, and by this share of the time, transitions are moved over them
@@ -124,18 +126,81 @@ def lowest(objective: Objective, points: Iterable[Array]) -> list[tuple[Array, O
 
 def beside_jump(objective: Objective, x: Array, limits: Array, sizes: Array) -> list[str]:
     """What to say if the residuals jump where the sum of squares falls: values beside a jump are no minimum."""
+    step = _step_over_jump(objective, x, limits, sizes)
+    if step is None:
+        return []
+    here, there = objective.run(x).execution.transitions, objective.run(x + step).execution.transitions
+    ways = zip_longest(here, there)
+    first = next(((old, new) for old, new in ways if old is None or new is None or old.edge != new.edge), None)
+    made = ""
+    if first and first[1]:
+        made = f", where the run makes {first[1].edge} at t = {show(first[1].time)}"
+    elif first and first[0]:
+        made = f", where the run no longer makes {first[0].edge} at t = {show(first[0].time)}"
+    return [f"the fit ended beside a jump of the sum of squares{made}: the covariance knows of no jump"]
+
+
+def _step_over_jump(objective: Objective, x: Array, limits: Array, sizes: Array) -> Array | None:
+    """A short step down the slope of the sum of squares over which the residuals jump, if they do."""
     residuals, slopes = objective.residuals(x), objective.slopes(x)
     falls = -(residuals @ slopes) * sizes
     falls[(x == limits[:, 1]) & (falls > 0) | (x == limits[:, 0]) & (falls < 0)] = 0.0
     if not np.any(falls) or not np.isfinite(falls).all():
-        return []
+        return None
     step = np.clip(x + BESIDE * sizes * falls / np.max(np.abs(falls)), limits[:, 0], limits[:, 1]) - x
     off = np.abs(objective.residuals(x + step) - residuals - slopes @ step)
-    if not np.any(off > JUMP * max(map(objective.size, objective.measured.columns))):
-        return []
-    return [
-        "the fit ended beside a jump of the sum of squares, which falls towards it: the covariance knows of no jump"
-    ]
+    return step if np.any(off > JUMP * max(map(objective.size, objective.measured.columns))) else None
+
+
+def along_jump(objective: Objective, x: Array, limits: Array, sizes: Array) -> Array:
+    """Values with a lower sum of squares along the jump that values are beside, on their side of it; else the same.
+
+    Where a jump has a normal, Gauss-Newton steps across it are left out, and each step ends beside the jump again.
+    """
+    step = _step_over_jump(objective, x, limits, sizes) if len(x) > 1 else None
+    order, seen = objective.order(x), objective.seen
+    if step is None or order is None or objective.order(x + step) == order:
+        return x
+    over = step / sizes / np.linalg.norm(step / sizes)
+    total = float(np.sum(objective.residuals(x) ** 2))
+
+    def beside(y: Array, reach: float) -> tuple[float, Array] | None:
+        """How far over the jump lies from values, as shares of their sizes, and values there on this side of it."""
+
+        def stays(share: float) -> bool:
+            return objective.order(np.clip((y + share * over) * sizes, limits[:, 0], limits[:, 1])) == order
+
+        low, high = -reach, reach
+        if not stays(low) or stays(high):
+            return None
+        while high - low > BESIDE / 4:
+            middle = (low + high) / 2
+            low, high = (middle, high) if stays(middle) else (low, middle)
+        return low, np.clip((y + low * over) * sizes, limits[:, 0], limits[:, 1])
+
+    basis: Array | None = None
+    for _ in range(MOST_ALONG):
+        y, residuals, slopes = x / sizes, objective.residuals(x), objective.slopes(x) * sizes
+        if fresh := basis is None:
+            near = [beside(y + ALONG * way, 4 * ALONG) for way in (0 * over, *np.eye(len(x)))]
+            known = [each[0] for each in near if each is not None]
+            if len(known) < len(near):
+                break
+            basis = np.linalg.svd(known[0] - np.array([known[1:]]))[2][1:]
+        move = -basis.T @ np.linalg.lstsq(slopes @ basis.T, residuals, rcond=UNKNOWN)[0]
+        found, lower, share = None, np.inf, 2.0
+        while not lower < total and share > 0.5**HALVINGS:
+            share /= 2
+            found = beside(y + share * move, max(ALONG, 2 * float(np.linalg.norm(share * move))))
+            lower = float(np.sum(objective.residuals(found[1]) ** 2)) if found else np.inf
+        level = not lower < (1 - LEVEL) * total
+        if found and lower < total:
+            x, total = found[1], lower
+        if fresh and level:
+            break
+        basis = None if level or share < 1 else basis  # the jump bends
+    objective.seen = seen
+    return x
 
 
 def close_transitions(found: Sensitivity, measured: Measurements, covariance: Array) -> Sequence[str]:

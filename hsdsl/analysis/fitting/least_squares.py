@@ -18,6 +18,7 @@ from hsdsl.analysis.fitting.fit import Fit, Measurements
 from hsdsl.analysis.fitting.jumps import (
     MOST_SIDES,
     UNKNOWN,
+    along_jump,
     around,
     beside_jump,
     close_transitions,
@@ -89,6 +90,7 @@ def fitted(
     best = min(results, key=lambda result: result.cost)
     if len(first) <= FEW or _leaves_order(objective, objective.order(best.x)):
         best = _further(objective, best, first, bounds, scales)
+    best = _along_jump(objective, best, bounds, scales)
     found = _fit(objective, best, bounds, sigma, scales)
     if level is None:
         return replace(found, nonsmooth=(*_other_order(objective, found), *found.nonsmooth))
@@ -152,6 +154,17 @@ def _further(
             break
         centres = [best.x]
     return best
+
+
+def _along_jump(objective: Objective, best: Any, bounds: Mapping[str, tuple[float, float]], scales: Any) -> Any:
+    """The best fit, or a lower one along the jump of the sum of squares that it ended beside."""
+    sizes, limits = np.array([scales[name] for name in objective.start]), np.array([*bounds.values()], float)
+    x = along_jump(objective, best.x, limits, sizes)
+    if np.array_equal(x, best.x):
+        return best
+    best.x, best.cost = x, float(np.sum(objective.residuals(x) ** 2)) / 2
+    tried = _solved(objective, x, bounds, scales)
+    return tried if tried.cost < (1 - PRECISE) * best.cost else best
 
 
 def _solved(
