@@ -29,7 +29,7 @@ fi
 # Importers of functional mock-up units, each in an environment of its own: test_masters.py. ecospy needs TBB.
 importers=${HSDSL_IMPORTERS:-/opt/fmi-importers}
 for package in libcosimpy==0.0.6 ecospy==0.7.2 cofmupy==1.0.0 pathsim-fmi==0.1.1 casadi==3.8.2 \
-  fmu-manipulation-toolbox==2.0; do
+  fmu-manipulation-toolbox==2.0 copasi-basico==0.92; do
   environment=$importers/${package%%=*}
   [ -d "$environment" ] || python3 -m venv "$environment"
   "$environment/bin/pip" install --quiet "$package"
@@ -39,4 +39,5 @@ done
 # What runs --to sbml: test_sbml_export.py.
 [ -d "$importers/libroadrunner" ] || python3 -m venv "$importers/libroadrunner"
 "$importers/libroadrunner/bin/pip" install --quiet libroadrunner==2.10.0 python-libsbml==5.21.2
+"$importers/copasi-basico/bin/pip" install --quiet python-copasi==4.48.311
 "$importers/pathsim-fmi/bin/pip" install --quiet pathsim==0.27.1

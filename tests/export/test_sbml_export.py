@@ -1,4 +1,4 @@
-"""Models as SBML: the same run behind our own import, and in libRoadRunner; what SBML lacks is refused."""
+"""Models as SBML: the same run behind our own import, and in other tools; what SBML lacks is refused."""
 
 from __future__ import annotations
 
@@ -61,6 +61,18 @@ modes:
       - {event: b >= 7, priority: x, reset: {c: c + 1/8}}
 initial: {mode: m, x: 0, s: 0, a: 0, b: 0, c: 0}
 """,
+    "three modes whose flows are products with the mode": HEAD
+    + """
+parameters: {period: 0.9}
+outputs: {power: i*u}
+modes:
+  on: {flow: {i: 3 - u, u: i - u/3, tau: 1}, transitions: [{when: tau >= 0.4, to: off}]}
+  off:
+    flow: {i: -u - 1, u: i - u/3, tau: 1}
+    transitions: [{when: tau >= period, to: on, reset: {tau: 0}}, {when: i <= 0, to: idle, reset: {i: 0}}]
+  idle: {flow: {i: 0, u: sin(t)/9 - u/period, tau: 1}, transitions: [{when: tau >= period, to: on, reset: {tau: 0}}]}
+initial: {mode: on, i: 0, u: 0, tau: 0}
+""",
 }
 FILES = {name: (MODELS / f"{name}.yaml").read_text("utf-8") for name in ("thermostat", "constrained-pendulum")}
 FILES["bouncing-ball"] = (MODELS / "bouncing-ball.yaml").read_text("utf-8").replace("until: 12", "until: 5")
@@ -104,12 +116,14 @@ def test_the_import_of_an_export_runs_alike(text: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.tools
+@pytest.mark.parametrize(("tool", "version"), [("libroadrunner", "2.10.0"), ("copasi-basico", "0.92")])
 @ALL
-def test_roadrunner_runs_an_export_alike(text: str, tmp_path: Path) -> None:
-    python = program("libroadrunner", "2.10.0")
+def test_other_tools_run_an_export_alike(text: str, tool: str, version: str, tmp_path: Path) -> None:
+    python = program(tool, version)
     model = hsdsl.loads(text)
     times, own = compared(model)
-    command = [python, HERE / "in_libroadrunner.py", exported(model, tmp_path), json.dumps([0.0, *times])]
+    script = HERE / f"in_{tool.removesuffix('-basico')}.py"
+    command = [python, script, exported(model, tmp_path), json.dumps([0.0, *times])]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     got = json.loads(done.stdout.splitlines()[-1])

@@ -67,7 +67,27 @@ class _Writer:
         self.ids = identifiers([*system.states, *(p.name for p in system.parameters), *system.outputs])
         self.mode = next(iter(identifiers(["mode"], self.ids.values()).values()))
         self.numbers = {mode.name: sp.Integer(i) for i, mode in enumerate(system.modes)}
-        self.mathml = MathML({**self.ids, self.mode: self.mode})
+        self.on = self._switches()
+        self.mathml = MathML({**self.ids, self.mode: self.mode, **{name: name for name in self.on.values()}})
+
+    def _switches(self) -> dict[str, str]:
+        """For each of three or more modes a parameter that is 1 in it and 0 elsewhere, to multiply flows with.
+
+        An event that changes two conditions of a ``piecewise`` in flows stops COPASI 4.48. A product needs factors
+        that are finite in every mode: without it, other flows have a ``piecewise``.
+        """
+        modes, wave = self.system.modes, sp.Dummy()
+        values = [
+            value for mode in modes for value in (*mode.vector_field.values(), *mode.outputs) if value is not None
+        ]
+        plain: list[Any] = [
+            value.replace(sp.sin, lambda x: wave * x).replace(sp.cos, lambda x: wave * x) for value in values
+        ]
+        moving = [*map(symbol, self.system.states), TIME]
+        if len(modes) < 3 or not all(value.is_polynomial(*moving) for value in plain):
+            return {}
+        names = identifiers([f"in {mode.name}" for mode in modes], [*self.ids.values(), self.mode])
+        return dict(zip(self.numbers, names.values(), strict=True))
 
     def model(self) -> Element:
         """The element of the model, with what it has of each kind in SBML's order."""
@@ -93,6 +113,8 @@ class _Writer:
             listed = ", ".join(f"{number} is {name}" for name, number in self.numbers.items())
             start = problem.program.modes[problem.mode].name
             yield self._parameter(self.mode, float(self.numbers[start]), f"the mode: {listed}", constant=False)
+            for name, switch in self.on.items():
+                yield self._parameter(switch, float(name == start), f"1 in the mode {name}", constant=False)
 
     def _parameter(self, name: str, value: float | None, about: str | None = None, constant: bool = True) -> Element:
         identifier = self.ids.get(name, name)
@@ -101,10 +123,14 @@ class _Writer:
         return Element("parameter", given | {"constant": str(constant).lower()})
 
     def rules(self) -> Iterator[Element]:
-        """The flow of each state, and the outputs."""
+        """The flow of each state that is not at rest in every mode, and the outputs.
+
+        An event on a state with the rate 0 that is on the event's threshold fires again and again in COPASI 4.48.
+        """
         for name in self.system.states:
             flows = [mode.vector_field.get(symbol(name), sp.S.Zero) for mode in self.system.modes]
-            yield self._rule("rateRule", name, self.by_mode(flows))
+            if any(flows):
+                yield self._rule("rateRule", name, self.by_mode(flows))
         for i, name in enumerate(self.system.outputs):
             if lacking := [mode.name for mode in self.system.modes if mode.outputs[i] is None]:
                 raise UsageError(f"SBML needs output `{name}` in every mode, and {lacking[0]} has none")
@@ -119,8 +145,10 @@ class _Writer:
         """The expression that is given for the mode that is on."""
         values: dict[Any, list[Any]] = {}
         for mode, value in zip(self.system.modes, given, strict=True):
-            values.setdefault(value, []).append(self.inside(mode))
+            values.setdefault(value, []).append(symbol(self.on[mode.name]) if self.on else self.inside(mode))
         *others, last = values
+        if others and self.on:
+            return sp.Add(*(value * sp.Add(*switches) for value, switches in values.items()))
         pieces = [(value, sp.Or(*values[value])) for value in others]
         return sp.Piecewise(*pieces, (last, True), evaluate=False) if pieces else last
 
@@ -139,7 +167,8 @@ class _Writer:
     def events(self) -> Iterator[Element]:
         """The transitions, each as an event."""
         edges = [(mode, edge) for mode in self.system.modes for edge in mode.edges]
-        names = identifiers([f"{mode.name} {edge.name} {k}" for k, (mode, edge) in enumerate(edges)], self.ids.values())
+        taken = [*self.ids.values(), self.mode, *self.on.values()]
+        names = identifiers([f"{mode.name} {edge.name} {k}" for k, (mode, edge) in enumerate(edges)], taken)
         for k, ((mode, edge), name) in enumerate(zip(edges, names.values(), strict=True)):
             yield self._event(mode, edge, name, len(edges) - k)
 
@@ -159,11 +188,12 @@ class _Writer:
         assigned = {str(name): value for name, value in edge.changes.items()}
         if edge.target != mode.name:
             assigned[self.mode] = self.numbers[edge.target]
+            assigned |= {self.on[mode.name]: sp.S.Zero, self.on[edge.target]: sp.S.One} if self.on else {}
         makes = SubElement(whole, "listOfEventAssignments") if assigned else whole
         for name, value in assigned.items():
             if edge.condition is not None:
                 value = sp.Piecewise((value, edge.condition), (symbol(name), True), evaluate=False)
-            one = SubElement(makes, "eventAssignment", variable=self.ids.get(name, self.mode))
+            one = SubElement(makes, "eventAssignment", variable=self.ids.get(name, name))
             one.append(self.mathml.math(value))
         return whole
 
