@@ -39,13 +39,12 @@ from math import inf, isfinite
 import numpy as np
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.engine.execution import Array, Execution
+from hsdsl.engine.execution import Array
 from hsdsl.engine.integrators import FALLBACK, METHODS, ButcherTableau, Method
 from hsdsl.engine.integrators.taylor import NoSeries, terms
 from hsdsl.engine.kernel import Kernel
-from hsdsl.engine.simulate import Prepared, Settings
+from hsdsl.engine.simulate import Problem, Settings
 from hsdsl.engine.simulate.input_segments import Segment, Timeline
-from hsdsl.engine.simulate.plan import Watch
 from hsdsl.engine.simulate.review import Judge
 from hsdsl.mathematics.program import Program
 
@@ -97,31 +96,20 @@ def _adaptive(
     return METHODS["taylor"], "every flow is smooth, and none was seen to be stiff"
 
 
-def run(prepared: Prepared, watch: Watch | None, seconds: Mapping[str, float]) -> tuple[Prepared, Execution]:
-    """Run to the end; by the method for stiff modes from the start where the run has come to a stiff stretch."""
-    judge = judge_of(prepared)
-    if judge is not None:
-        made, stiff = prepared.judged(judge, watch, seconds)
-        if made is not None:
-            return prepared, made
-        prepared = instead(prepared, stiff)
-    return prepared, prepared.simulate(watch, seconds)
-
-
-def judge_of(prepared: Prepared, plain: Prepared | None = None) -> Judge | None:
+def judge_of(problem: Problem, plain: Problem | None = None) -> Judge | None:
     """What finds stiff stretches of a run under way; None unless `auto` has chosen an explicit method.
 
     Of a run with more states ``plain`` is the one that the choice was made for: its modes are judged.
     """
-    plain = plain or prepared
-    settings, digits = prepared.settings, prepared.arithmetic.digits
+    plain = plain or problem
+    settings, digits = problem.settings, problem.arithmetic.digits
     chosen = settings.tolerance is not None and plain.settings.method_chosen is not None
     if chosen and digits is None and settings.method is not None and not settings.method.implicit:
-        return partial(_judge, plain, prepared.program)
+        return partial(_judge, plain, problem.program)
     return None
 
 
-def _judge(plain: Prepared, program: Program, mode: int, t: Number, x: Sequence[Number], step: Number) -> str | None:
+def _judge(plain: Problem, program: Program, mode: int, t: Number, x: Sequence[Number], step: Number) -> str | None:
     """Why a mode of a program is stiff at a state of a run with such steps on average; None where it is not."""
     name, values = program.modes[mode].name, dict(zip(program.modes[mode].states, x, strict=False))
     if name not in plain.program.mode_names:
@@ -138,22 +126,6 @@ def _judge(plain: Prepared, program: Program, mode: int, t: Number, x: Sequence[
     except (*DOMAIN_ERRORS, np.linalg.LinAlgError):
         return None
     return stiffness(plain.kernel, plain.timeline, name, index, here, until, float(t))
-
-
-def settled(prepared: Prepared) -> Prepared:
-    """The run by the method that it ends with: it is made once for that, in constant memory."""
-    judge = judge_of(prepared)
-    if prepared.plan is None or judge is None:
-        return prepared
-    _, stiff = prepared.stream(lambda chunk: None, None, judge)
-    return prepared if stiff is None else instead(prepared, stiff)
-
-
-def instead(prepared: Prepared, stiff: str) -> Prepared:
-    """The same run by the method for stiff modes."""
-    settings = prepared.settings
-    method = METHODS["radau"].for_tolerance(settings.tolerance, prepared.arithmetic)
-    return prepared.prepared_with(replace(settings, method=method, method_chosen=f"{method.name}: {stiff}"))
 
 
 def _has_derivatives(kernel: Kernel, timeline: Timeline, mode: int, x: Sequence[Number]) -> bool:

@@ -270,7 +270,8 @@ class Pipeline:
         settings = following_digits(settings, options, values.kernel.arithmetic)
         start = cache(partial(self._moved, parameters, initial, arithmetic_of(precision), settings.until))
         problem = Problem(self.program, values.kernel, settings, timeline, mode, states, x, waits, start)
-        return prepare(problem, choose(engine, settings, precision, self._compile))
+        judge = automatic.judge_of(problem) if options.automatic else None
+        return prepare(problem, choose(engine, settings, precision, self._compile), judge)
 
     def _moved(
         self, parameters: Mapping[str, Any], initial: Mapping[str, Any], arithmetic: Arithmetic, until: Number

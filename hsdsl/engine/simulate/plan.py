@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.engine.execution import Array, Execution, Stop
+from hsdsl.engine.integrators import METHODS
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.engine.simulate.compiled import CompiledPlan, CompiledRun
@@ -19,7 +20,6 @@ from hsdsl.engine.simulate.output_buffers import Sink
 from hsdsl.engine.simulate.problem import Problem, Tails
 from hsdsl.engine.simulate.result import about, from_recorder, written
 from hsdsl.engine.simulate.review import Judge, Judged, Review
-from hsdsl.engine.simulate.settings import Settings
 from hsdsl.engine.simulate.stops import interrupted, memory
 
 if TYPE_CHECKING:
@@ -59,10 +59,12 @@ Streamed = tuple[Stop, CompiledRun, dict[str, Array]]
 class Prepared(Problem):
     """A problem ready to run any number of times; ``plan`` is given where the compiled loop runs it.
 
-    ``links`` are the fields of its executions by which these answer what takes more than their numbers.
+    ``judge`` finds stiff stretches, where the method was chosen for the start. ``links`` are the fields of its
+    executions by which these answer what takes more than their numbers.
     """
 
     plan: CompiledPlan | None
+    judge: Judge | None = None
     links: dict[str, Any] = field(default_factory=dict[str, Any])
     finer: dict[int, Prepared] = field(default_factory=dict[int, "Prepared"])  # by the rows of the run
 
@@ -75,21 +77,32 @@ class Prepared(Problem):
         return self._run(None, watch, dict(seconds))
 
     def judged(
-        self, judge: Judge, watch: Watch | None = None, seconds: Mapping[str, float] = MappingProxyType({})
+        self, watch: Watch | None = None, seconds: Mapping[str, float] = MappingProxyType({})
     ) -> tuple[Execution | None, Any]:
         """Run to the end, or to a finding of the judge: the run, or None and the finding."""
         try:
-            return self._run(Review(judge), watch, dict(seconds)), None
+            return self._run(self._review(), watch, dict(seconds)), None
         except Judged as found:
             return None, found.finding
 
-    def stream(self, sink: Sink, watch: Watch | None = None, judge: Judge | None = None) -> tuple[Streamed | None, Any]:
+    def settled(self, watch: Watch | None, seconds: Mapping[str, float]) -> tuple[Prepared, Execution]:
+        """Run to the end; from the start by the method for stiff modes where the run has come to a stiff stretch.
+
+        Returns what has run, too.
+        """
+        made, stiff = self.judged(watch, seconds)
+        if made is not None:
+            return self, made
+        other = self.by_stiff_method(stiff)
+        return other, other.simulate(watch, seconds)
+
+    def stream(self, sink: Sink, watch: Watch | None = None) -> tuple[Streamed | None, Any]:
         """Run the compiled loop to the end, or to a finding of the judge, and hand over what it writes, by chunks.
 
         Returns why it stopped, the run with what it has noted, and the last chunk; or None and the finding.
         """
         assert self.plan is not None
-        run = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), judge and Review(judge))
+        run = CompiledRun(self.plan, self.plan.workspaces.new(structures.Task()), self._review())
         if watch is not None:
             watch(run)
         try:
@@ -97,6 +110,20 @@ class Prepared(Problem):
         except Judged as found:
             return None, found.finding
         return (stop, run, rest), None
+
+    def to_settled(self) -> Prepared:
+        """The run by the method that it ends with: it is made once for that, in constant memory."""
+        if self.plan is None or self.judge is None:
+            return self
+        _, stiff = self.stream(lambda chunk: None)
+        return self if stiff is None else self.by_stiff_method(stiff)
+
+    def by_stiff_method(self, why: str) -> Prepared:
+        """The same run by the method for stiff modes, and the reason."""
+        settings = self.settings
+        method = METHODS["radau"].for_tolerance(settings.tolerance, self.arithmetic)
+        chosen = replace(settings, method=method, method_chosen=f"{method.name}: {why}")
+        return self._prepared(self.with_settings(chosen))
 
     def again(self, execution: Execution) -> Execution:
         """Make the same run finer."""
@@ -106,12 +133,11 @@ class Prepared(Problem):
             self.finer[rows] = self._prepared(self.moved_with(settings))
         return self.finer[rows].simulate()
 
-    def prepared_with(self, settings: Settings) -> Prepared:
-        """Prepare the same problem with other settings."""
-        return self._prepared(self.with_settings(settings))
-
     def _prepared(self, problem: Problem) -> Prepared:
         return replace(prepare(problem, self.plan and self.plan.compiled), links=self.links)
+
+    def _review(self) -> Review | None:
+        return self.judge and Review(self.judge)
 
     @cached_property
     def _about(self) -> dict[str, Any]:
@@ -171,6 +197,6 @@ class Prepared(Problem):
         return from_recorder(self._about, run, stop, spent)
 
 
-def prepare(problem: Problem, code: CompiledModel | None = None) -> Prepared:
+def prepare(problem: Problem, code: CompiledModel | None = None, judge: Judge | None = None) -> Prepared:
     """Prepare a run by compiled code, by the Python loop where there is none."""
-    return Prepared(**vars(problem), plan=code and CompiledPlan(problem, code))
+    return Prepared(**vars(problem), plan=code and CompiledPlan(problem, code), judge=judge)

@@ -107,13 +107,11 @@ class Differentiator:
 
     def _run(self, ready: _Ready) -> tuple[_Ready, Execution]:
         """Run the augmented system; by the method for stiff modes where it comes to a stiff stretch."""
-        judge = automatic.judge_of(ready.setting.augmented, ready.setting.plain)
-        if judge is not None:
-            run, stiff = ready.setting.augmented.judged(judge)
-            if run is not None:
-                return ready, run
-            plain = automatic.instead(ready.setting.plain, stiff)
-            ready = self._prepare(replace(ready, setting=replace(ready.setting, plain=plain)))
+        run, stiff = ready.setting.augmented.judged()
+        if run is not None:
+            return ready, run
+        plain = ready.setting.plain.by_stiff_method(stiff)
+        ready = self._prepare(replace(ready, setting=replace(ready.setting, plain=plain)))
         return ready, ready.setting.augmented.simulate()
 
     def _prepare(self, ready: _Ready) -> _Ready:
@@ -146,7 +144,8 @@ class Differentiator:
             "precision": ready.call.get("precision"),
         }
         prepared = self._written(ready, method).prepare(arguments)
-        return replace(ready, setting=replace(ready.setting, augmented=prepared))
+        judged = replace(prepared, judge=automatic.judge_of(prepared, ready.setting.plain))
+        return replace(ready, setting=replace(ready.setting, augmented=judged))
 
     def _written(self, ready: _Ready, method: str) -> Pipeline:
         """The augmented system for runs by a method."""

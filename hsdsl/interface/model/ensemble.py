@@ -24,7 +24,6 @@ from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
 from hsdsl.base.numbers.columns import Column, varies
 from hsdsl.engine.execution import Array, Ensemble, Execution, Transition, TransitionTable
 from hsdsl.engine.execution.run import columns_by_name
-from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import KEYS, check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.preparation.values import (
@@ -219,7 +218,7 @@ def prepare_ensemble(request: EnsembleRequest) -> PreparedEnsemble:
     if first is None:
         why = next(iter(table.refused.values()), "there is none" if len(finite) == 0 else "a value is not finite")
         raise NothingToRunError(why)
-    base = automatic.settled(pipeline.prepare(request.single(first)))
+    base = pipeline.prepare(request.single(first)).to_settled()
     varied = request.arrays(initial=True)
     shared = start_of_parts(pipeline.program, dict.fromkeys(varied) | call["initial"])
     shared = {name: value for name, value in shared.items() if name not in varied}

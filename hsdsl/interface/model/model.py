@@ -15,7 +15,6 @@ from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import written_modes
 from hsdsl.base.progress import counted, counted_runs, in_notebook
 from hsdsl.engine.execution import Ensemble, Execution
-from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import arguments_of
 from hsdsl.engine.preparation.pipeline import pipeline_of
 from hsdsl.engine.preparation.values import with_parameters
@@ -273,12 +272,7 @@ class Model(Runs):
         self._flat("rows in a file while a run goes on")
         target = check(path, every, columns, arguments, self)
         prepared = self.pipeline.prepare(arguments | {"engine": "c"})
-        judge = automatic.judge_of(prepared)
-        made, stiff = stream(prepared, target, every, columns, watch, judge)
-        if made is None:
-            made, _ = stream(automatic.instead(prepared, stiff), target, every, columns, watch)
-        assert made is not None
-        return made
+        return stream(prepared, target, every, columns, watch)
 
     def ensemble(
         self,

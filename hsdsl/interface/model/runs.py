@@ -12,7 +12,6 @@ from hsdsl.base.names import checks_arguments, checks_methods, did_you_mean
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.progress import in_notebook, is_notebook, running
 from hsdsl.engine.execution import Execution
-from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.options import Options, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
 from hsdsl.engine.preparation.values import with_parameters
@@ -193,7 +192,7 @@ class Runs:
             if ready is not None:
                 run = ready.simulate(watch, self.pipeline.seconds)
             else:
-                ready, run = automatic.run(self._linked(call), watch, self.pipeline.seconds)
+                ready, run = self._linked(call).settled(watch, self.pipeline.seconds)
                 self.kept_runs.keep(key, ready)
         return visible_run(run, ready)
 

@@ -22,7 +22,6 @@ from hsdsl.engine.preparation.options import check_arguments
 from hsdsl.engine.preparation.values import whole
 from hsdsl.engine.simulate.columns import StateLayouts
 from hsdsl.engine.simulate.plan import Prepared, Watch
-from hsdsl.engine.simulate.review import Judge
 from hsdsl.engine.simulate.stops import loop_remarks, warnings_of
 from hsdsl.mathematics.program import Program
 
@@ -132,15 +131,8 @@ def check(
     return target
 
 
-def stream(
-    prepared: Prepared,
-    path: Path,
-    every: int,
-    columns: Sequence[str] | None,
-    watch: Watch | None,
-    judge: Judge | None = None,
-) -> tuple[Streamed | None, Any]:
-    """Run to the end, or to a finding of the judge, rows going to a CSV file: the run, or None and the finding.
+def stream(prepared: Prepared, path: Path, every: int, columns: Sequence[str] | None, watch: Watch | None) -> Streamed:
+    """Run to the end, rows going to a CSV file; from the start where it comes to a stiff stretch.
 
     Raises UsageError: the file cannot be written, or not on to its end (a full disk); what was written stays.
     """
@@ -152,17 +144,17 @@ def stream(
         file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0), 0o666)
         try:
             rows = Rows(prepared.program, prepared.states, every, columns, lambda text: _write_all(file, text))
-            made, finding = prepared.stream(rows.take, watch, judge)
-            if made is None:
-                return None, finding
-            stop, run, rest = made
-            final = rows.take(rest, at_end=True)
+            made, finding = prepared.stream(rows.take, watch)
+            final = made and rows.take(made[2], at_end=True)
         finally:
             os.close(file)
     except OSError as error:
         raise UsageError(f"cannot write {path}: {error.strerror or error}") from None
+    if made is None:
+        return stream(prepared.by_stiff_method(finding), path, every, columns, watch)
+    stop, run, _ = made
     assert final is not None
-    streamed = Streamed(
+    return Streamed(
         path=path,
         rows=rows.written,
         steps=rows.steps,
@@ -176,7 +168,6 @@ def stream(
         seconds=time.perf_counter() - began,
         overrides=dict(settings.overrides),
     )
-    return streamed, None
 
 
 def _write_all(file: int, text: bytes) -> None:
