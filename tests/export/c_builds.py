@@ -14,7 +14,7 @@ from typing import Any
 
 from hsdsl.engine.runtime.library import RUNTIME, print_scheme, runtime_text
 from hsdsl.export import files_of, source_of, write
-from hsdsl.export.c.sources import COMPILED, EXACT_FLAGS
+from hsdsl.export.c import COMPILED, EXACT_FLAGS
 from hsdsl.interface.model import Model
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")

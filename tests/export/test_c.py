@@ -18,7 +18,7 @@ import hsdsl
 from hsdsl.analysis.report import as_json
 from hsdsl.engine.runtime.library import RUNTIME
 from hsdsl.export import files_of, source_of
-from hsdsl.export.c.sources import COMPILED, MEASURED, SMALL, SMALL_MEASURED, c_sources
+from hsdsl.export.c import COMPILED, MEASURED, SMALL, SMALL_MEASURED, c_sources
 from hsdsl.interface.cli.verbs import obey
 
 EVENTS = Path(__file__).parents[1] / "conformance" / "events"

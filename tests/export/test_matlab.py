@@ -16,7 +16,7 @@ from shipped import assert_golden
 import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.export import files_of, source_of
-from hsdsl.export.c.sources import EXACT_FLAGS
+from hsdsl.export.c import EXACT_FLAGS
 
 ROOT = Path(__file__).parents[2]
 CASES = [f"tests/conformance/{name}" for name in ("cases", "events", "parts")]

@@ -13,7 +13,7 @@ import hsdsl
 from hsdsl.engine.runtime.library import RUNTIME
 from hsdsl.engine.simulate import Problem
 from hsdsl.export import source_of
-from hsdsl.export.c.sources import c_sources
+from hsdsl.export.c import c_sources
 from hsdsl.export.web import PARTS
 from hsdsl.export.web.model import page_numbers
 

@@ -53,7 +53,7 @@ def test_the_compiler_lays_out_structures_and_numbers_names_as_they_were_read(tm
 
 @needs_compiler
 @pytest.mark.parametrize(
-    "name", ["functions.h", "hs_math.h", "hs_series.h", "hs_screen.h", "workspace.h", "hs.c", "library.c", "lane.h"]
+    "name", ["functions.h", "hs_math.h", "hs_series.h", "hs_screen.h", "run.h", "hs.c", "library.c", "lane.h"]
 )
 def test_what_is_compiled_or_included_alone_includes_what_it_uses(name, tmp_path):
     flags = ["-std=c99", "-fsyntax-only", "-Werror=implicit-function-declaration", f"-I{print_scheme(tmp_path)}"]

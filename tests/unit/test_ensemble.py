@@ -16,7 +16,8 @@ from hsdsl.analysis.plot.ensembles import Spread
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution.records import same
-from hsdsl.engine.preparation.values import initial_state, with_parameters
+from hsdsl.engine.preparation.experiment import initial_state
+from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.simulate import output_buffers
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate

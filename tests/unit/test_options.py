@@ -9,8 +9,8 @@ import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.arithmetic import FLOAT64, multiprecision
 from hsdsl.engine.integrators import INTEGRATORS
+from hsdsl.engine.preparation.experiment import check_method
 from hsdsl.engine.preparation.options import FILE, resolve
-from hsdsl.engine.preparation.values import check_method
 from hsdsl.interface.model import split_overrides
 
 # (file, --set, call) -> (method, size, its value)

@@ -16,8 +16,8 @@ from hsdsl.engine.integrators.taylor import TaylorMethod
 
 Method = ButcherTableau | TaylorMethod | RadauMethod
 _HERE = "hsdsl.engine.integrators."
-_CLASSICAL = {name: f"{_HERE}classical:{name.upper()}" for name in ("euler", "midpoint", "heun", "ralston", "rk4")}
-_EXPLICIT = {**_CLASSICAL, "dopri5": f"{_HERE}dopri5:DOPRI5", "dop853": f"{_HERE}dop853:DOP853"}
+_FAMILY = ("euler", "midpoint", "heun", "ralston", "rk4", "dopri5")
+_EXPLICIT = {name: f"{_HERE}explicit:{name.upper()}" for name in _FAMILY} | {"dop853": f"{_HERE}dop853:DOP853"}
 
 
 def _fault(name: str, value: Any) -> str | None:

@@ -24,17 +24,15 @@ from hsdsl.engine import ahead
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.integrators import METHODS
 from hsdsl.engine.preparation import automatic
-from hsdsl.engine.preparation.options import FILE, KEYS, Options, overrides_of, recorded, resolve
-from hsdsl.engine.preparation.values import (
-    Values,
-    arithmetic_of,
+from hsdsl.engine.preparation.experiment import (
     following_digits,
     initial_state,
     initial_waits,
     settings_of,
     waiting_apart,
-    with_parameters,
 )
+from hsdsl.engine.preparation.options import FILE, KEYS, Options, overrides_of, recorded, resolve
+from hsdsl.engine.preparation.values import Values, arithmetic_of, with_parameters
 from hsdsl.engine.runtime import kernel
 from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel

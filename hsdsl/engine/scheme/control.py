@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import NOTHING, Number
-from hsdsl.engine.scheme.words import Count, Time, Vector, inline
+from hsdsl.engine.scheme.primitives import Count, Time, Vector, inline
 
 SAFETY = 0.9
 LEAST = 0.2

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.scheme.words import IndexRoom, Indices, Room, Vector, inline
+from hsdsl.engine.scheme.primitives import IndexRoom, Indices, Room, Vector, inline
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,19 @@ from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.linear import Blocks, Factors, solve_all, solve_all_complex
-from hsdsl.engine.scheme.primitives import Collocation, flow_at, sum_of
+from hsdsl.engine.scheme.primitives import (
+    Collocation,
+    Here,
+    Room,
+    Time,
+    Vector,
+    each,
+    flow_at,
+    inline,
+    may_fail,
+    sum_of,
+)
 from hsdsl.engine.scheme.scales import Resolved, is_finite
-from hsdsl.engine.scheme.words import Here, Room, Time, Vector, each, inline, may_fail
 
 MOST_ITERATIONS = 7  # Largest number of iterations of a step that has a tolerance.
 RENEWED = 1e-3  # The Jacobian is stale if the convergence rate exceeds this.

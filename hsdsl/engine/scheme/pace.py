@@ -8,8 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
-from hsdsl.engine.scheme.primitives import flow_between
-from hsdsl.engine.scheme.words import Count, Here, Room, Time, Vector, inline
+from hsdsl.engine.scheme.primitives import Count, Here, Room, Time, Vector, flow_between, inline
 
 IDLE_UNITS = 64  # a step below this many units of round-off of time (or of the full step) is idle
 MOST_IDLE = 64  # in a row: enough to close in on a surface to round-off

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.scheme.words import Room, Vector, inline
+from hsdsl.engine.scheme.primitives import Room, Vector, inline
 
 ROUNDING = 8  # units of round-off in evaluating a polynomial, relative to the sum of its terms
 

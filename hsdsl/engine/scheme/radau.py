@@ -31,9 +31,20 @@ from hsdsl.engine.scheme.linear import (
     sparse_factored_complex,
 )
 from hsdsl.engine.scheme.newton import Radau, to_roundoff, to_tolerance, weighted
-from hsdsl.engine.scheme.primitives import Collocation, derivatives_at, flow_at
+from hsdsl.engine.scheme.primitives import (
+    Collocation,
+    Here,
+    Indices,
+    Room,
+    Time,
+    Vector,
+    derivatives_at,
+    each,
+    flow_at,
+    inline,
+    may_fail,
+)
 from hsdsl.engine.scheme.scales import resolve
-from hsdsl.engine.scheme.words import Here, Indices, Room, Time, Vector, each, inline, may_fail
 
 
 def begin_stretch(steps: Radau, of: Blocks) -> None:

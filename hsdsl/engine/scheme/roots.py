@@ -9,8 +9,7 @@ from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.polynomials import ROUNDING, split, value_and_slope, value_at_end, value_of
-from hsdsl.engine.scheme.primitives import fill_bernstein, largest_of, least_of
-from hsdsl.engine.scheme.words import Room, Vector, inline
+from hsdsl.engine.scheme.primitives import Room, Vector, fill_bernstein, inline, largest_of, least_of
 
 MOST_REFINEMENTS = 300
 

@@ -12,8 +12,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hsdsl.base.numbers.arithmetic import Number
-from hsdsl.engine.scheme.primitives import flow_at, has_terms, terms_at
-from hsdsl.engine.scheme.words import Here, IndexRoom, Room, Time, Vector, inline, may_fail
+from hsdsl.engine.scheme.primitives import (
+    Here,
+    IndexRoom,
+    Room,
+    Time,
+    Vector,
+    flow_at,
+    has_terms,
+    inline,
+    may_fail,
+    terms_at,
+)
 
 SHARE = 32  # the terms of a flow may move a state by at least so many times its scale in a step
 NOISE_UNITS = 64  # units of round-off of what they move it by: no tolerance asks for less

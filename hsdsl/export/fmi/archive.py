@@ -14,7 +14,7 @@ from hsdsl.base.errors import UsageError
 from hsdsl.engine.runtime.compiler import FLAGS, NoCompiler, find_compiler
 from hsdsl.engine.runtime.library import EFFORT, loop_object
 from hsdsl.engine.runtime.process import workshop
-from hsdsl.export.c.sources import c_sources
+from hsdsl.export.c import c_sources
 from hsdsl.export.fmi import variables
 from hsdsl.export.fmi.variables import Unit
 

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from textwrap import wrap
 
 from hsdsl.base.names import visible
-from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
+from hsdsl.export.c import EXACT_FLAGS, c_sources
 from hsdsl.export.matlab.model import PARTS, ModelText, body, comment, helpers, literal, parameter_fields, string
 from hsdsl.export.source import Source, definitions, derived, followed, structural
 

@@ -21,7 +21,7 @@ from hsdsl.engine.runtime.kernel import CompiledModel, runtime
 from hsdsl.engine.runtime.structures import method_table
 from hsdsl.engine.simulate import Problem, prepare
 from hsdsl.engine.simulate.control import make_control
-from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
+from hsdsl.export.c import EXACT_FLAGS, c_sources
 from hsdsl.export.source import Source, filled, identifiers, structural
 from hsdsl.mathematics.program import ModeProgram, Program
 

@@ -23,7 +23,7 @@ from hsdsl.engine.runtime.compiler import Compiler, NoCompiler, zig_compiler
 from hsdsl.engine.runtime.kernel import CompiledModel
 from hsdsl.engine.runtime.process import workshop
 from hsdsl.engine.simulate import prepare
-from hsdsl.export.c.sources import EXACT_FLAGS, c_sources
+from hsdsl.export.c import EXACT_FLAGS, c_sources
 from hsdsl.export.source import Source
 from hsdsl.export.web.model import model_of, page_numbers
 
@@ -80,7 +80,7 @@ def _part(name: str) -> str:
 PARTS = Path(__file__).parent / "parts"
 FLAGS = ("-target", "wasm32-wasi", "-mexec-model=reactor", "-std=c99", "-Wl,--strip-all", *EXACT_FLAGS)
 COMPILED = ("model.c", "problem.c", "page.c", "runtime/hs.c")
-OWN = ("page.c", "page.h", "settings.c", "timeline.c", "samples.c")
+OWN = ("page.c", "page.h", "settings.c", "timeline.c")
 KIND = "pages"
 FIRST_TIME = 10  # times the limit: before its first module the compiler makes its C library
 

@@ -18,16 +18,10 @@ from hsdsl.base.parts import Part, present
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.integrators import FALLBACK, METHODS
 from hsdsl.engine.preparation import automatic
+from hsdsl.engine.preparation.experiment import initial_layout, initial_state, start_of_parts
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.values import (
-    Values,
-    arithmetic_of,
-    initial_layout,
-    initial_state,
-    start_of_parts,
-    with_parameters,
-)
+from hsdsl.engine.preparation.values import Values, arithmetic_of, with_parameters
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.simulate.verdict.errors import SAFE
 from hsdsl.interface.model.call_cache import CallCache, call_key

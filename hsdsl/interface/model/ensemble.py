@@ -24,19 +24,10 @@ from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
 from hsdsl.base.numbers.columns import Column, varies
 from hsdsl.engine.execution import Array, Ensemble, Execution, Transition, TransitionTable
 from hsdsl.engine.execution.run import columns_by_name
+from hsdsl.engine.preparation.experiment import check_alone, initial_columns, setting_columns, start_of_parts
 from hsdsl.engine.preparation.options import KEYS, check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.values import (
-    InstanceTable,
-    check_alone,
-    check_memory,
-    column_of,
-    evaluate_parameters,
-    initial_columns,
-    setting_columns,
-    start_of_parts,
-    whole,
-)
+from hsdsl.engine.preparation.values import InstanceTable, check_memory, column_of, evaluate_parameters, whole
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.simulate import Prepared
 from hsdsl.engine.simulate.columns import StateLayouts

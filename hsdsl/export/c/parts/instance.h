@@ -4,7 +4,7 @@
 #define INSTANCE_H
 
 #include "problem.h"
-#include "workspace.h"
+#include "run.h"
 
 #ifndef PROBLEM_ROWS
 #define PROBLEM_ROWS 64 /* of a chunk; what is written goes to the sink when a chunk is full */

@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "hs_math.h"
-#include "surfaces.h"
 
 #define ROUNDOFF 0x1p-14  /* of a margin: what counts as on a surface where an input jumps */
 #define MOST_AT_ONCE 1000 /* transitions at one instant, or in a row from a surface that the state does not leave */

@@ -12,7 +12,7 @@
    a reset leaves it there, it is on the surface, until it is inside again or gets further out: the indicator is positive
    between these two. */
 
-#include "surfaces.h"
+#include "events.h"
 
 #include <string.h>
 

@@ -1,5 +1,5 @@
 /* The settings of a run: what is given, and the model's own expressions for the rest.
-   See hsdsl/engine/preparation/values.py, hsdsl/engine/preparation/values.py, hsdsl/base/defaults.py and make_control in hsdsl/engine/simulate/control.py. */
+   See hsdsl/engine/preparation/options.py, hsdsl/engine/preparation/experiment.py, hsdsl/base/defaults.py and make_control in hsdsl/engine/simulate/control.py. */
 
 static int refused_at;
 
