@@ -238,29 +238,26 @@ def measurements(given: Any, known: Sequence[str]) -> Measurements:
 
 def _columns(given: Any) -> tuple[str, dict[str, Sequence[Any]]]:
     if isinstance(given, (str, Path)):
-        return str(given), _read(Path(given))
+        path = Path(given)
+        try:
+            with path.open(newline="", encoding="utf-8-sig") as file:
+                rows = [row for row in csv.reader(file) if row]
+        except UnicodeDecodeError:
+            raise UsageError(f"{path} cannot be read: it is no text in UTF-8") from None
+        except (OSError, csv.Error) as error:
+            raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+        if not rows:
+            raise UsageError(f"{path} is empty", "its first row has the names of columns")
+        names = _single(str(path), [name.strip() for name in rows[0]])
+        for k, row in enumerate(rows[1:], 2):
+            if len(row) != len(names):
+                raise UsageError(f"{path}: row {k} has {len(row)} cells, and the first one has {len(names)}")
+        return str(given), {name: [row[k] for row in rows[1:]] for k, name in enumerate(names)}
     if hasattr(given, "columns") or isinstance(given, Mapping):
         table = cast(Any, given)
         names = _single("data", [*getattr(table, "columns", table)])
         return "data", {str(name): list(table[name]) for name in names}
     raise UsageError(f"data: expected a CSV file, a mapping or a DataFrame, got {type(given).__name__}")
-
-
-def _read(path: Path) -> dict[str, Sequence[str]]:
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except UnicodeDecodeError:
-        raise UsageError(f"{path} cannot be read: it is no text in UTF-8") from None
-    except (OSError, csv.Error) as error:
-        raise UsageError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if not rows:
-        raise UsageError(f"{path} is empty", "its first row has the names of columns")
-    names = _single(str(path), [name.strip() for name in rows[0]])
-    for k, row in enumerate(rows[1:], 2):
-        if len(row) != len(names):
-            raise UsageError(f"{path}: row {k} has {len(row)} cells, and the first one has {len(names)}")
-    return {name: [row[k] for row in rows[1:]] for k, name in enumerate(names)}
 
 
 def _single(source: str, names: list[Any]) -> list[Any]:

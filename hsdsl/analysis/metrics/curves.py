@@ -168,7 +168,15 @@ class OnSpace(Labelled):
     def over(self, a: Side, b: Side) -> Array:
         """Bound by the difference of the two polynomials, where the straight lines between them stay in one domain."""
         bound = np.full(len(a.pieces), np.inf)
-        same = np.flatnonzero(self._in_one_domain(a, b))
+        inside = np.zeros(len(a.pieces), dtype=bool)
+        for i, layout in enumerate(a.trace.modes):
+            if layout not in b.trace.modes:
+                continue
+            other = b.trace.modes.index(layout)
+            here = np.flatnonzero((a.trace.mode[a.pieces] == i) & (b.trace.mode[b.pieces] == other))
+            if len(here):
+                inside[here] = self.metric.contains(layout[0], *self._hull(a[here], b[here], list(layout[1])))
+        same = np.flatnonzero(inside)
         if len(same):
             bound[same] = largest_norm(a.powers[same] - b.powers[same])
             if self.strips:
@@ -202,17 +210,6 @@ class OnSpace(Labelled):
         edge = side.edge if self.strips else np.full(len(times), "")
         depth = side.depth[:, end] if self.strips else np.zeros(len(times))
         return ModePoints(name, x[:, list(columns)], times, edge, depth)
-
-    def _in_one_domain(self, a: Side, b: Side) -> Array:
-        inside = np.zeros(len(a.pieces), dtype=bool)
-        for i, layout in enumerate(a.trace.modes):
-            if layout not in b.trace.modes:
-                continue
-            other = b.trace.modes.index(layout)
-            here = np.flatnonzero((a.trace.mode[a.pieces] == i) & (b.trace.mode[b.pieces] == other))
-            if len(here):
-                inside[here] = self.metric.contains(layout[0], *self._hull(a[here], b[here], list(layout[1])))
-        return inside
 
     def _hull(self, a: Side, b: Side, columns: list[int]) -> tuple[Array, Array]:
         """Boxes around both curves; with the time as last coordinate where it is one."""
@@ -304,7 +301,8 @@ class Supremum:
             return frontier.take(chosen)
         cells = frontier.cells[chosen]
         way = np.concatenate([[0.0], np.cumsum(_ways(cells, self.distance))])
-        opens = np.append(True, _breaks(cells, chosen))
+        jumps = [curve.jump[piece] for curve, piece in ((cells.a, cells.piece_a), (cells.b, cells.piece_b))]
+        opens = np.append(True, (np.diff(chosen) > 1) | (np.diff(jumps[0]) != 0) | (np.diff(jumps[1]) != 0))
         first = np.flatnonzero(opens)
         last = np.append(first[1:], len(cells)) - 1
         ends = np.full((len(cells), 2), np.nan)
@@ -399,9 +397,3 @@ def _largest(bound: Array, size: int) -> Array:
 def _ways(cells: Cells, distance: Labelled) -> Array:
     """Bound the sum of the lengths of both curves in each cell."""
     return np.concatenate([distance.motion(a) + distance.motion(b) for a, b in _chunks(cells)])
-
-
-def _breaks(cells: Cells, number: Array) -> Array:
-    """Say, for each cell but the first, whether a curve jumps before it or it does not follow the cell before it."""
-    jumps = [curve.jump[piece] for curve, piece in ((cells.a, cells.piece_a), (cells.b, cells.piece_b))]
-    return (np.diff(number) > 1) | (np.diff(jumps[0]) != 0) | (np.diff(jumps[1]) != 0)

@@ -450,7 +450,12 @@ def proved_below(shape: ConeShape, offsets: Array, numbers: Array, s: Array, vec
     longest_path, far = lengths(shape, offsets, s), norm(s)
     if np.all(value <= charge(shape, numbers, far)):  # nothing is left of it, wherever the unknowns may be
         return np.zeros(len(value))
-    near = _reach(shape, numbers, longest_path, far)
+    # How far from s the unknowns of a path can be that is no longer than the one at s
+    near = (
+        (2 * longest_path + charge(shape, numbers, far)) * (1 + 1e-9) / shape.least
+        if shape.least > 0
+        else shape.radius + far
+    )
     heavy = weights.sum(axis=1)
     residual = norm(flat @ shape.stacked + weights @ shape.normals)
     with np.errstate(invalid="ignore"):  # nothing times an unbounded reach: no bound
@@ -458,10 +463,3 @@ def proved_below(shape: ConeShape, offsets: Array, numbers: Array, s: Array, vec
         rounding += shape.operations * UNIT * (heavy * (far + near) + weights @ np.abs(shape.levels))
         value = np.nan_to_num(value - rounding)
     return np.maximum(0.0, np.minimum(value, longest_path * (1 - shape.operations * UNIT)))
-
-
-def _reach(shape: ConeShape, numbers: Array, length: Array, far: Array) -> Array:
-    """How far from s the unknowns of a path can be that is no longer than the one at s."""
-    if shape.least > 0:
-        return (2 * length + charge(shape, numbers, far)) * (1 + 1e-9) / shape.least
-    return shape.radius + far

@@ -68,7 +68,11 @@ def _below(formula: Formula, a: Array, b: Array, tolerance: Array) -> Array:
         middle = (begin + end) / 2
         piece, begin, end = np.tile(piece, 2), np.append(begin, middle), np.append(middle, end)
     verdict[np.unique(piece)] = UNDECIDED
-    return _looked_at(formula, a, b, tolerance, verdict)
+    for k in np.flatnonzero(verdict == UNDECIDED).tolist():
+        for share in np.linspace(0, 1, SAMPLES + 1).tolist():
+            if not formula(a[k] + share * (b[k] - a[k])) <= tolerance[k]:
+                verdict[k] = OUTSIDE
+    return verdict
 
 
 def _largest(formula: Formula, a: Array, b: Array, begin: Array, end: Array) -> tuple[Array, Array]:
@@ -104,14 +108,6 @@ def _sum(products: Array, unknown: float) -> Array:
     """The sum of each row; ``unknown`` where a coordinate stays and its slope has no bound, or two have none."""
     total = products.sum(axis=1)
     return np.where(np.isnan(total), unknown, total)
-
-
-def _looked_at(formula: Formula, a: Array, b: Array, tolerance: Array, verdict: Array) -> Array:
-    for k in np.flatnonzero(verdict == UNDECIDED).tolist():
-        for share in np.linspace(0, 1, SAMPLES + 1).tolist():
-            if not formula(a[k] + share * (b[k] - a[k])) <= tolerance[k]:
-                verdict[k] = OUTSIDE
-    return verdict
 
 
 def to_passages(space: Space, mode: int, x: Array) -> Array:

@@ -61,7 +61,11 @@ def distance(
     a, b = starts[0], ends[0]
     if b.mode not in space.fewest(a.mode):
         return PointDistance(INFINITE, (), "certified: no edges connect the modes")
-    strip = _along_strip(p, q, a, b, relaxation)
+    strip = (
+        np.inf
+        if relaxation is None or p.edge is None or (p.edge, p.mode) != (q.edge, q.mode)
+        else float(np.linalg.norm(a.x - b.x)) + abs(p.depth - q.depth)
+    )
     query = Query(space, starts, ends, relaxation or 0.0, hops, budget or Budget(), strip)
     return answer(space, search(query) if space.affine else search_nonaffine(query), query.most)
 
@@ -108,13 +112,6 @@ def _rows(space: Space, name: str, x: Array, count: int) -> End:
     if x.shape != (count, len(names)):
         raise ValueError(f"mode {name}: expected rows of {', '.join(names)}, got shape {x.shape}")
     return End(mode, x)
-
-
-def _along_strip(p: SpacePoint, q: SpacePoint, a: End, b: End, relaxation: float | None) -> float:
-    """The distance inside one strip (Def. 15), inf where the two are not in one."""
-    if relaxation is None or p.edge is None or (p.edge, p.mode) != (q.edge, q.mode):
-        return np.inf
-    return float(np.linalg.norm(a.x - b.x)) + abs(p.depth - q.depth)
 
 
 class ModePoints(NamedTuple):
@@ -311,19 +308,15 @@ def status_of(found: SearchResult, hops: int) -> str:
 
 def _sentence(found: SearchResult, status: str) -> str:
     if found.local:
-        return _of_local_solves(found)
+        if found.upper == np.inf:
+            return "lower end certified; no path was found, though one may exist"
+        unproved = "" if found.proved else "; that it stays in its domains was examined in points, not proved"
+        if found.upper > found.lower * (1 + CLOSED):
+            early = ", ended early for want of time" if found.ended_early else ""
+            return f"upper end: the best path that local solves found{early}; lower end certified, not tight{unproved}"
+        return f"certified{unproved}"
     early = ", with a wide gap: the search ended early" if found.ended_early else ""
     return f"certified{early}" if status == CERTIFIED else f"certified {status}{early}"
-
-
-def _of_local_solves(found: SearchResult) -> str:
-    if found.upper == np.inf:
-        return "lower end certified; no path was found, though one may exist"
-    unproved = "" if found.proved else "; that it stays in its domains was examined in points, not proved"
-    if found.upper > found.lower * (1 + CLOSED):
-        early = ", ended early for want of time" if found.ended_early else ""
-        return f"upper end: the best path that local solves found{early}; lower end certified, not tight{unproved}"
-    return f"certified{unproved}"
 
 
 def _path(space: Space, found: SearchResult) -> tuple[PathPiece, ...]:

@@ -105,32 +105,9 @@ def trace(execution: Execution, names: Sequence[str], instants: bool = False) ->
     waits = table.kind[arcs] == "strip"
     columns = [tuple(names.index(state) for state in states) for _, states in layouts]
     depth = np.asarray(execution.depth, dtype=float)
-    return Trace(
-        names=tuple(names),
-        start=times[pieces],
-        end=times[followers],
-        mode=mode_of,
-        modes=tuple((mode, place) for (mode, _), place in zip(layouts, columns, strict=True)),
-        jump=table.jump[arcs],
-        strip=np.where(waits, table.jump[arcs], -1),
-        edges=tuple(transition.edge for transition in execution.transitions),
-        coefficients=_polynomials(execution, pieces, followers, waits, mode_of, columns, len(names)),
-        depth=np.stack([depth[pieces], depth[followers]], axis=1),
-    )
-
-
-def _polynomials(
-    execution: Execution,
-    pieces: Array,
-    followers: Array,
-    waits: Array,
-    mode_of: Array,
-    columns: Sequence[tuple[int, ...]],
-    width: int,
-) -> Array:
-    """Sort the recorded pieces into columns by name; a strip, and the last value, stay where they are."""
+    # Sort the recorded pieces into columns by name; a strip, and the last value, stay where they are
     degree = max(1, execution.coefficients.shape[1])
-    sorted_by_name = np.zeros((len(pieces), degree + 1, width))
+    sorted_by_name = np.zeros((len(pieces), degree + 1, len(names)))
     for number, places in enumerate(columns):
         here = np.flatnonzero(mode_of == number)
         moving = here[~waits[here] & (followers[here] > pieces[here])]
@@ -141,7 +118,18 @@ def _polynomials(
                 sorted_by_name[moving, 1, column] = values[followers[moving]] - values[pieces[moving]]
             else:
                 sorted_by_name[moving, 1:, column] = execution.coefficients[pieces[moving], :, own]
-    return sorted_by_name
+    return Trace(
+        names=tuple(names),
+        start=times[pieces],
+        end=times[followers],
+        mode=mode_of,
+        modes=tuple((mode, place) for (mode, _), place in zip(layouts, columns, strict=True)),
+        jump=table.jump[arcs],
+        strip=np.where(waits, table.jump[arcs], -1),
+        edges=tuple(transition.edge for transition in execution.transitions),
+        coefficients=sorted_by_name,
+        depth=np.stack([depth[pieces], depth[followers]], axis=1),
+    )
 
 
 ROUNDOFF = 64 * 2.0**-53  # times the largest state: two bounds need not be nearer
@@ -364,7 +352,14 @@ def _parts(curve: Trace, span: tuple[float, float], resolution: int, cuts: float
     way = _way(curve, whole, begin, end)
     count = np.maximum(1, np.ceil(way * resolution / max(float(np.sum(way)), 1e-300))).astype(int)
     if cuts is not None:
-        whole, begin, end, count = _cut(curve, whole, begin, end, count, cuts)
+        at = curve.share(whole, cuts - curve.jump[whole])
+        inside = np.flatnonzero((at > begin) & (at < end))
+        whole, begin, end, count = (
+            np.insert(whole, inside, whole[inside]),
+            np.insert(begin, inside + 1, at[inside]),
+            np.insert(end, inside, at[inside]),
+            np.insert(count, inside, count[inside]),
+        )
     piece = np.repeat(whole, count)
     number = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
     width, many = np.repeat(end - begin, count), np.repeat(count, count)
@@ -372,20 +367,6 @@ def _parts(curve: Trace, span: tuple[float, float], resolution: int, cuts: float
     high = (number + 1) / many
     ends = np.where(number + 1 == many, np.repeat(end, count), starts + width * high)
     return piece, starts + width * low, ends, _way(curve, piece, starts + width * low, ends)
-
-
-def _cut(
-    curve: Trace, whole: Array, begin: Array, end: Array, count: Array, cuts: float
-) -> tuple[Array, Array, Array, Array]:
-    """Cut the pieces that hold a hybrid time in two there."""
-    at = curve.share(whole, cuts - curve.jump[whole])
-    inside = np.flatnonzero((at > begin) & (at < end))
-    return (
-        np.insert(whole, inside, whole[inside]),
-        np.insert(begin, inside + 1, at[inside]),
-        np.insert(end, inside, at[inside]),
-        np.insert(count, inside, count[inside]),
-    )
 
 
 def _way(curve: Trace, piece: Array, begin: Array, end: Array) -> Array:

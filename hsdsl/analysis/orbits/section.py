@@ -93,7 +93,18 @@ class Section:
         for tried in range(1 + longer):
             passed = [made.index for made in found.execution.transitions if made.edge == self.edge]
             if len(passed) >= self.laps:
-                return self._return(found, passed[self.laps - 1], wrt, parameter)
+                index = passed[self.laps - 1]
+                made = found.execution.transitions[index]
+                assert made.after is not None
+                if any(int(made.after[part]) != number for part, number in self.numbers.items()):
+                    raise NoReturn(f"a run from there comes back to {self.edge} in other modes of parts: try more laps")
+                point = np.array([made.after[x] for x in self.states], float)
+                slopes = self.slopes(found.as_made(), index, wrt, parameter)
+                if not np.isfinite(slopes).all():
+                    raise NoReturn(
+                        f"no derivative exists there: {found.breaks[0][1] if found.breaks else 'it is not finite'}"
+                    )
+                return Return(point, float(made.time), slopes, found, index)
             reason = found.execution.stop.reason
             if reason not in ("until", "transition_limit") or tried == longer:
                 break
@@ -103,17 +114,6 @@ class Section:
         if found.breaks:
             raise NoReturn(found.breaks[0][1])
         raise NoReturn(f"a run from there does not come back to {self.edge}: it stops ({stop.reason}): {stop.message}")
-
-    def _return(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Return:
-        made = found.execution.transitions[index]
-        assert made.after is not None
-        if any(int(made.after[part]) != number for part, number in self.numbers.items()):
-            raise NoReturn(f"a run from there comes back to {self.edge} in other modes of parts: try more laps")
-        point = np.array([made.after[x] for x in self.states], float)
-        slopes = self.slopes(found.as_made(), index, wrt, parameter)
-        if not np.isfinite(slopes).all():
-            raise NoReturn(f"no derivative exists there: {found.breaks[0][1] if found.breaks else 'it is not finite'}")
-        return Return(point, float(made.time), slopes, found, index)
 
     def slopes(self, found: Sensitivity, index: int, wrt: Sequence[str], parameter: str | None) -> Array:
         """The derivatives of a passage that ends with a transition."""

@@ -156,23 +156,18 @@ def plot_orbit(run: Curves, states: Sequence[str], multipliers: Array, view: Vie
         left.set_xlabel(time_label(view.units), parse_math=False)
         left.set_ylabel(label(states[0], view.units), parse_math=False)
         named = modes_named(left, run, None, 4.0)
-    draw_circle(right, multipliers)
+    angles = np.linspace(0, 2 * np.pi, 200)
+    right.plot(np.cos(angles), np.sin(angles), color=FAINT)
+    for inside, colour in ((True, RUNS[0]), (False, RUNS[1])):
+        chosen = [complex(m) for m in multipliers.tolist() if (abs(m) < 1) is inside]
+        right.plot([m.real for m in chosen], [m.imag for m in chosen], "o", color=colour)
+    right.set_aspect("equal", "datalim")
+    right.set_title("Floquet multipliers" if len(multipliers) else "no Floquet multipliers", fontsize=9)
+    right.set_xlabel("real part")
+    right.set_ylabel("imaginary part")
     heading(figure, view.title or "", facts, left, 6 if plane else 16)
     legend_below(figure, [*named, *marks([run], states[:2], plane, f"right after {section}")], 10.0)
     return figure
-
-
-def draw_circle(axis: Axes, multipliers: Array) -> None:
-    """Draw the unit circle and multipliers."""
-    angles = np.linspace(0, 2 * np.pi, 200)
-    axis.plot(np.cos(angles), np.sin(angles), color=FAINT)
-    for inside, colour in ((True, RUNS[0]), (False, RUNS[1])):
-        chosen = [complex(m) for m in multipliers.tolist() if (abs(m) < 1) is inside]
-        axis.plot([m.real for m in chosen], [m.imag for m in chosen], "o", color=colour)
-    axis.set_aspect("equal", "datalim")
-    axis.set_title("Floquet multipliers" if len(multipliers) else "no Floquet multipliers", fontsize=9)
-    axis.set_xlabel("real part")
-    axis.set_ylabel("imaginary part")
 
 
 MOST_WORDS = 20  # of which each has a colour
@@ -256,7 +251,12 @@ def plot_map(x: Axis, y: Axis, of: Quantity, title: str) -> Figure:
     shades: dict[str, Any] = {"cmap": "viridis"}
     values = of.values
     if of.words:
-        values, shades = _by_words(of)
+        from matplotlib.colors import BoundaryNorm, ListedColormap
+
+        words = of.words[:MOST_WORDS]
+        values = np.array([words.index(v) if v in words else np.nan for v in of.values], dtype=float)
+        colours = ListedColormap([RUNS[i % len(RUNS)] for i in range(len(words))])
+        shades = {"cmap": colours, "norm": BoundaryNorm(np.arange(len(words) + 1) - 0.5, max(1, len(words)))}
     if x.grid is None or y.grid is None:
         drawn: Any = axes.scatter(x.values, y.values, c=values, s=12, linewidths=0, **shades)
     else:
@@ -280,16 +280,6 @@ def _labelled(figure: Figure, axes: Axes, x: Axis, title: str) -> Figure:
     axes.set_xlabel(x.label, parse_math=False)
     heading(figure, title)
     return figure
-
-
-def _by_words(of: Quantity) -> tuple[Any, dict[str, Any]]:
-    """Words as numbers, and their colours."""
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-
-    words = of.words[:MOST_WORDS]
-    numbers = np.array([words.index(v) if v in words else np.nan for v in of.values], dtype=float)
-    colours = ListedColormap([RUNS[i % len(RUNS)] for i in range(len(words))])
-    return numbers, {"cmap": colours, "norm": BoundaryNorm(np.arange(len(words) + 1) - 0.5, max(1, len(words)))}
 
 
 def _cells(x: Axis, y: Axis, values: Any) -> tuple[Any, Any, Any]:

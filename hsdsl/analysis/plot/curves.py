@@ -178,23 +178,18 @@ def _shares(stays: list[tuple[str, float, float]]) -> Shares:
 
 def _bands(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
     if len(bands) <= BANDS:
-        return _visible(bands)
+        if not bands:
+            return bands
+        start, end = bands[0][1], bands[-1][2]
+        wide = [band for band in bands if band[2] - band[1] >= (end - start) / CELLS]
+        begins = [start, *(band[1] for band in wide[1:]), end]
+        return merged([(band[0], *span) for band, span in zip(wide, pairwise(begins), strict=True)])
     edges = np.linspace(bands[0][1], bands[-1][2], BINS + 1)
     begins, ends = np.array([band[1] for band in bands]), np.array([band[2] for band in bands])
     earliest: list[int] = np.searchsorted(ends, edges[:-1], side="right").tolist()
     latest: list[int] = (np.searchsorted(begins, edges[1:], side="left") - 1).tolist()
     modes = [bands[i][0] if i == k else SEVERAL for i, k in zip(earliest, latest, strict=True)]
     return merged(list(zip(modes, edges[:-1].tolist(), edges[1:].tolist(), strict=True)))
-
-
-def _visible(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
-    """Leave out the bands narrower than a cell; the band before one covers it."""
-    if not bands:
-        return bands
-    start, end = bands[0][1], bands[-1][2]
-    wide = [band for band in bands if band[2] - band[1] >= (end - start) / CELLS]
-    begins = [start, *(band[1] for band in wide[1:]), end]
-    return merged([(band[0], *span) for band, span in zip(wide, pairwise(begins), strict=True)])
 
 
 def merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:

@@ -132,7 +132,11 @@ def draw(runs: Sequence[Execution], view: View, make: Callable[[tuple[float, flo
     for (name, columns), axis in zip(shown_panels.items(), panels, strict=False):
         draw_panel(axis, data, columns, view, plan.room[1])
         axis.set_ylabel(label(name, view.units), parse_math=False)
-    _time_labels(panels, plan.across, view)
+    for i, axis in enumerate(panels):
+        if i + plan.across < len(panels):
+            axis.tick_params(labelbottom=False)
+        else:
+            axis.set_xlabel(time_label(view.units), parse_math=False)
     if ribbon is not None and strip is not None:
         strip.draw(ribbon, labels if len(data) > 1 else [*strip.rows])
     phases = _phases(figure, outer[0, 1], plan, pairs, data, view) if pairs else []
@@ -171,14 +175,6 @@ def _phases(
     for axis, pair in zip(axes, pairs, strict=True):
         draw_phase(axis, data, pair, view)
     return axes
-
-
-def _time_labels(axes: Sequence[Axes], across: int, view: View) -> None:
-    for i, axis in enumerate(axes):
-        if i + across < len(axes):
-            axis.tick_params(labelbottom=False)
-        else:
-            axis.set_xlabel(time_label(view.units), parse_math=False)
 
 
 def _facts(run: Execution) -> str:
@@ -409,7 +405,16 @@ def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, view: View) -> No
     across, up = (with_guards(limits_of(runs, name), at) for name, at in zip(pair, levels, strict=True))
     axis.set(xlim=across, ylim=up)
     for run, look in zip(runs, looks(len(runs)), strict=True):
-        _draw_pair(axis, run, pair, _parts(run, look, len(runs) == 1), (*across, *up), len(runs) <= MOST_MARKED)
+        parts = _parts(run, look, len(runs) == 1)
+        x, y = run.column(pair[0]), run.column(pair[1])
+        for shade, here in parts:
+            wide: Look = {"linewidth": 1.1 if len(run.jumps) <= AFTER_ONLY else 0.6, **shade}
+            drawn = line(np.where(here, x, np.nan), np.where(here, y, np.nan), run.begins, (*across, *up))
+            axis.plot(*drawn, rasterized=len(drawn[0]) > 60_000, **wide)
+        colour = looks(1)[0]["color"] if len(parts) > 1 else parts[0][0]["color"]
+        if len(runs) <= MOST_MARKED:
+            mark_jumps(axis, x, y, run.jumps, colour)
+        axis.plot(x[:1], y[:1], marker="D", color=colour, markersize=4.5, linestyle="")
     for level in dict.fromkeys(levels[0]):
         axis.axvline(level, **LEVEL)
     for level in dict.fromkeys(levels[1]):
@@ -417,25 +422,6 @@ def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, view: View) -> No
     axis.set_xlabel(label(pair[0], view.units), parse_math=False)
     axis.set_ylabel(label(pair[1], view.units), parse_math=False)
     axis.set_box_aspect(1)
-
-
-def _draw_pair(
-    axis: Axes,
-    run: Curves,
-    pair: Pair,
-    parts: Sequence[tuple[Look, Array]],
-    ends: tuple[float, float, float, float],
-    marked: bool,
-) -> None:
-    x, y = run.column(pair[0]), run.column(pair[1])
-    for look, here in parts:
-        wide: Look = {"linewidth": 1.1 if len(run.jumps) <= AFTER_ONLY else 0.6, **look}
-        drawn = line(np.where(here, x, np.nan), np.where(here, y, np.nan), run.begins, ends)
-        axis.plot(*drawn, rasterized=len(drawn[0]) > 60_000, **wide)
-    colour = looks(1)[0]["color"] if len(parts) > 1 else parts[0][0]["color"]
-    if marked:
-        mark_jumps(axis, x, y, run.jumps, colour)
-    axis.plot(x[:1], y[:1], marker="D", color=colour, markersize=4.5, linestyle="")
 
 
 def _parts(run: Curves, look: Look, alone: bool) -> list[tuple[Look, Array]]:

@@ -43,11 +43,12 @@ def model_html(system: HybridSystem, program: Program) -> str:
     left = len(written) - MOST_MODES
     more = [f"<p>{left} more modes</p>"] if left > 0 else []
     rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts]
+    inputs = [f"{_said(given.name)} is an input of {counted(len(given.times), 'sample')}" for given in system.inputs]
     parts = [
         heading,
         _parameters(system),
         _table(("part", "modes", "starts in"), rows),
-        _shared(system, math),
+        _list([*inputs, *_definitions(system, None, math)]),
         mode_graph.graph_of(visited_part(program, None)),
         *modes,
         *more,
@@ -84,12 +85,6 @@ def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     head = "".join(f"<th>{names[k]}</th>" for k in used)
     body = "".join("<tr>" + "".join(f"<td>{_said(row[k])}</td>" for k in used) + "</tr>" for row in rows)
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-
-
-def _shared(system: HybridSystem, math: Mathematics) -> str:
-    """Inputs, and definitions of the whole model."""
-    inputs = [f"{_said(given.name)} is an input of {counted(len(given.times), 'sample')}" for given in system.inputs]
-    return _list([*inputs, *_definitions(system, None, math)])
 
 
 def _definitions(system: HybridSystem, mode: str | None, math: Mathematics) -> list[str]:

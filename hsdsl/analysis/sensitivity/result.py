@@ -424,7 +424,9 @@ def as_json(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> dict[str, Any]
         result["final"] = {"at": run.final.time, **_end(found.final)}
     if "transitions" in parts:
         made = zip(run.transitions, found.transitions, strict=True)
-        result["transitions"] = [{"at": t.time, **_transition(d)} for t, d in made]
+        result["transitions"] = [
+            {"at": t.time, **(vars(d) | {"before": seen(d.before), "after": seen(d.after)})} for t, d in made
+        ]
     if "outputs" in parts:
         table = found.sample()
         values = {
@@ -442,10 +444,6 @@ def as_json(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> dict[str, Any]
 
 def _end(end: EndSlopes) -> dict[str, Any]:
     return {"mode": end.mode, "time": end.time, "state": seen(end.state), "outputs": end.outputs}
-
-
-def _transition(made: TransitionSlopes) -> dict[str, Any]:
-    return vars(made) | {"before": seen(made.before), "after": seen(made.after)}
 
 
 def summary(found: Sensitivity, parts: Sequence[str] = ALWAYS) -> str:

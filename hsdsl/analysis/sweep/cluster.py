@@ -70,7 +70,32 @@ def _run(client: Any, work: Work, chunks: Sequence[int], write: Write) -> None:
     name = f"hsdsl-sweep-{token_hex(8)}"
     _register(client, SweepPlugin(name, work))
     try:
-        _make(client, name, iter(chunks), write)
+        waiting = iter(chunks)
+        deaths, under_way = Counter[int](), {}
+        done = as_completed([], loop=client.loop)
+
+        def submit(chunk: int) -> None:
+            future = client.submit(_answer, name, chunk, pure=False, retries=2)
+            under_way[future.key] = chunk
+            done.add(future)
+
+        def fill() -> None:
+            room = AHEAD * max(1, sum(client.nthreads().values()))
+            while len(under_way) < room and (chunk := next(waiting, None)) is not None:
+                submit(chunk)
+
+        fill()
+        for future in done:
+            chunk = under_way.pop(future.key)
+            try:
+                content = future.result()
+            except KilledWorker:
+                deaths[chunk] += 1
+                refuse_deadly(deaths)
+                submit(chunk)
+            else:
+                write(chunk, content)
+                fill()
     finally:
         with suppress(OSError, TimeoutError):
             client.unregister_worker_plugin(name)
@@ -86,31 +111,3 @@ def _register(client: Any, plugin: SweepPlugin) -> None:
             if not left:
                 raise
             time.sleep(PAUSE)
-
-
-def _make(client: Any, name: str, waiting: Iterator[int], write: Write) -> None:
-    deaths, under_way = Counter[int](), {}
-    done = as_completed([], loop=client.loop)
-
-    def submit(chunk: int) -> None:
-        future = client.submit(_answer, name, chunk, pure=False, retries=2)
-        under_way[future.key] = chunk
-        done.add(future)
-
-    def fill() -> None:
-        room = AHEAD * max(1, sum(client.nthreads().values()))
-        while len(under_way) < room and (chunk := next(waiting, None)) is not None:
-            submit(chunk)
-
-    fill()
-    for future in done:
-        chunk = under_way.pop(future.key)
-        try:
-            content = future.result()
-        except KilledWorker:
-            deaths[chunk] += 1
-            refuse_deadly(deaths)
-            submit(chunk)
-        else:
-            write(chunk, content)
-            fill()

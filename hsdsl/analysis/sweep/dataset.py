@@ -227,10 +227,31 @@ class Sweep:
         share = f"  {self.done:,} of {self.rows:,} rows in {len(self.chunks)} of {manifest.chunks} files"
         yield share + ("" if self.complete else "; the command that made it goes on")
         yield "stops  " + ", ".join(f"{count:,} {reason}" for reason, count in self.reasons.items())
-        yield from _failures(self)
+        messages: dict[str, str] = {}
+        for table in self.batches(["stop", "message"]):
+            for reason, message in zip(*(table.column(k).to_pylist() for k in range(2)), strict=True):
+                if message is not None:
+                    messages.setdefault(reason, message)
+        for reason, message in messages.items():
+            more = ", the first of them" if self.reasons[reason] > 1 else ""
+            yield f"  {reason}{more}: {visible(message)}"
         for code, count in self.warning_counts.items():
             yield f"  {code} in {counted(count, 'row')}: {WARNINGS.get(code, 'of another version')}"
-        yield from _ranges(self)
+        names = ["transitions", "time", *(name for name in self.columns if name.startswith("final."))]
+        found: dict[str, list[Array]] = {name: [] for name in names}
+        for table in self.batches(names):
+            for name in names:
+                values = table.column(name).to_numpy().astype(float)
+                values = values[np.isfinite(values)]
+                found[name] += (
+                    [np.array([values.min(), values.max(), values.sum(), len(values)])] if len(values) else []
+                )
+        wide = max(map(len, names))
+        for name, parts in found.items():
+            if parts:
+                low, high, total, count = np.transpose(parts)
+                span = f"{low.min():<12.6g} to {high.max():<12.6g}"
+                yield f"{visible(name):{wide}} {span} mean {total.sum() / count.sum():.6g}"
 
 
 def path_of(folder: Path, chunk: int) -> Path:
@@ -306,35 +327,6 @@ def check_ranked(manifest: Manifest, of: str) -> None:
         known = [name for name, kind in columns.items() if kind in ("double", "int64") and name != "row"]
         reason = "has no numbers" if of in columns else "is no column of the sweep"
         raise UsageError(f"'{shown(of)}' {reason}", did_you_mean(of, known) or f"known here: {', '.join(known)}")
-
-
-def _failures(sweep: Sweep) -> Iterator[str]:
-    """The first message of each reason why runs did not get to their end."""
-    messages: dict[str, str] = {}
-    for table in sweep.batches(["stop", "message"]):
-        for reason, message in zip(*(table.column(k).to_pylist() for k in range(2)), strict=True):
-            if message is not None:
-                messages.setdefault(reason, message)
-    for reason, message in messages.items():
-        more = ", the first of them" if sweep.reasons[reason] > 1 else ""
-        yield f"  {reason}{more}: {visible(message)}"
-
-
-def _ranges(sweep: Sweep) -> Iterator[str]:
-    """The least, the largest and the mean of each column of numbers."""
-    names = ["transitions", "time", *(name for name in sweep.columns if name.startswith("final."))]
-    found: dict[str, list[Array]] = {name: [] for name in names}
-    for table in sweep.batches(names):
-        for name in names:
-            values = table.column(name).to_numpy().astype(float)
-            values = values[np.isfinite(values)]
-            found[name] += [np.array([values.min(), values.max(), values.sum(), len(values)])] if len(values) else []
-    wide = max(map(len, names))
-    for name, parts in found.items():
-        if parts:
-            low, high, total, count = np.transpose(parts)
-            span = f"{low.min():<12.6g} to {high.max():<12.6g}"
-            yield f"{visible(name):{wide}} {span} mean {total.sum() / count.sum():.6g}"
 
 
 Work = Callable[[int], bytes]

@@ -178,31 +178,27 @@ def read(folder: Path) -> Manifest:
         if content["version"] > VERSION:
             reason = f"a later version of hsdsl wrote it, in format {content['version']}; this one reads {VERSION}"
             raise UsageError(f"cannot read {path}: {reason}", "update hsdsl")
-        return _parsed(content)
+        grids, draws = list[Grid](), list[Draw]()
+        for item in content["vary"]:
+            if "values" in item:
+                grids.append(Grid(str(item["name"]), tuple(map(float, item["values"])), bool(item["logarithmic"])))
+            else:
+                draws.append(Draw(str(item["name"]), str(item["distribution"]), tuple(map(float, item["arguments"]))))
+        variation = Variation(tuple(grids), tuple(draws), int(content["random"]), int(content["seed"] or 0))
+        chunk = int(content["chunk"])
+        if variation.rows != content["rows"] or chunk < 1:
+            raise ValueError("other rows")
+        return Manifest(
+            str(content["model"]), str(content["sha256"]), content["title"], dict(content["units"]), variation,
+            Recording(**content["record"]), dict(content["settings"]), tuple(content["states"]),
+            tuple(content["outputs"]), chunk, dict(content["versions"]), str(content["tag"]),
+        )  # fmt: skip
     except FileNotFoundError:
         raise UsageError(f"{folder} is not a sweep: it has no {FILE}") from None
     except OSError as error:
         raise UsageError(f"cannot read {path}: {error.strerror or error}") from None
     except (ValueError, KeyError, TypeError, RecursionError):
         raise UsageError(f"cannot read {path}: it is damaged, or not the manifest of a sweep") from None
-
-
-def _parsed(content: Mapping[str, Any]) -> Manifest:
-    grids, draws = list[Grid](), list[Draw]()
-    for item in content["vary"]:
-        if "values" in item:
-            grids.append(Grid(str(item["name"]), tuple(map(float, item["values"])), bool(item["logarithmic"])))
-        else:
-            draws.append(Draw(str(item["name"]), str(item["distribution"]), tuple(map(float, item["arguments"]))))
-    variation = Variation(tuple(grids), tuple(draws), int(content["random"]), int(content["seed"] or 0))
-    chunk = int(content["chunk"])
-    if variation.rows != content["rows"] or chunk < 1:
-        raise ValueError("other rows")
-    return Manifest(
-        str(content["model"]), str(content["sha256"]), content["title"], dict(content["units"]), variation,
-        Recording(**content["record"]), dict(content["settings"]), tuple(content["states"]), tuple(content["outputs"]),
-        chunk, dict(content["versions"]), str(content["tag"]),
-    )  # fmt: skip
 
 
 WORDS = ("final", "transitions", "outputs", "verdict")

@@ -39,31 +39,10 @@ MEASURES: dict[str, Callable[[Row], float]] = {
 def plot_work_precision(charted: Sequence[tuple[str, Sequence[Row]]]) -> Figure:
     """Draw the rows of scenes, a column for each: the states' error, and rho where it was computed."""
     columns = [_panels(name, rows) for name, rows in charted]
-    looks = _looks([row for _, rows in charted for row in rows])
-    places, down, across = _places(columns)
-    figure = empty(4.6 * across + 2.4, 3.7 * down + 0.3)
-    axes = figure.subplots(down, across, squeeze=False)
-    for place, axis in np.ndenumerate(axes):
-        if place in places:
-            _draw(axis, places[place], looks, ylabel=place[1] == 0)
-        else:
-            axis.axis("off")
-    _legend(figure, looks)
-    return figure
-
-
-def _panels(name: str, rows: Sequence[Row]) -> list[Panel]:
-    error, rho = MEASURES
-    measured = [row for row in rows if row.judgement.rho is not None]
-    return [(name, error, rows), *([(name, rho, measured)] if measured else [])]
-
-
-def _looks(rows: Sequence[Row]) -> Looks:
-    """A colour for each tool and scheme, and a marker for each method of theirs."""
     groups: dict[tuple[str, str], dict[str, None]] = {}
-    for row in rows:
+    for row in [row for _, rows in charted for row in rows]:
         groups.setdefault((row.attempt.tool.name, row.attempt.tool.scheme), {})[row.attempt.tool.label] = None
-    return {
+    looks: Looks = {
         label: {
             "color": RUNS[group % len(RUNS)],
             "marker": MARKERS[method % len(MARKERS)],
@@ -73,6 +52,26 @@ def _looks(rows: Sequence[Row]) -> Looks:
         for group, labels in enumerate(groups.values())
         for method, label in enumerate(labels)
     }
+    places, down, across = _places(columns)
+    figure = empty(4.6 * across + 2.4, 3.7 * down + 0.3)
+    axes = figure.subplots(down, across, squeeze=False)
+    for place, axis in np.ndenumerate(axes):
+        if place in places:
+            _draw(axis, places[place], looks, ylabel=place[1] == 0)
+        else:
+            axis.axis("off")
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], label=label, **look) for label, look in looks.items()]
+    handles.append(Line2D([], [], color=FAINT, marker="x", linestyle="none", label="another execution, or no end"))
+    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=8)
+    return figure
+
+
+def _panels(name: str, rows: Sequence[Row]) -> list[Panel]:
+    error, rho = MEASURES
+    measured = [row for row in rows if row.judgement.rho is not None]
+    return [(name, error, rows), *([(name, rho, measured)] if measured else [])]
 
 
 def _places(columns: Sequence[Sequence[Panel]]) -> tuple[dict[tuple[int, int], Panel], int, int]:
@@ -113,11 +112,3 @@ def _draw(axis: Axes, panel: Panel, looks: Looks, ylabel: bool) -> None:
     if silent:
         text = "no answer: " + ", ".join(silent)
         axis.text(0.02, 0.02, text, transform=axis.transAxes, fontsize=7, color=FAINT, wrap=True)
-
-
-def _legend(figure: Figure, looks: Looks) -> None:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], label=label, **look) for label, look in looks.items()]
-    handles.append(Line2D([], [], color=FAINT, marker="x", linestyle="none", label="another execution, or no end"))
-    figure.legend(handles=handles, loc="outside right upper", frameon=False, fontsize=8)

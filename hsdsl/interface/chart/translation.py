@@ -184,7 +184,7 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
             first, t = last, arc.end
             if arc.edge is None:
                 break
-            taken = _taken(choices[k][arc.edge], t, arc.x)
+            taken = next((i for i, holds in choices[k][arc.edge] if holds(t, *arc.x)[0]), None)
             if taken is None:
                 passed_by = passed_by + 1 if t <= begin else 0
                 if passed_by > len(mode.edges):
@@ -214,11 +214,6 @@ def _alternatives(mode: PlainMode, guard: object) -> list[Choice]:
     """The edges with the same guard, in the order of the file, and their conditions."""
     edges = [i for i, edge in enumerate(mode.edges) if edge.guard == guard]
     return [(i, as_function(mode, (mode.edges[i].condition,))) for i in edges]
-
-
-def _taken(choices: Sequence[Choice], t: float, x: Sequence[float]) -> int | None:
-    """The edge that is taken where their guard is reached; None where no condition holds."""
-    return next((i for i, holds in choices if holds(t, *x)[0]), None)
 
 
 def _past(

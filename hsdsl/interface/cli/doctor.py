@@ -56,7 +56,23 @@ def doctor(json: Json = False, forget: Forget = False) -> None:
     if json:
         print_json(installation)
     else:
-        print(_text(installation))
+        absent = "not installed, needed for {}: pip install 'hsdsl[table]'"
+        lines = [
+            f"hsdsl {installation['hsdsl']}, Python {installation['python']} on {installation['platform']}",
+            *(f"  {name} {value or 'MISSING'}" for name, value in installation["packages"].items()),
+            *(
+                f"  {name}: {value or absent.format(OPTIONAL[name])}"
+                for name, value in installation["optional"].items()
+            ),
+            f"engines: {', '.join(installation['engines'])}",
+            f"compiler: {installation['compiler'] or installation['compiler_failure']}",
+            f"compiled code: {installation['cache_refused'] or installation['cache']}",
+            f"models that took too long to compile, and are not tried again: {installation['given_up']}",
+            f"schemes: {', '.join(installation['schemes'])}",
+            f"methods: {', '.join(installation['methods'])}",
+            *(f"plug-ins: {table} {', '.join(names)}" for table, names in installation["plug_ins"].items() if names),
+        ]
+        print("\n".join(lines))
     if any(value is None for value in installation["packages"].values()):
         raise Exit(1)
 
@@ -66,20 +82,3 @@ def _version(name: str) -> str | None:
         return version(name)
     except PackageNotFoundError:
         return None
-
-
-def _text(installation: dict[str, Any]) -> str:
-    absent = "not installed, needed for {}: pip install 'hsdsl[table]'"
-    lines = [
-        f"hsdsl {installation['hsdsl']}, Python {installation['python']} on {installation['platform']}",
-        *(f"  {name} {value or 'MISSING'}" for name, value in installation["packages"].items()),
-        *(f"  {name}: {value or absent.format(OPTIONAL[name])}" for name, value in installation["optional"].items()),
-        f"engines: {', '.join(installation['engines'])}",
-        f"compiler: {installation['compiler'] or installation['compiler_failure']}",
-        f"compiled code: {installation['cache_refused'] or installation['cache']}",
-        f"models that took too long to compile, and are not tried again: {installation['given_up']}",
-        f"schemes: {', '.join(installation['schemes'])}",
-        f"methods: {', '.join(installation['methods'])}",
-        *(f"plug-ins: {table} {', '.join(names)}" for table, names in installation["plug_ins"].items() if names),
-    ]
-    return "\n".join(lines)

@@ -74,26 +74,6 @@ STATE = "state or output "
 PICTURES = (".png", ".svg")
 
 
-def limit_options(folders: Sequence[Path], pairs: Sequence[str]) -> Limits:
-    """Read ``--allow-path`` and ``--limit``.
-
-    Raises UsageError: no such limit, no positive number, or no such folder.
-    """
-    numbers: dict[str, Any] = {}
-    for pair in pairs:
-        name, _, value = (part.strip() for part in pair.partition("="))
-        if name not in NUMBERS:
-            raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
-        try:
-            numbers[name] = type(getattr(DEFAULT, name))(float(value))
-        except (ValueError, OverflowError):
-            raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
-    for folder in folders:
-        if not folder.is_dir():
-            raise UsageError(f"--allow-path {folder}: there is no such folder")
-    return Limits(**numbers, folders=tuple(folders))
-
-
 def names_of(text: str | None) -> list[str]:
     """The names in a text with commas between them."""
     return [part.strip() for part in (text or "").split(",") if part.strip()]
@@ -260,7 +240,20 @@ class Answer(NamedTuple):
 @contextmanager
 def answering(json: bool, allow_path: AllowPath, limit: Limit) -> Generator[None]:
     """Report errors, and apply the limits while the command runs."""
-    with errors_reported(json), applied(limit_options(allow_path or (), limit or ())):
+    folders = allow_path or ()
+    numbers: dict[str, Any] = {}
+    for pair in limit or ():
+        name, _, value = (part.strip() for part in pair.partition("="))
+        if name not in NUMBERS:
+            raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
+        try:
+            numbers[name] = type(getattr(DEFAULT, name))(float(value))
+        except (ValueError, OverflowError):
+            raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
+    for folder in folders:
+        if not folder.is_dir():
+            raise UsageError(f"--allow-path {folder}: there is no such folder")
+    with errors_reported(json), applied(Limits(**numbers, folders=tuple(folders))):
         yield
 
 

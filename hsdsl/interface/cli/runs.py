@@ -127,7 +127,10 @@ def distance(
 ) -> None:
     """Measure the distance between two states, or two runs, in the hybrid metric."""
     with answering(json, allow_path, limit):
-        parameters = _parameters(overrides)
+        parameters, initial, settings = split(overrides)
+        others: list[Any] = [*(f"initial.{name}" for name in initial), *(f"experiment.{name}" for name in settings)]
+        if others:
+            raise UsageError(f"a distance depends on parameters alone; --set {others[0]} has no meaning here")
         options = {"relaxation": relaxation, "parameters": parameters, "hops": hops, "seconds": seconds}
         check_target(plot, "--plot")
         if second is not None:
@@ -141,16 +144,15 @@ def distance(
         elif coordinates is not None:
             raise UsageError("--coordinates is for two runs")
         elif start is None or end is None:
-            raise UsageError("expected two states, or a second run", _example(first))
+            program = hsdsl.load(first).program
+            mode = program.modes[program.initial_mode]
+            two = (f'"{mode.name} {" ".join(f"{state}={number}" for state in mode.states)}"' for number in (0, 1))
+            raise UsageError(
+                "expected two states, or a second run",
+                "for example: hsdsl distance {} --from {} --to {}".format(first, *two),
+            )
         else:
             _between_points(first, (start, end), metric, plot, json, options)
-
-
-def _example(path: Path) -> str:
-    program = hsdsl.load(path).program
-    mode = program.modes[program.initial_mode]
-    two = (f'"{mode.name} {" ".join(f"{state}={number}" for state in mode.states)}"' for number in (0, 1))
-    return "for example: hsdsl distance {} --from {} --to {}".format(path, *two)
 
 
 def _between_points(
@@ -172,14 +174,6 @@ def _between_points(
     ]  # fmt: skip
     bounds = {"lower": result.interval.lower, "upper": result.interval.upper, "status": result.status}
     print_json({**bounds, "metric": name, "certified": result.certified, "path": pieces})
-
-
-def _parameters(overrides: list[str] | None) -> dict[str, str]:
-    parameters, initial, settings = split(overrides)
-    others: list[Any] = [*(f"initial.{name}" for name in initial), *(f"experiment.{name}" for name in settings)]
-    if others:
-        raise UsageError(f"a distance depends on parameters alone; --set {others[0]} has no meaning here")
-    return parameters
 
 
 def _between_runs(

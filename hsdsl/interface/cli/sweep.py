@@ -20,7 +20,6 @@ from hsdsl.interface.cli.options import Answer, Engine, Experiment, check_target
 if TYPE_CHECKING:
     from hsdsl.analysis.sweep import Sweep
     from hsdsl.analysis.sweep.manifest import Manifest
-    from hsdsl.analysis.sweep.picture import Picture
 
 OPTIONS = {"overrides": "set"}
 
@@ -93,7 +92,13 @@ def sweep(
             found = _run(model, vary or [], out, settings | {"check": check}, answer.hidden)
         target = plot or (show and show / "_picture.png")
         if target is not None:
-            _draw(found, target, picture, plot is not None or bool(given(**drawing)))
+            try:
+                picture.draw(found, target)
+                say(f"wrote {target}")
+            except UsageError as error:
+                if plot is not None or bool(given(**drawing)):
+                    raise
+                say(f"no picture: {error}")
         rows = {how: getattr(found, how)(column) for how, column in ranked.items() if column}
         summary = [] if answer.quiet else [found.summary]
         listed = "\n".join([*summary, *_listed(found, rows, ranked)])
@@ -142,15 +147,12 @@ def _listed(found: Sweep, rows: Mapping[str, list[dict[str, Any]]], ranked: Mapp
     """The rows at one end as a table, and the command that makes the first of them again."""
     for how, kept in rows.items():
         yield f"\n{how} rows by {ranked[how]}" + ("" if kept else ": no row has a number")
-        table = [[*map(visible, kept[0])], *([_cell(x) for x in row.values()] for row in kept)] if kept else []
+        cells = [[f"{x:.9g}" if isinstance(x, float) else visible(str(x)) for x in row.values()] for row in kept]
+        table = [[*map(visible, kept[0])], *cells] if kept else []
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
         yield from ("  " + "  ".join(map(str.ljust, line, widths)).rstrip() for line in table)
         if kept:
             yield f"  again: {found.command(kept[0]['row'])}"
-
-
-def _cell(value: Any) -> str:
-    return f"{value:.9g}" if isinstance(value, float) else visible(str(value))
 
 
 def _run(model: Path, vary: list[str], out: Path, settings: dict[str, Any], quiet: bool) -> Any:
@@ -200,13 +202,3 @@ def duration(seconds: float) -> str:
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours} h {minutes:02} min" if hours else f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
-
-
-def _draw(found: Sweep, plot: Path, picture: Picture, needed: bool) -> None:
-    try:
-        picture.draw(found, plot)
-        say(f"wrote {plot}")
-    except UsageError as error:
-        if needed:
-            raise
-        say(f"no picture: {error}")

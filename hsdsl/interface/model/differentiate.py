@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.analysis.sensitivity.result import Sensitivity, Setting, Slopes
+from hsdsl.analysis.sensitivity.result import Sensitivity, Setting
 from hsdsl.analysis.sensitivity.targets import ERROR, SPAN, UNIT, Target, listed, targets
 from hsdsl.base.defaults import DEFAULT_TOLERANCE
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
-from hsdsl.base.parts import Part, present
+from hsdsl.base.parts import present
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.integrators import FALLBACK, METHODS
 from hsdsl.engine.preparation import automatic
@@ -76,25 +76,29 @@ class Differentiator:
         return self.sensitivity(wrt, kept)
 
     def _ready(self, wrt: Sequence[str], arguments: Mapping[str, Any], firsts: tuple[str, ...]) -> _Ready:
-        from hsdsl.analysis.sensitivity.overrides import overridden
+        from hsdsl.analysis.sensitivity.overrides import overridden, parameter_slopes, time_slopes
 
         call = located_arguments(self.pipeline, arguments)
         plain = self.pipeline.prepare(call)
         parameters = overrides_of(call, "parameters", self.pipeline.program)
         initial = start_of_parts(self.pipeline.program, overrides_of(call, "initial", self.pipeline.program))
         values = with_parameters(self.pipeline.values(arithmetic_of(call.get("precision"))), parameters)
-        by = targets(wrt, self.pipeline.program, started_with(values, initial))
+        states, parts = initial_layout(values, initial)[1], values.program.parts
+        own = present(parts, {part.name: part.start + 1 for part in parts} | dict(initial))
+        by = targets(wrt, self.pipeline.program, [name for name in states if not parts or name in own])
         given: dict[str, Any] = dict(call.get("settings") or {})
         experiment = {k: given.get(k) if call.get(k) is None else call[k] for k in ("until", "samples")}
         change = overridden(self.pipeline.system, parameters, initial, experiment)
-        span, samples = moving_times(change, by, values)
+        until, samples = time_slopes(change, by)
+        times = [dict(zip((t.label for t in by), row, strict=True)) for row in _numbers([until, *samples], values)]
+        rows = _numbers(list(parameter_slopes(change, by).values()), values)
         setting = Setting(
             plain,
             plain,
             self.pipeline.program.outputs,
-            span,
-            samples,
-            moving_parameters(change, by, values),
+            times[0],
+            times[1:],
+            {target.label: tuple(row[k] for row in rows) for k, target in enumerate(by)},
             partial(visible_run, prepared=plain),
         )
         return self._prepare(_Ready(by, change, call, setting, firsts, exact=arguments.get("tolerance") is not None))
@@ -123,6 +127,9 @@ class Differentiator:
             SPAN: settings.until,
             ERROR: ROUNDOFF_UNITS * arithmetic.unit + SAFE * allowed,
         }
+        initial = ready.change.initial
+        modes = {part.name: part.modes for part in self.pipeline.program.parts if part.name in initial}
+        given = {f"{name}.mode": own[int(initial[name]) - 1] for name, own in modes.items()}
         arguments = {
             "until": settings.until,
             "scheme": "located",
@@ -133,7 +140,7 @@ class Differentiator:
             "max_transitions": settings.max_transitions,
             "completion": "none",  # derivatives end where the run leaves the theorem
             "parameters": ready.change.parameters | numbers,
-            "initial": with_mode_names(self.pipeline.program.parts, ready.change.initial),
+            "initial": given | {name: value for name, value in initial.items() if name not in modes},
             "engine": ready.call.get("engine") or "auto",
             "precision": ready.call.get("precision"),
         }
@@ -174,20 +181,6 @@ class _Ready:
         return tuple(t.label for t in self.by)
 
 
-def started_with(values: Values, initial: Mapping[str, Any]) -> list[str]:
-    """The states that the initial mode has, of a system of parts those of its product mode."""
-    states, parts = initial_layout(values, initial)[1], values.program.parts
-    own = present(parts, {part.name: part.start + 1 for part in parts} | dict(initial))
-    return [name for name in states if not parts or name in own]
-
-
-def with_mode_names(parts: Sequence[Part], initial: Mapping[str, Any]) -> dict[str, Any]:
-    """Overrides of the start with the modes of parts by name, as a call has them."""
-    modes = {part.name: part.modes for part in parts if part.name in initial}
-    given = {f"{name}.mode": own[int(initial[name]) - 1] for name, own in modes.items()}
-    return given | {name: value for name, value in initial.items() if name not in modes}
-
-
 def start_by(
     wrt: str | Sequence[str] | None, arguments: Mapping[str, Any], values: Values
 ) -> tuple[tuple[Target, ...], dict[str, float]]:
@@ -224,23 +217,6 @@ def located_arguments(pipeline: Pipeline, arguments: Mapping[str, Any]) -> dict[
     if "tolerance" not in call and pipeline.resolve(settings, {"scheme": "located"}).size == "step":
         call["tolerance"] = DEFAULT_TOLERANCE
     return call
-
-
-def moving_times(change: Overridden, by: Sequence[Target], values: Values) -> tuple[Slopes, list[Slopes]]:
-    """The derivatives of ``until`` and of the sample times."""
-    from hsdsl.analysis.sensitivity.overrides import time_slopes
-
-    until, samples = time_slopes(change, by)
-    rows = [dict(zip((t.label for t in by), row, strict=True)) for row in _numbers([until, *samples], values)]
-    return rows[0], rows[1:]
-
-
-def moving_parameters(change: Overridden, by: Sequence[Target], values: Values) -> dict[str, tuple[Number, ...]]:
-    """The derivatives of all parameters by each target."""
-    from hsdsl.analysis.sensitivity.overrides import parameter_slopes
-
-    rows = _numbers(list(parameter_slopes(change, by).values()), values)
-    return {target.label: tuple(row[k] for row in rows) for k, target in enumerate(by)}
 
 
 def _numbers(rows: Sequence[Sequence[Any]], values: Values) -> list[list[Number]]:

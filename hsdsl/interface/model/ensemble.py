@@ -87,33 +87,29 @@ class PreparedEnsemble:
             execution = self.request.run(place)
             if execution.stop.reason == "interrupted":
                 return
-            self._record(kept, i, execution)
+            last, program = execution.arcs[-1], self.base.program
+            n, end = len(last.states), execution.times[-1]
+            kept.stop[i] = execution.stop.reason
+            modes = program.mode_names
+            kept.noted[i] = execution.noted(execution) if execution.noted else ""
+            kept.mode[i] = modes.index(last.mode)
+            kept.kind[i] = self.kinds.index(last.states)
+            kept.transitions[i] = len(execution.transitions)
+            kept.ended[i] = end
+            kept.final[i, :n] = execution.values[-1, :n]
+            kept.outputs[i] = execution.outputs[-1]
+            times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
+            kept.crossed[i, : len(times)] = times
+            inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
+            samples = execution.sample(self.instances.time[i][inside])
+            for k, name in enumerate(self.names):
+                if name in samples.states:
+                    kept.states[i, k, inside] = samples[name]
+            kept.results[i, inside] = samples.output_columns
+            if kept.logs:
+                kept.log[i] = self._logged(kept.width, execution.transitions)
             if progress is not None:
                 progress(i + 1, len(self.places))
-
-    def _record(self, kept: Kept, i: int, execution: Execution) -> None:
-        """Record the execution of an instance."""
-        last, program = execution.arcs[-1], self.base.program
-        n, end = len(last.states), execution.times[-1]
-        kept.stop[i] = execution.stop.reason
-        modes = program.mode_names
-        kept.noted[i] = execution.noted(execution) if execution.noted else ""
-        kept.mode[i] = modes.index(last.mode)
-        kept.kind[i] = self.kinds.index(last.states)
-        kept.transitions[i] = len(execution.transitions)
-        kept.ended[i] = end
-        kept.final[i, :n] = execution.values[-1, :n]
-        kept.outputs[i] = execution.outputs[-1]
-        times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
-        kept.crossed[i, : len(times)] = times
-        inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
-        samples = execution.sample(self.instances.time[i][inside])
-        for k, name in enumerate(self.names):
-            if name in samples.states:
-                kept.states[i, k, inside] = samples[name]
-        kept.results[i, inside] = samples.output_columns
-        if kept.logs:
-            kept.log[i] = self._logged(kept.width, execution.transitions)
 
     def _logged(self, width: int, transitions: Sequence[Transition]) -> Logged:
         nan, program = float("nan"), self.base.program
@@ -308,7 +304,8 @@ class EnsembleRequest:
         for group, prefix in (("parameters", ""), ("initial", INITIAL)):
             given = overrides_of(call, group, model.program)
             varied |= {prefix + name: _array(name, value) for name, value in given.items() if np.ndim(value) > 0}
-            call = call | {group: {name: _plain(value) for name, value in given.items() if np.ndim(value) == 0}}
+            alone = {name: value for name, value in given.items() if np.ndim(value) == 0}
+            call = call | {group: {name: x.item() if hasattr(x, "item") else x for name, x in alone.items()}}
         try:
             common = np.broadcast_arrays(*varied.values())
         except ValueError:
@@ -350,33 +347,22 @@ class EnsembleRequest:
         if given is None:
             return 0, lambda: np.empty((len(until), 0))
         if isinstance(given, str):
-            return _times_every(column_of(table.expression(given, "the time between samples"), table.count), until)
+            step = column_of(table.expression(given, "the time between samples"), table.count)
+            if wrong := [value for value in step[np.isfinite(until)].tolist() if not value > 0]:
+                raise UsageError(f"the time between samples must be positive, not {wrong[0]:g}")
+            with np.errstate(invalid="ignore"):
+                count = np.floor(until / step * (1 + TIE)) + 1
+            most = int(min(np.nanmax(count, initial=0), 2**62))
+
+            def times() -> Array:
+                times = step[:, None] * np.arange(most)
+                return np.where(np.arange(most) < count[:, None], np.minimum(times, until[:, None]), math.nan)
+
+            return most, times
         if isinstance(given, int):
-            return given, lambda: _evenly(until, given)
+            shares = np.arange(given - 1)
+            return given, lambda: np.concatenate([until[:, None] * shares / (given - 1), until[:, None]], axis=1)
         return len(given), lambda: np.tile(given, (len(until), 1))
-
-
-def _evenly(until: Array, count: int) -> Array:
-    return np.concatenate([until[:, None] * np.arange(count - 1) / (count - 1), until[:, None]], axis=1)
-
-
-def _times_every(step: Array, until: Array) -> tuple[int, Callable[[], Array]]:
-    """Multiples of each instance's step up to its end."""
-    if wrong := [value for value in step[np.isfinite(until)].tolist() if not value > 0]:
-        raise UsageError(f"the time between samples must be positive, not {wrong[0]:g}")
-    with np.errstate(invalid="ignore"):
-        count = np.floor(until / step * (1 + TIE)) + 1
-    most = int(min(np.nanmax(count, initial=0), 2**62))
-
-    def times() -> Array:
-        times = step[:, None] * np.arange(most)
-        return np.where(np.arange(most) < count[:, None], np.minimum(times, until[:, None]), math.nan)
-
-    return most, times
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
 
 
 def _array(name: str, value: Any) -> Array:

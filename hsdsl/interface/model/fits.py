@@ -54,8 +54,13 @@ def fit(
         reason = f"{counted(measured.count, 'measurement')} of {counted(len(by), 'value')} leave nothing over"
         raise UsageError(f"intervals: {reason} to judge by", "give sigma")
     bounds = {t.label: _bounds(values, t) for t in by}
+    labels = [t.label for t in by]
+
+    def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:
+        return model.sensitivity(labels, **varied({**arguments, "until": until}, by, given, model.program))
+
     objective = Objective(
-        _evaluate(model, by, arguments),
+        evaluate,
         measured,
         _weights(measured, _by_column(measured, sigma), _by_column(measured, weights)),
         start,
@@ -63,15 +68,6 @@ def fit(
     )
     scales = {label: abs(value) or _span(bounds[label]) for label, value in start.items()}
     return replace(fitted(objective, bounds, bool(sigma), scales, level, starts), units=model.program.units)
-
-
-def _evaluate(model: Runs, by: Sequence[Target], arguments: Mapping[str, Any]) -> Any:
-    labels = [t.label for t in by]
-
-    def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:
-        return model.sensitivity(labels, **varied({**arguments, "until": until}, by, given, model.program))
-
-    return evaluate
 
 
 def _bounds(values: Any, target: Target) -> tuple[float, float]:

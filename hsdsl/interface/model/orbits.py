@@ -89,8 +89,16 @@ class Orbits:
 
         check_arguments(arguments, "an orbit", LOCATED_ALONE)
         self.model, self.laps, self.arguments = model, whole(laps, "laps", 1), dict(arguments)
-        self.edge = _edge(model, section)
-        self._parameters = _numbers(model, arguments)
+        names = [edge.name for mode in model.program.modes for edge in written_edges(mode.edges)]
+        if section not in names:
+            hint = did_you_mean(section, names)
+            if section in model.columns:
+                hint = "a section is a transition, by its name; " + (hint or "")
+            raise UsageError(f"the model has no transition '{section}'", hint)
+        self.edge = section
+        given = overrides_of(arguments, "parameters", model.program)
+        values = with_parameters(model.pipeline.values(FLOAT64), given)
+        self._parameters = {name: values.parameters[model.program.parameters.index(name)] for name in given}
         self.forced = forced(model.system)
         if period is not None and not self.forced:
             raise UsageError("the model does not depend on time, so its forcing has no period")
@@ -354,6 +362,14 @@ class Orbits:
         broken = tuple(why for when, why in breaks if when <= passage.time * (1 + TIE))
         verdict, reasons = "undecided" if broken else verdict, (reason, *broken)
         mode, states = self._entered()
+        sides: dict[str, Array] = {}
+        sensitivity = found.passage.sensitivity
+        for edge, side in (sensitivity.sides if sensitivity.breaks else {}).items():
+            passed = [made.index for made in side.execution.transitions if made.edge == self.edge]
+            if len(passed) >= self.laps:
+                slopes = self.section({}).slopes(side, passed[self.laps - 1], side.wrt, None)
+                if not np.isnan(slopes).any():
+                    sides[edge] = multipliers_of(found, slopes, forced)
         return Orbit(
             self.edge,
             self.laps,
@@ -366,7 +382,7 @@ class Orbits:
             found.residual,
             verdict,
             reasons,
-            self._sides(found, forced),
+            sides,
             dict(parameters),
             found,
         )
@@ -379,25 +395,6 @@ class Orbits:
             return float("inf")
         other = multipliers_of(found, again.slopes, forced)
         return abs(float(np.abs(other[0])) - float(np.abs(multipliers[0]))) if len(multipliers) else 0.0
-
-    def _sides(self, found: Closed, forced: bool) -> dict[str, Array]:
-        """The multipliers for each order of simultaneous transitions, where they differ."""
-        sides: dict[str, Array] = {}
-        sensitivity = found.passage.sensitivity
-        for edge, side in (sensitivity.sides if sensitivity.breaks else {}).items():
-            passed = [made.index for made in side.execution.transitions if made.edge == self.edge]
-            if len(passed) >= self.laps:
-                slopes = self.section({}).slopes(side, passed[self.laps - 1], side.wrt, None)
-                if not np.isnan(slopes).any():
-                    sides[edge] = multipliers_of(found, slopes, forced)
-        return sides
-
-
-def _numbers(model: Runs, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """The parameters that a call gives, as numbers: its runs need not read their texts again."""
-    given = overrides_of(arguments, "parameters", model.program)
-    values = with_parameters(model.pipeline.values(FLOAT64), given)
-    return {name: values.parameters[model.program.parameters.index(name)] for name in given}
 
 
 def _with_sizes(guess: Guess, run: Execution) -> Guess:
@@ -418,13 +415,3 @@ def _still(found: Closed) -> bool:
                 column = np.asarray(run.values[rows, arc.states.index(name)], float)
                 moved[k] = max(moved[k], float(np.max(np.abs(column - found.point[k]))) / found.sizes[k])
     return bool(np.max(moved, initial=0.0) <= SHRUNK)
-
-
-def _edge(model: Runs, section: str) -> str:
-    names = [edge.name for mode in model.program.modes for edge in written_edges(mode.edges)]
-    if section not in names:
-        hint = did_you_mean(section, names)
-        if section in model.columns:
-            hint = "a section is a transition, by its name; " + (hint or "")
-        raise UsageError(f"the model has no transition '{section}'", hint)
-    return section

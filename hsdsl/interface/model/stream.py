@@ -71,7 +71,16 @@ class Rows:
 
     def take(self, chunk: dict[str, Array], at_end: bool = False) -> Samples | None:
         """Write the due rows of a chunk; at the end of the run returns its last row."""
-        rows = self._rows(chunk)
+        arcs, count = chunk["arc"], len(chunk["times"])
+        number = self.steps + np.arange(count)
+        self.steps += count
+        layout = self._layouts.of_arcs(arcs["mode"], before=self._arc[2]).astype(int)
+        which = np.searchsorted(arcs["first"], number, side="right")
+        columns = (arcs["mode"].astype(int), arcs["jump"].astype(int), layout)
+        mode, jump, kind = (np.append(last, own) for last, own in zip(self._arc, columns, strict=True))
+        self._arc = int(mode[-1]), int(jump[-1]), int(kind[-1])
+        places = {"mode": mode[which], "jump": jump[which], "kind": kind[which], "due": number % self._every == 0}
+        rows = {name: chunk[name].copy() for name in ("times", "values", "outputs")} | places
         if self._held is not None:
             rows = {name: np.concatenate([self._held[name], column]) for name, column in rows.items()}
         if not len(rows["times"]):
@@ -86,19 +95,6 @@ class Rows:
         self._write(text.getvalue())
         self.written += len(table)
         return self._table(self._held) if at_end else None
-
-    def _rows(self, chunk: dict[str, Array]) -> dict[str, Array]:
-        """The rows of a chunk with mode, jump, layout and whether they are due; the first may be of the arc before."""
-        arcs, count = chunk["arc"], len(chunk["times"])
-        number = self.steps + np.arange(count)
-        self.steps += count
-        layout = self._layouts.of_arcs(arcs["mode"], before=self._arc[2]).astype(int)
-        which = np.searchsorted(arcs["first"], number, side="right")
-        columns = (arcs["mode"].astype(int), arcs["jump"].astype(int), layout)
-        mode, jump, kind = (np.append(last, own) for last, own in zip(self._arc, columns, strict=True))
-        self._arc = int(mode[-1]), int(jump[-1]), int(kind[-1])
-        places = {"mode": mode[which], "jump": jump[which], "kind": kind[which], "due": number % self._every == 0}
-        return {name: chunk[name].copy() for name in ("times", "values", "outputs")} | places
 
     def _table(self, rows: dict[str, Array]) -> Samples:
         columns, present = columns_by_name(rows["values"], rows["kind"], self._layouts.kinds, self._names)

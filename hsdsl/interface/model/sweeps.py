@@ -50,7 +50,21 @@ def sweep(
         check(planned)
     with _place(cluster, processes or cores()) as run:
         work, missing = _begun(model, planned, folder, chunk, processes or cores(), cluster is None)
-        _fill(work, folder, missing, run, progress)
+        found = Sweep(folder, work.manifest)
+        done = found.rows - sum(last - first for first, last in map(work.manifest.rows_of, missing))
+
+        def write(number: int, content: bytes) -> None:
+            nonlocal done
+            write_chunk(folder, number, content)
+            first, last = work.manifest.rows_of(number)
+            done += last - first
+            if progress is not None:
+                progress(done, found.rows)
+
+        if progress is not None:
+            progress(done, found.rows)
+        if missing:
+            run(work, missing, write)
     return Sweep(folder, work.manifest)
 
 
@@ -67,25 +81,6 @@ def _place(cluster: str | None, processes: int) -> Generator[Run]:
 
     with connected(cluster) as run:
         yield run
-
-
-def _fill(work: ChunkWork, folder: Path, missing: Sequence[int], run: Run, progress: Progress | None) -> None:
-    """Make the missing chunks."""
-    found = Sweep(folder, work.manifest)
-    done = found.rows - sum(last - first for first, last in map(work.manifest.rows_of, missing))
-
-    def write(number: int, content: bytes) -> None:
-        nonlocal done
-        write_chunk(folder, number, content)
-        first, last = work.manifest.rows_of(number)
-        done += last - first
-        if progress is not None:
-            progress(done, found.rows)
-
-    if progress is not None:
-        progress(done, found.rows)
-    if missing:
-        run(work, missing, write)
 
 
 def _planned(

@@ -151,7 +151,12 @@ def overlapping_guards(subject: Subject) -> Iterator[Finding]:
     left = MOST_PAIRS
     for part in subject.modes:
         for first, second in combinations(part.edges, 2):
-            if _ordered(first.edge, second.edge):
+            # Whether two edges on one surface have an order: every run reaches both at once, and round-off
+            # decides nothing
+            if (
+                first.edge.priority != second.edge.priority
+                and first.edge.surface.residual == second.edge.surface.residual
+            ):
                 continue
             overlaps = overlap_of(subject.dynamics, first.edge, second.edge)
             if not any(subject.dynamics.ask(part.mode, overlap).somewhere for overlap in overlaps):
@@ -163,11 +168,6 @@ def overlapping_guards(subject: Subject) -> Iterator[Finding]:
             left -= 1
             _follow_both_orders(subject.dynamics, part.mode, first, second, overlaps, alike)
     yield from alike
-
-
-def _ordered(first: Edge, second: Edge) -> bool:
-    """Whether two edges on one surface have an order: every run reaches both at once, and round-off decides nothing."""
-    return first.priority != second.priority and first.surface.residual == second.surface.residual
 
 
 def _follow_both_orders(

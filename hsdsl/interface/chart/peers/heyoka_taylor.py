@@ -42,7 +42,10 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
 
     def integrate(tolerance: float, k: int, t: float, x: Sequence[float], times: Array, until: float) -> ToolArc:
         if (k, tolerance) not in kept:
-            kept[k, tolerance] = _integrator(model.modes[k], systems[k], k, tolerance, counted)
+            system = systems[k]
+            flow = list(zip(system.variables, system.flow, strict=True))
+            events = [_event(model.modes[k], i, k, guard, counted) for i, guard in enumerate(system.guards)]
+            kept[k, tolerance] = hy.taylor_adaptive(flow, [0.0] * len(flow), tol=tolerance, t_events=events)
         ta, end = kept[k, tolerance], None
         if stops[k]:
             end = _reached(_begun(ta, t, x).propagate_until(until)[0], ta)
@@ -99,12 +102,6 @@ def _system(mode: PlainMode) -> System:
         return [hy.expression(value) for value in as_function(mode, of, FUNCTIONS)(hy.time, *variables)]
 
     return System(variables, expressions(mode.flow), expressions(tuple(edge.guard for edge in mode.edges)))
-
-
-def _integrator(mode: PlainMode, system: System, k: int, tolerance: float, counted: list[int]) -> Any:
-    flow = list(zip(system.variables, system.flow, strict=True))
-    events = [_event(mode, i, k, guard, counted) for i, guard in enumerate(system.guards)]
-    return hy.taylor_adaptive(flow, [0.0] * len(flow), tol=tolerance, t_events=events)
 
 
 def _event(mode: PlainMode, i: int, k: int, guard: Any, counted: list[int]) -> Any:
