@@ -93,21 +93,7 @@ def source_of(model: ExportedModel, arguments: Mapping[str, Any]) -> Source:
 
     Raises UsageError: a name, value or combination that a run would refuse, too.
     """
-    return _with_given_start(Source(*_prepared(model.pipeline, arguments), model, arguments))
-
-
-def _prepared(pipeline: Pipeline, arguments: Mapping[str, Any]) -> tuple[HybridSystem, Problem]:
-    """The system with the modes of its completion, and the problem."""
-    problem = pipeline.prepare({**arguments, "engine": "python"})
-    if problem.waits:
-        name = next(iter(problem.waits))
-        raise UsageError(f"{name} is above 1, and an exported run starts with one execution that waits, or none")
-    completed = pipeline.sliding if problem.settings.completion == "auto" else pipeline
-    return completed.system, problem
-
-
-def _with_given_start(source: Source) -> Source:
-    """The source with initial values that follow those which the call gives."""
+    source = Source(*_prepared(model.pipeline, arguments), model, arguments)
     problem, system = source.problem, source.system
     given = {
         name: Fraction(float(value))
@@ -121,6 +107,16 @@ def _with_given_start(source: Source) -> Source:
     program = replace(problem.program, constants=lower_constants(replace(system, initial=initial)))
     kernel = PythonKernel(program, FLOAT64)
     return replace(source, problem=replace(problem, program=program, kernel=kernel))
+
+
+def _prepared(pipeline: Pipeline, arguments: Mapping[str, Any]) -> tuple[HybridSystem, Problem]:
+    """The system with the modes of its completion, and the problem."""
+    problem = pipeline.prepare({**arguments, "engine": "python"})
+    if problem.waits:
+        name = next(iter(problem.waits))
+        raise UsageError(f"{name} is above 1, and an exported run starts with one execution that waits, or none")
+    completed = pipeline.sliding if problem.settings.completion == "auto" else pipeline
+    return completed.system, problem
 
 
 def drivable(source: Source) -> Source:

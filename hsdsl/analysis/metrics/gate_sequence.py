@@ -201,7 +201,9 @@ def solve(shape: ConeShape, offsets: Array, numbers: Array, rounds: int = ROUNDS
         some = offsets[todo]
         s, vectors, weights = _proposals(shape, some, best[todo], unit[todo], SOLVED if rounds > 1 else ROUGHLY)
         s, inside = brought_inside(shape, s)
-        value = proved_above(shape, some, numbers[todo], s, inside)
+        value = lengths(shape, some, s)
+        above = value * (1 + shape.operations * UNIT) + charge(shape, numbers[todo], norm(s))
+        value = np.where(inside, above, np.inf)
         below = proved_below(shape, some, numbers[todo], s, vectors, weights)
         lower[todo] = np.maximum(lower[todo], below)
         better = value < upper[todo]
@@ -286,33 +288,28 @@ def on_line(shape: ConeShape, offsets: Array, numbers: Array) -> tuple[Array, Ar
         s, far = np.zeros((len(numbers), 0)), np.zeros(len(numbers))
         lower = upper = lengths(shape, offsets, s)
     else:
-        lower, upper, where, far = _minimised(shape, offsets)
+        low, high = interval_of(shape.normals, shape.levels)
+        along = [(offsets[:, part], shape.stacked[part, 0]) for part in shape.parts]
+        kinks = [np.clip(-(o @ m) / (m @ m), low, high) for o, m in along if m @ m > 0]
+        kinks = np.array(kinks or [np.full(len(offsets), np.clip(0.0, low, high))])
+        a, b = kinks.min(axis=0), kinks.max(axis=0)
+        values = np.array([lengths(shape, offsets, s[:, None]) for s in kinks])
+        first = np.argmin(values, axis=0)[None]
+        best, where = (np.take_along_axis(x, first, axis=0)[0] for x in (values, kinks))
+        wide = np.flatnonzero(b - a > 4e-16 * (np.abs(a) + np.abs(b)))
+        lower = best.copy()
+        if wide.size:
+            low_wide, value, at = _newton(shape, offsets[wide], a[wide], b[wide])
+            better = value < best[wide]
+            best[wide] = np.where(better, value, best[wide])
+            where[wide] = np.where(better, at, where[wide])
+            lower[wide] = np.minimum(low_wide, best[wide])
+        upper, far = best, np.maximum(np.abs(a), np.abs(b))
         s = where[:, None]
         if shape.least > 0:  # no shorter path is farther away
             far = np.minimum(far, np.abs(where) + 2 * upper / shape.least)
     rounding = charge(shape, numbers, far) + shape.operations * UNIT * upper
     return np.maximum(0.0, lower - rounding), upper + rounding, s
-
-
-def _minimised(shape: ConeShape, offsets: Array) -> tuple[Array, Array, Array, Array]:
-    """Lower bounds, attained values (up to round-off), their places, and a bound on the distance of minima from 0."""
-    low, high = interval_of(shape.normals, shape.levels)
-    along = [(offsets[:, part], shape.stacked[part, 0]) for part in shape.parts]
-    kinks = [np.clip(-(o @ m) / (m @ m), low, high) for o, m in along if m @ m > 0]
-    kinks = np.array(kinks or [np.full(len(offsets), np.clip(0.0, low, high))])
-    a, b = kinks.min(axis=0), kinks.max(axis=0)
-    values = np.array([lengths(shape, offsets, s[:, None]) for s in kinks])
-    first = np.argmin(values, axis=0)[None]
-    best, where = (np.take_along_axis(x, first, axis=0)[0] for x in (values, kinks))
-    wide = np.flatnonzero(b - a > 4e-16 * (np.abs(a) + np.abs(b)))
-    lower = best.copy()
-    if wide.size:
-        low_wide, value, at = _newton(shape, offsets[wide], a[wide], b[wide])
-        better = value < best[wide]
-        best[wide] = np.where(better, value, best[wide])
-        where[wide] = np.where(better, at, where[wide])
-        lower[wide] = np.minimum(low_wide, best[wide])
-    return lower, best, where, np.maximum(np.abs(a), np.abs(b))
 
 
 def _newton(shape: ConeShape, offsets: Array, a: Array, b: Array) -> tuple[Array, Array, Array]:
@@ -420,13 +417,6 @@ def _beyond(shape: ConeShape, s: Array) -> Array:
 
 def _margin(shape: ConeShape, s: Array) -> Array:
     return shape.operations * UNIT * (norm(s)[:, None] + np.abs(shape.levels))
-
-
-def proved_above(shape: ConeShape, offsets: Array, numbers: Array, s: Array, inside: Array) -> Array:
-    """The lengths of paths, charged; infinite for those that are not inside."""
-    value = lengths(shape, offsets, s)
-    above = value * (1 + shape.operations * UNIT) + charge(shape, numbers, norm(s))
-    return np.where(inside, above, np.inf)
 
 
 def proved_below(shape: ConeShape, offsets: Array, numbers: Array, s: Array, vectors: Array, weights: Array) -> Array:

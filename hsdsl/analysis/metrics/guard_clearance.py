@@ -35,19 +35,15 @@ def segments_inside(space: Space, mode: int, a: Array, b: Array) -> Array:
     """
     verdict = np.full(len(a), CERTAIN)
     for formula in space.domains[mode].curved:
-        tolerance = _tolerance(formula, np.vstack([a, b])).reshape(2, len(a)).max(axis=0)
+        x = np.vstack([a, b])
+        below, above = formula.slopes(x, x)
+        steepest = np.maximum(np.abs(below[:, 0]), np.abs(above[:, 0])).sum(axis=1)
+        moved = steepest * np.abs(x).max(axis=1, initial=0.0)  # how much the size of the point makes
+        moved = np.where(np.isfinite(moved), moved, 0.0)
+        beyond = np.nan_to_num(formula.ranges(x, x)[1][:, 0], nan=0.0, neginf=0.0, posinf=0.0)
+        tolerance = np.clip(beyond, KEPT * moved, TOLERANCE * moved).reshape(2, len(a)).max(axis=0)
         verdict = np.minimum(verdict, _below(formula, a, b, tolerance))
     return verdict
-
-
-def _tolerance(formula: Formula, x: Array) -> Array:
-    """How far beyond an inequality points are, or may be by rounding."""
-    below, above = formula.slopes(x, x)
-    steepest = np.maximum(np.abs(below[:, 0]), np.abs(above[:, 0])).sum(axis=1)
-    moved = steepest * np.abs(x).max(axis=1, initial=0.0)  # how much the size of the point makes
-    moved = np.where(np.isfinite(moved), moved, 0.0)
-    beyond = np.nan_to_num(formula.ranges(x, x)[1][:, 0], nan=0.0, neginf=0.0, posinf=0.0)
-    return np.clip(beyond, KEPT * moved, TOLERANCE * moved)
 
 
 def _below(formula: Formula, a: Array, b: Array, tolerance: Array) -> Array:
@@ -130,21 +126,16 @@ def to_zeros(formula: Formula, x: Array) -> Array:
     nearest = np.zeros(len(x))
     for k in range(below.shape[1]):
         size = np.maximum(np.maximum(below[:, k], -above[:, k]), 0.0)
-        nearest = np.maximum(nearest, _free(formula, k, x, size))
+        near = np.zeros(len(x))
+        with np.errstate(all="ignore"):
+            cap = FARTHEST * (float(np.abs(x).max(initial=0.0)) or 1.0)
+            far = np.fmin(size / _steepest(formula, k, x, near), cap)
+            for n in range(HALVINGS):
+                tried = far if n == 0 else (near + far) / 2
+                free = tried * _steepest(formula, k, x, tried) * (1 + ROUNDING) <= size
+                near, far = np.where(free, tried, near), np.where(free, far, tried)
+        nearest = np.maximum(nearest, near)
     return nearest
-
-
-def _free(formula: Formula, k: int, x: Array, size: Array) -> Array:
-    """The largest half width found in whose box a function that is ``size`` at x has no zero."""
-    near = np.zeros(len(x))
-    with np.errstate(all="ignore"):
-        cap = FARTHEST * (float(np.abs(x).max(initial=0.0)) or 1.0)
-        far = np.fmin(size / _steepest(formula, k, x, near), cap)
-        for n in range(HALVINGS):
-            tried = far if n == 0 else (near + far) / 2
-            free = tried * _steepest(formula, k, x, tried) * (1 + ROUNDING) <= size
-            near, far = np.where(free, tried, near), np.where(free, far, tried)
-    return near
 
 
 def _steepest(formula: Formula, k: int, x: Array, half_width: Array) -> Array:

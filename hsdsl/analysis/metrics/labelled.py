@@ -41,7 +41,7 @@ from hsdsl.analysis.metrics.curves import (
 )
 from hsdsl.analysis.metrics.interval import INFINITE, SAMPLED, Budget, Interval
 from hsdsl.analysis.metrics.points import SpaceMetric
-from hsdsl.analysis.metrics.trace import ROUNDOFF, Cells, Polyline, Trace, names_of, polylines, rounding_of, trace
+from hsdsl.analysis.metrics.trace import ROUNDOFF, Polyline, Trace, names_of, polylines, rounding_of, trace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean
 from hsdsl.engine.execution import Array, Execution
@@ -66,23 +66,6 @@ def rho_hat(a: Execution, b: Execution, coordinates: Sequence[str] | None = None
     position; by default all states that every visited mode has.
     """
     cells = merged(a, b)
-    columns = _columns(cells, coordinates)
-    first, second = cells.sides()
-    ours = np.isin(cells.begin, cells.a.start), np.isin(cells.end, cells.a.end)
-    if cells.same:
-        return no_distance(cells, "rho-hat", SAMPLED)
-    largest, time = 0.0, float(cells.begin[0])
-    for end, times, chosen in ((0, cells.begin, ours[0]), (1, cells.end, ours[1])):
-        difference = (first.at_end(end) - second.at_end(end))[chosen][:, columns]
-        apart = np.sqrt(np.sum(difference**2, axis=1))
-        if len(apart) and apart.max() > largest:
-            largest, time = float(apart.max()), float(times[chosen][int(np.argmax(apart))])
-    rounding = float(np.max(first.rounding + second.rounding)) + ROUNDOFF * largest
-    interval = Interval(max(0.0, largest - rounding), largest + rounding, SAMPLED)
-    return CurveDistance(interval, time, "rho-hat", cells.span, cells.note)
-
-
-def _columns(cells: Cells, coordinates: Sequence[str] | None) -> Array:
     names = cells.a.names
     everywhere = [name for i, name in enumerate(names) if _in_all(cells.a, i) and _in_all(cells.b, i)]
     if coordinates is None:
@@ -96,7 +79,20 @@ def _columns(cells: Cells, coordinates: Sequence[str] | None) -> Array:
             raise UsageError(f"rho-hat: the runs have no state '{name}'", did_you_mean(name, names))
         if name not in everywhere:
             raise UsageError(f"rho-hat: not every mode visited has the state '{name}'")
-    return np.array([names.index(name) for name in coordinates])
+    columns = np.array([names.index(name) for name in coordinates])
+    first, second = cells.sides()
+    ours = np.isin(cells.begin, cells.a.start), np.isin(cells.end, cells.a.end)
+    if cells.same:
+        return no_distance(cells, "rho-hat", SAMPLED)
+    largest, time = 0.0, float(cells.begin[0])
+    for end, times, chosen in ((0, cells.begin, ours[0]), (1, cells.end, ours[1])):
+        difference = (first.at_end(end) - second.at_end(end))[chosen][:, columns]
+        apart = np.sqrt(np.sum(difference**2, axis=1))
+        if len(apart) and apart.max() > largest:
+            largest, time = float(apart.max()), float(times[chosen][int(np.argmax(apart))])
+    rounding = float(np.max(first.rounding + second.rounding)) + ROUNDOFF * largest
+    interval = Interval(max(0.0, largest - rounding), largest + rounding, SAMPLED)
+    return CurveDistance(interval, time, "rho-hat", cells.span, cells.note)
 
 
 def _in_all(curve: Trace, column: int) -> bool:
@@ -120,7 +116,14 @@ def skorokhod(a: Execution, b: Execution, resolution: int = RESOLUTION) -> Curve
     coupled, rounding = coupling(p, q), cells.rounding + ROUNDOFF * max(map(abs, span))
     same_time = sup_norm(a, b).upper
     upper = min(coupled + (p.reach + q.reach) / 2 + rounding, same_time)
-    lower = max(coupled - max(p.reach, q.reach) / 2 - rounding, switches_apart(cells.a, cells.b, span), 0.0)
+    # Bound the distance from below by the modes: 1 for other sequences, else the time between switches, at most
+    # 1. A retiming that costs less than 1 takes every change of mode to the same change of mode
+    (modes_a, times_a), (modes_b, times_b) = _switches(cells.a, span), _switches(cells.b, span)
+    lower = max(
+        coupled - max(p.reach, q.reach) / 2 - rounding,
+        1.0 if modes_a != modes_b else min(1.0, float(np.max(np.abs(times_a - times_b), initial=0.0))),
+        0.0,
+    )
     note = f"Curves by {len(p)} and {len(q)} points, up to {max(p.reach, q.reach):.2g} apart."
     notes = " ".join(filter(None, (cells.note, note)))
     return CurveDistance(Interval(lower, upper), None, "skorokhod", span, notes)
@@ -172,17 +175,6 @@ def _within(p: Polyline, q: Polyline, limit: float) -> float:
 def _cost(p: Polyline, q: Polyline, i: Array, j: Array) -> Array:
     states = np.sqrt(np.sum((p.states[i] - q.states[j]) ** 2, axis=1)) + (p.label[i] != q.label[j])
     return np.maximum(np.abs(p.times[i] - q.times[j]), states)
-
-
-def switches_apart(a: Trace, b: Trace, span: tuple[float, float]) -> float:
-    """Bound the distance from below by the modes: 1 for other sequences, else the time between switches, at most 1.
-
-    A retiming that costs less than 1 takes every change of mode to the same change of mode.
-    """
-    (modes_a, times_a), (modes_b, times_b) = _switches(a, span), _switches(b, span)
-    if modes_a != modes_b:
-        return 1.0
-    return min(1.0, float(np.max(np.abs(times_a - times_b), initial=0.0)))
 
 
 def _switches(curve: Trace, span: tuple[float, float]) -> tuple[list[str], Array]:

@@ -115,7 +115,12 @@ def _try_from(route: Route, guess: Array, toll: float, found: SearchResult, budg
             _keep(found, value, route, s, min(verdicts))
         elif bends:
             bent = _bent(route, s, outside)
-            _try_from(bent, _with_middles(route, s, outside), toll, found, budget, bends - 1)
+            points = [*route.points(s), np.zeros(0)]
+            parts: list[Array] = []
+            for k, (_, a, b) in enumerate(route.legs(s)):
+                parts += [(a + b) / 2] * (k in outside)
+                parts.append(points[k])
+            _try_from(bent, np.concatenate(parts), toll, found, budget, bends - 1)
         return
 
 
@@ -132,15 +137,6 @@ def _bent(route: Route, s: Array, legs: Sequence[int]) -> Route:
             depths[len(sequence)] = held[k]
         sequence += route.sequence[k : k + 1]
     return replace(route, sequence=tuple(sequence), held=tuple(depths.items()))
-
-
-def _with_middles(route: Route, s: Array, legs: Sequence[int]) -> Array:
-    points = [*route.points(s), np.zeros(0)]
-    parts: list[Array] = []
-    for k, (_, a, b) in enumerate(route.legs(s)):
-        parts += [(a + b) / 2] * (k in legs)
-        parts.append(points[k])
-    return np.concatenate(parts)
 
 
 def _keep(found: SearchResult, value: float, route: Route, s: Array, verdict: int) -> None:

@@ -279,16 +279,12 @@ class _Search:
             return rows[:0], bounds[:0]
         for least in kinds:
             if rows.size:
-                rows, bounds = self._left(rows, np.maximum(bounds, self._closer(least, sequence, rows)))
+                own, upper = least(sequence, rows, 1) + self.fixed, self.found.upper[rows]
+                near = (upper * (1 - NEAR) < own) & (own < upper * (1 - TOLERANCE))
+                if near.any():  # a closer bound may decide
+                    own[near] = np.maximum(own[near], least(sequence, rows[near], ROUNDS) + self.fixed)
+                rows, bounds = self._left(rows, np.maximum(bounds, own))
         return rows, bounds
-
-    def _closer(self, least: Bound, sequence: tuple[int, ...], rows: Indices) -> Array:
-        """Lower bounds, closer where that may decide."""
-        bounds, upper = least(sequence, rows, 1) + self.fixed, self.found.upper[rows]
-        near = (upper * (1 - NEAR) < bounds) & (bounds < upper * (1 - TOLERANCE))
-        if near.any():
-            bounds[near] = np.maximum(bounds[near], least(sequence, rows[near], ROUNDS) + self.fixed)
-        return bounds
 
 
 ROUNDING = 64 * 2.0**-53  # of a norm or a short sum, relative to itself

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hsdsl.analysis.metrics.geometry import Domain, Formula, Gate, Space
+    from hsdsl.analysis.metrics.geometry import Formula, Gate, Space
     from hsdsl.analysis.metrics.points import PathPiece
     from hsdsl.analysis.plot.curves import Curves, View
 
@@ -360,7 +360,11 @@ def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[PathPiece]) -> N
     low, high = middle - (0.5 + AROUND) * extent, middle + (0.5 + AROUND) * extent
     x: Array = np.linspace(float(low[0]), float(high[0]), GRID)
     y: Array = np.linspace(float(low[1]), float(high[1]), GRID)
-    axis.contourf(x, y, _beyond(domain, x, y), levels=[-np.inf, 0], colors=["#eef4fa"])
+    points = _grid(x, y)
+    worst = np.max(points @ domain.normals.T - domain.levels, axis=1, initial=-1.0)
+    for formula in domain.curved:
+        worst = np.maximum(worst, [formula(point) for point in points])
+    axis.contourf(x, y, np.nan_to_num(worst, nan=1.0).reshape(len(y), len(x)), levels=[-np.inf, 0], colors=["#eef4fa"])
     for gate in space.gates:
         if gate.source == mode:
             _line(axis, gate, gate.sides[0], extent, own, "-", f"guard of {gate.edge}")
@@ -383,15 +387,6 @@ def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[PathPiece]) -> N
 
 def _grid(x: Array, y: Array) -> Array:
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-
-
-def _beyond(domain: Domain, x: Array, y: Array) -> Array:
-    """How far each point of a grid is beyond the domain: positive outside."""
-    points = _grid(x, y)
-    worst = np.max(points @ domain.normals.T - domain.levels, axis=1, initial=-1.0)
-    for formula in domain.curved:
-        worst = np.maximum(worst, [formula(point) for point in points])
-    return np.nan_to_num(worst, nan=1.0).reshape(len(y), len(x))
 
 
 def _line(axis: Any, gate: Gate, side: Array, extent: float, own: Array, style: str, label: str) -> None:

@@ -167,7 +167,17 @@ class Stage:
 
         self.samples, self.shapes, self.unit = samples, shapes, f" {unit}" if unit else ""
         self.canvas = FigureCanvasAgg(Figure(dpi=DPI, layout="constrained"))
-        self.whole, first = _extents(run, samples, shapes)
+        # The lower left and the upper right corner of all shapes, and those of the first view, or the same again.
+        # What a run that stopped early does at its end is arbitrary
+        rows = len(samples) if run.stop.complete else max(1, int(0.97 * len(samples)))
+        seen = [drawn for row in range(rows) for _, drawn in shapes_at(samples, shapes, row)]
+        reached = [drawn.extent for drawn in seen if drawn.kind != "view"]
+        points = np.concatenate(reached) if reached else np.zeros((1, 2))
+        low, high = points.min(axis=0), points.max(axis=0)
+        size = float(max(*(high - low), 1e-9 * np.abs(points).max())) or 1.0
+        room = size * np.where(high - low < 0.05 * size, 0.11, 0.06)
+        self.whole = np.array([low - room, high + room])
+        first = next((drawn.extent for drawn in seen if drawn.kind == "view"), self.whole)
         width, height = (first[1] - first[0]).tolist()
         self.shape = height / width if width > 0 and height > 0 else 1.0
         self.scene, self.cursor = self._set_up(run)
@@ -191,7 +201,12 @@ class Stage:
         middle, view = self._look_at([drawn for drawn in shapes.values() if drawn.kind == "view"], row)
         for k, drawn in shapes.items():
             if (artist := self.artists[k]) and (drawn.kind != "circle" or drawn.reach(middle) <= FAR * view):
-                _place(artist, drawn)
+                if drawn.kind == "circle":
+                    artist.set(center=drawn.points[0], radius=abs(drawn.sizes[0]))
+                elif drawn.kind == "box":
+                    artist.set_xy(drawn.outline)
+                else:
+                    artist.set_data(*drawn.outline.T)
                 self.scene.draw_artist(artist)
         time = float(self.samples.time[row])
         self.cursor.set_xdata([time, time])
@@ -236,22 +251,6 @@ class Stage:
         ribbon.spines[:].set_visible(False)
         ribbon.tick_params(labelsize=7)
         return scene, ribbon.axvline(start, color="#000000", linewidth=2.0, animated=True)
-
-
-def _extents(run: Execution, samples: Samples, shapes: Sequence[Any]) -> tuple[Array, Array]:
-    """The lower left and the upper right corner of all shapes, and those of the first view, or the same again.
-
-    What a run that stopped early does at its end is arbitrary.
-    """
-    rows = len(samples) if run.stop.complete else max(1, int(0.97 * len(samples)))
-    seen = [drawn for row in range(rows) for _, drawn in shapes_at(samples, shapes, row)]
-    reached = [drawn.extent for drawn in seen if drawn.kind != "view"]
-    points = np.concatenate(reached) if reached else np.zeros((1, 2))
-    low, high = points.min(axis=0), points.max(axis=0)
-    size = float(max(*(high - low), 1e-9 * np.abs(points).max())) or 1.0
-    room = size * np.where(high - low < 0.05 * size, 0.11, 0.06)
-    whole = np.array([low - room, high + room])
-    return whole, next((drawn.extent for drawn in seen if drawn.kind == "view"), whole)
 
 
 COILS = 8  # of a spring
@@ -322,12 +321,3 @@ def _artist(axis: Axes, kind: str) -> Any:
         return axis.add_patch(Polygon(np.zeros((4, 2)), closed=True, **look))
     look = {"color": ALARM, "marker": "o", "markersize": 6} if kind == "point" else {"color": INK, "linewidth": 1.6}
     return axis.plot([], [], solid_joinstyle="round", animated=True, **look)[0]
-
-
-def _place(artist: Any, drawn: Drawn) -> None:
-    if drawn.kind == "circle":
-        artist.set(center=drawn.points[0], radius=abs(drawn.sizes[0]))
-    elif drawn.kind == "box":
-        artist.set_xy(drawn.outline)
-    else:
-        artist.set_data(*drawn.outline.T)

@@ -120,7 +120,19 @@ def modes_of(runs: Sequence[Curves]) -> tuple[str, ...]:
 def curves(execution: Execution) -> Curves:
     """Make the curves of a run."""
     run = _in_float64(execution)
-    rows, times = _points(run)
+    n = len(run.times)
+    duration = np.diff(run.times, append=run.times[-1])
+    parts = np.ones(n, dtype=int)
+    if run.coefficients.shape[1] > 1 or run.output_function is not None:
+        share = np.maximum(duration / max(float(duration.sum()), np.finfo(float).tiny), 1 / n)
+        parts = np.where(duration > 0, np.maximum(np.ceil(POINTS * share), 1), 1).astype(int)
+    for arc in run.arcs:
+        parts[arc.last] = 1
+        if arc.kind == "strip":
+            parts[arc.first : arc.last] = 1
+    rows = np.repeat(np.arange(n), parts)
+    within = np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts)
+    times = run.times[rows] + duration[rows] * (within / parts[rows])
     samples = evaluate(run, rows, times)
     first = np.array([arc.first for arc in run.arcs])
     begins = np.zeros(len(rows), dtype=bool)
@@ -146,23 +158,6 @@ def _in_float64(execution: Execution) -> Execution:
         return execution
     columns = ("times", "values", "outputs", "depth", "coefficients")
     return replace(execution, digits=None, **{name: getattr(execution, name).astype(float) for name in columns})
-
-
-def _points(run: Execution) -> tuple[Array, Array]:
-    """Divide each piece that is not a straight line evenly, the longer ones into more parts."""
-    n = len(run.times)
-    duration = np.diff(run.times, append=run.times[-1])
-    parts = np.ones(n, dtype=int)
-    if run.coefficients.shape[1] > 1 or run.output_function is not None:
-        share = np.maximum(duration / max(float(duration.sum()), np.finfo(float).tiny), 1 / n)
-        parts = np.where(duration > 0, np.maximum(np.ceil(POINTS * share), 1), 1).astype(int)
-    for arc in run.arcs:
-        parts[arc.last] = 1
-        if arc.kind == "strip":
-            parts[arc.first : arc.last] = 1
-    rows = np.repeat(np.arange(n), parts)
-    within = np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts)
-    return rows, run.times[rows] + duration[rows] * (within / parts[rows])
 
 
 def _shares(stays: list[tuple[str, float, float]]) -> Shares:

@@ -266,38 +266,28 @@ def draw_panel(axis: Axes, runs: Sequence[Curves], names: Sequence[str], view: V
     axis.set_xlim(start - 0.008 * (end - start), end + 0.008 * (end - start))  # room for markers at the ends
     axis.set_ylim(low, high)
     if Strip.of(runs, [""] * len(runs)) is None and len(runs) == 1:
-        _draw_bands(axis, runs[0])
+        first = runs[0]
+        for mode, fill in fills(first.modes).items():
+            spans = [(begin, end - begin) for name, begin, end in first.bands if name == mode]
+            axis.broken_barh(spans, (0, 1), label=mode, transform=axis.get_xaxis_transform(), zorder=0, **fill)
     _draw_guards(axis, runs, guards, moving, tall)
     several = [(run, name) for run in runs for name in names]
     each = looks(len(several)) if len(runs) == 1 else [look for look in looks(len(runs)) for _ in names]
     for (run, name), look in zip(several, each, strict=True):
-        _draw_curve(axis, run, name, look, (start, end, low, high), len(several) <= MOST_MARKED)
+        values, time = run.column(name), run.samples.time
+        x, y = line(time, values, run.begins, (start, end, low, high))
+        wide: Look = {"linewidth": 1.3, **look}
+        axis.plot(x, y, rasterized=len(x) > 60_000, label=name, **wide)
+        if len(several) <= MOST_MARKED:
+            mark_jumps(axis, time, values, run.jumps_of(name), look["color"])
+        if len(time) == 1:
+            axis.plot(time, values, "o", color=look["color"], markersize=4)
+        if run.ends_badly:
+            colour = ALARM if look["color"] == INK else look["color"]  # of several runs each has its own
+            axis.axvline(run.span[1], color=colour, linewidth=1.2, linestyle=look["linestyle"])
     whole_ticks(axis.yaxis, np.concatenate([run.column(name) for run, name in several]))
     if not any(run.has_values(name) for run, name in several):
         axis.text(0.5, 0.5, "no value in this run", transform=axis.transAxes, ha="center", va="center", color=FAINT)
-
-
-def _draw_bands(axis: Axes, run: Curves) -> None:
-    """Draw a band for each stay in a mode."""
-    for mode, fill in fills(run.modes).items():
-        spans = [(begin, end - begin) for name, begin, end in run.bands if name == mode]
-        axis.broken_barh(spans, (0, 1), label=mode, transform=axis.get_xaxis_transform(), zorder=0, **fill)
-
-
-def _draw_curve(
-    axis: Axes, run: Curves, name: str, look: Look, ends: tuple[float, float, float, float], marked: bool
-) -> None:
-    values, time = run.column(name), run.samples.time
-    x, y = line(time, values, run.begins, ends)
-    wide: Look = {"linewidth": 1.3, **look}
-    axis.plot(x, y, rasterized=len(x) > 60_000, label=name, **wide)
-    if marked:
-        mark_jumps(axis, time, values, run.jumps_of(name), look["color"])
-    if len(time) == 1:
-        axis.plot(time, values, "o", color=look["color"], markersize=4)
-    if run.ends_badly:
-        colour = ALARM if look["color"] == INK else look["color"]  # of several runs each has its own
-        axis.axvline(run.span[1], color=colour, linewidth=1.2, linestyle=look["linestyle"])
 
 
 def _raise_of(axis: Axes) -> float:

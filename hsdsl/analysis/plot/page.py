@@ -34,33 +34,25 @@ def page(runs: Sequence[Execution], view: View) -> str:
     modes = list(dict.fromkeys(m for run, drawn in pairs_of for m in (*(a.mode for a in run.arcs), *drawn.modes)))
     kept = [thinned(drawn, columns, NUMBERS // len(runs)) for drawn in data]
     title = escape(visible(view.title or ", ".join(dict.fromkeys(map(words.heading, runs)))))
+    ends = [visible(words.stop(run)) for run in runs]
+    facts = ends[0] if len(runs) == 1 else f"{len(runs)} runs"
+    drawn, points = sum(map(len, kept)), sum(len(each.samples) for each in data)
+    sections: list[str] = []
+    for run, label in zip(runs, labels, strict=True):
+        heading = f"<h2>{escape(visible(label))}</h2>\n" if len(runs) > 1 else ""
+        sections.append(f"<section>{heading}{html(run)}</section>")
+    graph = view.program and mode_graph.mode_graph(view.program, runs[0] if len(runs) == 1 else None)
     parts = {
         "title": title,
         "style": shared("page.css") + mode_graph.CSS,
-        "facts": _facts(runs, data, kept),
+        "facts": escape(facts + (f"; {drawn:,} of {points:,} points are drawn" if drawn < points else "")),
         "pictures": shared("pictures.html"),
-        "summaries": _summaries(runs, labels, view),
+        "summaries": "\n".join([*sections, graph or ""]),
         "model": inert(_model(view, columns, shown, pairs, modes) | {"moving": list(_moving(view, data))}),
         "runs": inert([_run(*one, columns, modes) for one in zip(runs, data, kept, map(visible, labels), strict=True)]),
         "script": "\n".join([scripts(), shared("runs.js")]),
     }
     return filled(shared("runs.html"), parts)
-
-
-def _facts(runs: Sequence[Execution], data: Sequence[Curves], kept: Sequence[Array]) -> str:
-    ends = [visible(words.stop(run)) for run in runs]
-    facts = ends[0] if len(runs) == 1 else f"{len(runs)} runs"
-    drawn, points = sum(map(len, kept)), sum(len(each.samples) for each in data)
-    return escape(facts + (f"; {drawn:,} of {points:,} points are drawn" if drawn < points else ""))
-
-
-def _summaries(runs: Sequence[Execution], labels: Sequence[str], view: View) -> str:
-    parts: list[str] = []
-    for run, label in zip(runs, labels, strict=True):
-        heading = f"<h2>{escape(visible(label))}</h2>\n" if len(runs) > 1 else ""
-        parts.append(f"<section>{heading}{html(run)}</section>")
-    graph = view.program and mode_graph.mode_graph(view.program, runs[0] if len(runs) == 1 else None)
-    return "\n".join([*parts, graph or ""])
 
 
 def _model(view: View, columns: list[str], shown: list[str], pairs: Sequence[Pair], modes: list[str]) -> dict[str, Any]:

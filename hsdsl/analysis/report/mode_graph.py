@@ -63,11 +63,15 @@ def _picture(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int]
     parts = [_begin(layout.boxes[first])]
     parts += [_edge(k, line, count) for k, (line, count) in enumerate(zip(layout.lines, made, strict=True), start=1)]
     for mode, lines, box in zip(program.modes, texts, layout.boxes, strict=True):
-        parts.append(_box(lines, box, mode.name in visited, mode.final))
-    return _svg(layout, parts)
-
-
-def _svg(layout: Layout, parts: Sequence[str]) -> str:
+        kind = "box" if mode.name in visited else "box unused"
+        borders = [_border(box, kind, inset) for inset in ((0, 3) if mode.final else (0,))]
+        top = box.y + (box.height - len(lines) * PITCH) / 2 + SIZE
+        x, kinds = f"{box.x + INSIDE:.1f}", ["name", *(["line"] * (len(lines) - 1))]
+        rows = [
+            f'<text class="{kind}" x="{x}" y="{top + i * PITCH:.1f}">{escape(line)}</text>'
+            for i, (kind, line) in enumerate(zip(kinds, lines, strict=True))
+        ]
+        parts.append("".join([*borders, *rows]))
     arrow = '<path d="M0 0L9 4L0 8z" {}/></marker>'
     markers = "".join(
         f'<marker id="{name}" viewBox="0 0 9 8" refX="9" refY="4" markerWidth="9" markerHeight="8" orient="auto" '
@@ -93,19 +97,6 @@ def _lines(mode: ModeProgram, with_flow: bool) -> list[str]:
     return [shown(mode.name, LONGEST), *(shown(line, LONGEST) for line in flow)]
 
 
-def _box(lines: Sequence[str], box: Box, visited: bool, final: bool) -> str:
-    """A box with its lines; a final mode has two borders, one that the run did not visit is dashed."""
-    kind = "box" if visited else "box unused"
-    borders = [_border(box, kind, inset) for inset in ((0, 3) if final else (0,))]
-    top = box.y + (box.height - len(lines) * PITCH) / 2 + SIZE
-    x, kinds = f"{box.x + INSIDE:.1f}", ["name", *(["line"] * (len(lines) - 1))]
-    rows = [
-        f'<text class="{kind}" x="{x}" y="{top + i * PITCH:.1f}">{escape(line)}</text>'
-        for i, (kind, line) in enumerate(zip(kinds, lines, strict=True))
-    ]
-    return "".join([*borders, *rows])
-
-
 def _border(box: Box, kind: str, inset: int) -> str:
     place = f'x="{box.x + inset:.1f}" y="{box.y + inset:.1f}"'
     size = f'width="{box.width - 2 * inset:.1f}" height="{box.height - 2 * inset:.1f}"'
@@ -124,11 +115,6 @@ def _edge(number: int, line: Line, made: int) -> str:
     side = 1 if line.arc or x1 > x else -1
     badge = f'<circle class="badge{"" if made else " never"}" cx="{x + side * 20:.1f}" cy="{y:.1f}" r="{BADGE}"/>'
     text = f'<text class="number" x="{x + side * 20:.1f}" y="{y + 3.5:.1f}">{number}</text>'
-    return f'<path class="{kind}" marker-end="url(#{marker})" d="{_path(line, side)}"/>{badge}{text}'
-
-
-def _path(line: Line, side: int) -> str:
-    """Cubic pieces that are level at all points; the first begins with a level stretch that the number is on."""
     x, y = line.points[0]
     start = x + side * 32
     path = [f"M{x:.1f} {y:.1f}H{start:.1f}"]
@@ -141,7 +127,7 @@ def _path(line: Line, side: int) -> str:
             middle = (x + x1) / 2
             path.append(f"C{middle:.1f} {y:.1f} {middle:.1f} {y1:.1f} {x1:.1f} {y1:.1f}")
         x, y = x1, y1
-    return "".join(path)
+    return f'<path class="{kind}" marker-end="url(#{marker})" d="{"".join(path)}"/>{badge}{text}'
 
 
 def _table(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int] | None) -> str:
@@ -195,7 +181,10 @@ def laid_out(sizes: Sequence[tuple[float, float]], edges: Sequence[tuple[int, in
     ranks = _ranks(len(sizes), edges, first)
     paths, columns = _with_waypoints(ranks, edges)
     _order(columns, paths)
-    ends = _ends(ranks, edges)
+    ends: dict[tuple[int, int], int] = {}
+    for a, b in edges:
+        for v, side in zip((a, b), _sides(ranks, a, b), strict=True):
+            ends[v, side] = ends.get((v, side), 0) + 1
     heights = {v: max(h, PORT * (max(ends.get((v, -1), 0), ends.get((v, 1), 0)) + 1)) for v, (_, h) in enumerate(sizes)}
     tallest = max(sum(heights.get(v, PASSAGE) + GAP for v in column) for column in columns)
     middle: dict[int, float] = {}
@@ -210,8 +199,24 @@ def laid_out(sizes: Sequence[tuple[float, float]], edges: Sequence[tuple[int, in
             y += height + GAP
         x += width + CHANNEL + 8.0 * sum(min(ranks[a], ranks[b]) == rank for a, b in edges)
     boxes = [Box(left[v], middle[v] - heights[v] / 2, w, heights[v]) for v, (w, _) in enumerate(sizes)]
-    lines = _routed(boxes, edges, ranks, paths, middle, left)
-    return Layout(tuple(boxes), lines, max(b.x + b.width for b in boxes) + CHANNEL, tallest + GAP)
+    # The points of each line: its ends are spread over the sides of boxes, in the order of where they lead
+    at_side: dict[tuple[int, int], list[tuple[float, int, int]]] = {}
+    for k, (a, b) in enumerate(edges):
+        sides = _sides(ranks, a, b)
+        for end, (v, side) in enumerate(zip((a, b), sides, strict=True)):
+            leads_to = paths[k][1 if end == 0 else -2]
+            at_side.setdefault((v, side), []).append((middle[leads_to], k, end))
+    port: dict[tuple[int, int], tuple[float, float]] = {}
+    for (v, side), found in at_side.items():
+        box = boxes[v]
+        for i, (_, k, end) in enumerate(sorted(found)):
+            y = box.y + box.height * (i + 1) / (len(found) + 1)
+            port[k, end] = (box.x + (box.width if side > 0 else 0.0), y)
+    lines: list[Line] = []
+    for k, (a, b) in enumerate(edges):
+        passed = [(left[v], middle[v]) for v in paths[k][1:-1]]
+        lines.append(Line((port[k, 0], *passed, port[k, 1]), ranks[a] == ranks[b]))
+    return Layout(tuple(boxes), tuple(lines), max(b.x + b.width for b in boxes) + CHANNEL, tallest + GAP)
 
 
 def _ranks(count: int, edges: Sequence[tuple[int, int]], first: int) -> list[int]:
@@ -271,47 +276,10 @@ def _order(columns: list[list[int]], paths: list[list[int]]) -> None:
             columns[rank].sort(key=mean)
 
 
-def _ends(ranks: list[int], edges: Sequence[tuple[int, int]]) -> dict[tuple[int, int], int]:
-    """How many lines end at each side (-1 left, 1 right) of each box."""
-    ends: dict[tuple[int, int], int] = {}
-    for a, b in edges:
-        for v, side in zip((a, b), _sides(ranks, a, b), strict=True):
-            ends[v, side] = ends.get((v, side), 0) + 1
-    return ends
-
-
 def _sides(ranks: list[int], a: int, b: int) -> tuple[int, int]:
     if ranks[a] == ranks[b]:
         return 1, 1
     return (1, -1) if ranks[a] < ranks[b] else (-1, 1)
-
-
-def _routed(
-    boxes: Sequence[Box],
-    edges: Sequence[tuple[int, int]],
-    ranks: list[int],
-    paths: list[list[int]],
-    middle: dict[int, float],
-    left: dict[int, float],
-) -> tuple[Line, ...]:
-    """The points of each line: its ends are spread over the sides of boxes, in the order of where they lead."""
-    at_side: dict[tuple[int, int], list[tuple[float, int, int]]] = {}
-    for k, (a, b) in enumerate(edges):
-        sides = _sides(ranks, a, b)
-        for end, (v, side) in enumerate(zip((a, b), sides, strict=True)):
-            leads_to = paths[k][1 if end == 0 else -2]
-            at_side.setdefault((v, side), []).append((middle[leads_to], k, end))
-    port: dict[tuple[int, int], tuple[float, float]] = {}
-    for (v, side), found in at_side.items():
-        box = boxes[v]
-        for i, (_, k, end) in enumerate(sorted(found)):
-            y = box.y + box.height * (i + 1) / (len(found) + 1)
-            port[k, end] = (box.x + (box.width if side > 0 else 0.0), y)
-    lines: list[Line] = []
-    for k, (a, b) in enumerate(edges):
-        passed = [(left[v], middle[v]) for v in paths[k][1:-1]]
-        lines.append(Line((port[k, 0], *passed, port[k, 1]), ranks[a] == ranks[b]))
-    return tuple(lines)
 
 
 def visited_part(program: Program, run: Execution | None) -> Program:

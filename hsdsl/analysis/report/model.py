@@ -44,9 +44,10 @@ def model_html(system: HybridSystem, program: Program) -> str:
     more = [f"<p>{left} more modes</p>"] if left > 0 else []
     rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts]
     inputs = [f"{_said(given.name)} is an input of {counted(len(given.times), 'sample')}" for given in system.inputs]
+    given = [(p.name, p.text, p.unit or "", p.about or "") for p in system.parameters]
     parts = [
         heading,
-        _parameters(system),
+        _table(("parameter", "value", "unit", "meaning"), given),
         _table(("part", "modes", "starts in"), rows),
         _list([*inputs, *_definitions(system, None, math)]),
         mode_graph.graph_of(visited_part(program, None)),
@@ -69,11 +70,6 @@ def _start(system: HybridSystem, math: Mathematics) -> str:
     values += ", ..." if len(start) > MOST_ROWS else ""
     where = "" if system.parts else f" in {_said(initial.mode)}"
     return f"starts{where}{' at ' if values else ''}{values}, until {until}"
-
-
-def _parameters(system: HybridSystem) -> str:
-    rows = [(p.name, p.text, p.unit or "", p.about or "") for p in system.parameters]
-    return _table(("parameter", "value", "unit", "meaning"), rows)
 
 
 def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

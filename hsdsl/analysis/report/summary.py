@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from html import escape
 
 from hsdsl.analysis.report import words
@@ -66,22 +66,17 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
         yield "No transitions."
         return
     rows, cut, left_out = words.table(execution, limit)
-    cells = list(zip(words.COLUMNS, *rows, strict=True))
-    *aligned, notes = [column for column in cells if set(column[1:]) != {"-"} or column[0] != "delay"]
-    for i, (line, note) in enumerate(zip(_aligned(aligned), notes, strict=True)):
-        yield from _row(line, note, columns)
-        if i == cut and left_out:
-            yield f"   ... {left_out} more ..."
-
-
-def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
-    """Set columns side by side, those of numbers flush right."""
+    known = zip(words.COLUMNS, *rows, strict=True)
+    *aligned, notes = [column for column in known if set(column[1:]) != {"-"} or column[0] != "delay"]
     cells: list[list[str]] = []
-    for column in ([shown(cell, None) for cell in column] for column in table):
+    for column in ([shown(cell, None) for cell in column] for column in aligned):
         wide = max(len(cell) for cell in column)
         right = column[0] in ("#", "time", "delay")
         cells.append([cell.rjust(wide) if right else cell.ljust(wide) for cell in column])
-    return ["  ".join(row) for row in zip(*cells, strict=True)]
+    for i, (row, note) in enumerate(zip(zip(*cells, strict=True), notes, strict=True)):
+        yield from _row("  ".join(row), note, columns)
+        if i == cut and left_out:
+            yield f"   ... {left_out} more ..."
 
 
 def _row(line: str, note: str, columns: int) -> list[str]:

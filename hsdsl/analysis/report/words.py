@@ -229,16 +229,11 @@ def _joined(form: str, alike: Sequence[str]) -> str:
         if moves and _WHEN.fullmatch(piece):
             times += [text for column in own for text in column]
         else:
-            kept += _filled(piece, own)
+            first, *rest = piece.split(_MARK)
+            texts = [_span(column, first if k == 0 else rest[k - 1]) for k, column in enumerate(own)]
+            kept += first + "".join(text + after for text, after in zip(texts, rest, strict=True))
     when = f" between t = {_least(times)} and {_largest(times)}" if times else ""
     return f"{len(alike)} times{when}: {kept.strip()}"
-
-
-def _filled(piece: str, columns: Sequence[Sequence[str]]) -> str:
-    """A piece of a sentence with the span of each number."""
-    first, *rest = piece.split(_MARK)
-    texts = [_span(column, first if k == 0 else rest[k - 1]) for k, column in enumerate(columns)]
-    return first + "".join(text + after for text, after in zip(texts, rest, strict=True))
 
 
 def _span(column: Sequence[str], before: str) -> str:

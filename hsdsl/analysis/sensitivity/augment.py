@@ -75,7 +75,19 @@ class _Writer:
         self.base, self.labels, self.entries = given.system, [t.label for t in by], entries
         self.implicit, self.ends_at_rest = implicit, any(not mode.states for mode in self.base.modes)
         self.of = Derivatives(given, by)
-        self.start = self._start(given, by)
+        # The derivatives of the initial state that are not zero
+        found: dict[tuple[str, int], sp.Expr] = {}
+        earlier: list[sp.Symbol] = []
+        for name, value in given.system.initial.in_order:
+            (row,) = slopes([value], [*self.of.moving, *earlier])
+            earlier.append(symbol(name))
+            for k, target in enumerate(by):
+                through = (row[x] * found.get((x.name, k), sp.S.Zero) for x in earlier if x in row)
+                slope = sp.S.Zero if name in given.placed else sp.Add(self.of.by(row, k), *through)
+                slope = sp.S.One if target.initial and target.name == name else slope
+                if slope != 0:
+                    found[name, k] = slope
+        self.start = found
         self.dependence = Dependence(self.of, self.start, self.base.initial.mode)
         self.columns = self.of.columns
         self.flowing = {m.name: [x for x, f in zip(m.states, m.flow, strict=True) if f != 0] for m in self.base.modes}
@@ -109,21 +121,6 @@ class _Writer:
             reference=(),
             scene=(),
         )
-
-    def _start(self, given: Overridden, by: Sequence[Target]) -> dict[tuple[str, int], sp.Expr]:
-        """The derivatives of the initial state that are not zero."""
-        found: dict[tuple[str, int], sp.Expr] = {}
-        earlier: list[sp.Symbol] = []
-        for name, value in given.system.initial.in_order:
-            (row,) = slopes([value], [*self.of.moving, *earlier])
-            earlier.append(symbol(name))
-            for k, target in enumerate(by):
-                through = (row[x] * found.get((x.name, k), sp.S.Zero) for x in earlier if x in row)
-                slope = sp.S.Zero if name in given.placed else sp.Add(self.of.by(row, k), *through)
-                slope = sp.S.One if target.initial and target.name == name else slope
-                if slope != 0:
-                    found[name, k] = slope
-        return found
 
     def _states(self, mode: str, names: Sequence[str]) -> Iterator[str]:
         """The states of a mode: the model's, their derivatives, those of the last transition's time."""
@@ -228,16 +225,6 @@ class _Writer:
         reset = (*edge.reset, *further)
         return replace(edge, target_states=states, reset=reset, reset_texts=texts, derived=len(further))
 
-    def _rate(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
-        """The rate at which a guard is crossed; 0 where an error of the run decides whether it is.
-
-        A surface that rises at the rate a and bends by b stays crossed while it moves by less than a**2 / (2 |b|).
-        """
-        (bends,) = self.of.rows([jump.rate], mode.states)
-        rate = self.of.along(jump.guard, mode, self._slopes(mode))
-        margin = rate**2 - 2 * _size(self.of.along(bends, mode)) * symbol(ERROR) * self._sizes(mode, edge, jump)
-        return below(-margin, 0, rate, sp.S.Zero)
-
     def _sizes(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
         """The sizes of the numbers that a guard is computed from."""
         guard, surface = jump.guard, edge.surface
@@ -248,10 +235,18 @@ class _Writer:
     def _shifts(self, mode: Mode, edge: Edge, jump: Jump) -> list[sp.Expr]:
         """How fast the time of a transition moves, by each target."""
         moved = [-self._total(jump.guard, mode, k) for k in self.columns]
-        crossing = self._rate(mode, edge, jump)
+        # The rate at which a guard is crossed; 0 where an error of the run decides whether it is. A surface that
+        # rises at the rate a and bends by b stays crossed while it moves by less than a**2 / (2 |b|)
+        (bends,) = self.of.rows([jump.rate], mode.states)
+        rate = self.of.along(jump.guard, mode, self._slopes(mode))
+        margin = rate**2 - 2 * _size(self.of.along(bends, mode)) * symbol(ERROR) * self._sizes(mode, edge, jump)
+        crossing = below(-margin, 0, rate, sp.S.Zero)
         if not self.entries or edge.condition is not None:
             return [m / crossing for m in moved]
-        beyond, tie = self._beyond(mode, edge, jump), self._tie()
+        # 1 where the state is beyond the guard by more than round-off, or on it and does not move; else 0
+        bound = 32 * symbol(UNIT) * self._sizes(mode, edge, jump) + 2 * self._tie() * _size(jump.rate)
+        moves = below(-_size(jump.rate), 0, sp.S.Zero, sp.S.One)
+        beyond, tie = below(bound - edge.surface.residual, 0, sp.S.One, moves), self._tie()
         earlier = maximum(sign(TIME - symbol(LAST) - tie), sp.S.Zero)  # 1 where an input's jump is what fires it
         known = self._shifting(mode.name)
         before = [symbol(shift_name(self.labels[k])) * (1 - earlier) if k in known else sp.S.Zero for k in self.columns]
@@ -260,12 +255,6 @@ class _Writer:
 
     def _tie(self) -> sp.Expr:
         return sp.Rational(1, 10**12) * (TIME + symbol(SPAN))
-
-    def _beyond(self, mode: Mode, edge: Edge, jump: Jump) -> sp.Expr:
-        """1 where the state is beyond the guard by more than round-off, or on it and does not move; else 0."""
-        bound = 32 * symbol(UNIT) * self._sizes(mode, edge, jump) + 2 * self._tie() * _size(jump.rate)
-        moves = below(-_size(jump.rate), 0, sp.S.Zero, sp.S.One)
-        return below(bound - edge.surface.residual, 0, sp.S.One, moves)
 
 
 def _size(term: sp.Expr) -> sp.Expr:

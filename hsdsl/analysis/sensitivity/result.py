@@ -467,7 +467,11 @@ def _lines(found: Sensitivity, parts: Sequence[str]) -> Iterator[str]:
         table = [[str(t.index), t.edge, number(t.time, 10), *map(_slope, d.time.values())] for t, d in rows]
         yield from _table("transition times", ["#", "edge", "time", *_heads(found)], table)
     if "outputs" in parts:
-        yield from _samples(found)
+        samples = found.sample()
+        for name, values in samples.values.items():
+            columns = zip(samples.times.tolist(), values.tolist(), samples.slopes[name].tolist(), strict=True)
+            lines = [[number(t, 10), number(v, 10), *map(_slope, row)] for t, v, row in columns]
+            yield from _table(name, ["t", "value", *_heads(found)], lines)
 
 
 def _final(found: Sensitivity) -> Iterator[str]:
@@ -476,14 +480,6 @@ def _final(found: Sensitivity) -> Iterator[str]:
     rows += [[x, number(run.final.state[x], 10), *map(_slope, row.values())] for x, row in seen(end.state).items()]
     rows += [[y, number(run.final.outputs[y], 10), *map(_slope, row.values())] for y, row in end.outputs.items()]
     yield from _table(f"end of the run, mode {end.mode}", ["", "value", *_heads(found)], rows)
-
-
-def _samples(found: Sensitivity) -> Iterator[str]:
-    table = found.sample()
-    for name, values in table.values.items():
-        columns = zip(table.times.tolist(), values.tolist(), table.slopes[name].tolist(), strict=True)
-        rows = [[number(t, 10), number(v, 10), *map(_slope, row)] for t, v, row in columns]
-        yield from _table(name, ["t", "value", *_heads(found)], rows)
 
 
 def _heads(found: Sensitivity) -> list[str]:

@@ -78,7 +78,16 @@ def load(path: str | os.PathLike[str]) -> Execution:
         raise UsageError(f"{name} is not an .npz file: only those hold a whole execution")
     try:
         with open_regular(path) as file:
-            _check_whole(file)
+            size = file.seek(0, os.SEEK_END)
+            file.seek(0)
+            beginning = file.read(len(_BEGINNING))
+            if not zipfile.is_zipfile(file):
+                cut = size < len(_BEGINNING) or beginning == _BEGINNING
+                raise UsageError(_DAMAGED, "its end is missing: copy it again" if cut else None)
+            with zipfile.ZipFile(file) as archive:
+                if sum(member.file_size for member in archive.infolist()) > size or archive.testzip() is not None:
+                    raise UsageError(_DAMAGED)
+            file.seek(0)
             with np.load(file, allow_pickle=False) as archive:
                 return _read(archive)
     except UsageError as error:
@@ -89,22 +98,6 @@ def load(path: str | os.PathLike[str]) -> Execution:
         raise UsageError(f"cannot read {name}: it does not fit into memory") from None
     except Exception:  # what NumPy and the readers of ZIP and JSON raise for bytes that are none of theirs has no end
         raise UsageError(f"cannot read {name}: {_DAMAGED}") from None
-
-
-def _check_whole(file: BinaryIO) -> None:
-    """Refuse what is no archive, has lost its end, unfolds to more than it is (ours are not compressed), or whose
-    checksums are wrong.
-    """
-    size = file.seek(0, os.SEEK_END)
-    file.seek(0)
-    beginning = file.read(len(_BEGINNING))
-    if not zipfile.is_zipfile(file):
-        cut = size < len(_BEGINNING) or beginning == _BEGINNING
-        raise UsageError(_DAMAGED, "its end is missing: copy it again" if cut else None)
-    with zipfile.ZipFile(file) as archive:
-        if sum(member.file_size for member in archive.infolist()) > size or archive.testzip() is not None:
-            raise UsageError(_DAMAGED)
-    file.seek(0)
 
 
 def _read(archive: Mapping[str, Array]) -> Execution:

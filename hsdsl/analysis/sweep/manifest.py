@@ -325,32 +325,6 @@ def _columns(manifest: Manifest, first: int, ensemble: Ensemble) -> Iterator[tup
     count = ensemble.stop.size
     yield "row", np.arange(first, first + count)
     yield "stop", ensemble.stop
-    yield from _words(manifest, ensemble)
-    yield "time", ensemble.time
-    yield "mode", ensemble.mode
-    yield "transitions", ensemble.transitions
-    yield from ((f"final.{name}", column) for name, column in (ensemble.state | ensemble.outputs).items())
-    made = ensemble.transition_table
-    if made is not None:
-        yield "transition.time", (made.first, made.time)
-        yield "transition.name", (made.first, made.edge)
-        for side, states in (("before", made.before), ("after", made.after)):
-            yield from ((f"{side}.{name}", (made.first, column)) for name, column in states.items())
-    yield from ((f"sample.{name}", column) for name, column in _sample_columns(ensemble).items())
-
-
-def _sample_columns(ensemble: Ensemble) -> dict[str, tuple[Array, Array]]:
-    """Samples up to the end of each run, one behind the other."""
-    times = ensemble.sample_times
-    with np.errstate(invalid="ignore"):
-        inside = times <= (ensemble.time * (1 + TIE))[:, None]
-    first = np.concatenate([[0], np.cumsum(inside.sum(axis=1))])
-    columns = ensemble.samples | {"time": times}
-    return {name: (first, column[inside]) for name, column in columns.items()}
-
-
-def _words(manifest: Manifest, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
-    """Messages of failures, and verdicts."""
     count, judged = ensemble.stop.size, manifest.recording.verdict
     messages, verdicts, reasons = (np.full(count, None, object) for _ in range(3))
     warnings = ensemble.warnings.astype(object)
@@ -372,6 +346,27 @@ def _words(manifest: Manifest, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
     yield "verdict", verdicts
     yield "warnings", warnings
     yield "verdict.reasons", reasons
+    yield "time", ensemble.time
+    yield "mode", ensemble.mode
+    yield "transitions", ensemble.transitions
+    yield from ((f"final.{name}", column) for name, column in (ensemble.state | ensemble.outputs).items())
+    made = ensemble.transition_table
+    if made is not None:
+        yield "transition.time", (made.first, made.time)
+        yield "transition.name", (made.first, made.edge)
+        for side, states in (("before", made.before), ("after", made.after)):
+            yield from ((f"{side}.{name}", (made.first, column)) for name, column in states.items())
+    yield from ((f"sample.{name}", column) for name, column in _sample_columns(ensemble).items())
+
+
+def _sample_columns(ensemble: Ensemble) -> dict[str, tuple[Array, Array]]:
+    """Samples up to the end of each run, one behind the other."""
+    times = ensemble.sample_times
+    with np.errstate(invalid="ignore"):
+        inside = times <= (ensemble.time * (1 + TIE))[:, None]
+    first = np.concatenate([[0], np.cumsum(inside.sum(axis=1))])
+    columns = ensemble.samples | {"time": times}
+    return {name: (first, column[inside]) for name, column in columns.items()}
 
 
 NAMED, LATEST = 3, 64  # transitions that a reason names, and the last ones, among which they are sought

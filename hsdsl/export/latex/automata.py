@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from hsdsl.export.automata import Automata, Automaton, Pairs, automata_of, pairs
+from hsdsl.export.automata import Automaton, Pairs, automata_of, pairs
 from hsdsl.export.latex.mathematics import Mathematics, equations, escaped, stacked
 from hsdsl.export.source import Source
 
@@ -17,7 +17,21 @@ def of_parts(source: Source, math: Mathematics) -> Iterator[str]:
     yield from [r"\subsection*{Definitions}", *_defined(lets, math)] if lets else []
     for automaton in found.automata:
         yield from _automaton(automaton, math)
-    yield from _instances(found, math)
+    yield from [r"\subsection*{Instances}", r"\begin{itemize}"]
+    for group in found.groups:
+        initial = group.given.initial
+        mode = f", starting in mode {escaped(initial.mode.value)}" if initial and initial.mode else ""
+        extra = pairs(initial.__pydantic_extra__ or {}) if initial else []
+        rows = [(math.symbol(name), math.expression(text)) for name, text in pairs(group.given.inputs)]
+        rows += [(math.symbol(name), math.expression(text)) for name, text in pairs(group.given.parameters)]
+        rows += [(rf"{math.symbol(name)}(0)", math.expression(text)) for name, text in extra]
+        colon = ":" if rows else "."
+        kind = escaped(group.given.automaton.value)
+        yield rf"\item \textbf{{{escaped(group.label)}}}, of the automaton {kind}{mode}{colon}"
+        yield from equations(rows)
+        if group.ends:
+            yield from ["Beyond its ends", *_defined(group.ends, math)]
+    yield r"\end{itemize}"
     outputs = pairs(found.document.outputs)
     yield from [r"\subsection*{Outputs}", *_defined(outputs, math)] if outputs else []
 
@@ -55,36 +69,14 @@ def _mode(name: str, mode: Any, math: Mathematics) -> Iterator[str]:
     if mode.transitions:
         yield r"\begin{itemize}"
         for made in mode.transitions:
-            yield from _transition(name, made, math)
+            label = rf"\textbf{{{escaped(made.name.value)}}} " if made.name else ""
+            fires = rf"when \({math.inequality(made.when.value)}\) is reached" if made.when else ""
+            fires = fires or rf"together with \texttt{{{escaped(made.on.value)}}}"
+            condition = rf" while \({math.condition(made.condition.value)}\)" if made.condition else ""
+            changed = [(rf"{math.symbol(state)}^{{+}}", math.expression(text)) for state, text in pairs(made.reset)]
+            target = made.target or name
+            priority = f", with priority {made.priority}" if made.priority else ""
+            yield rf"\item {label}to {escaped(target)}, {fires}{condition}{priority}" + (":" if changed else ".")
+            yield from equations(changed)
         yield r"\end{itemize}"
     yield ""
-
-
-def _transition(mode: str, made: Any, math: Mathematics) -> Iterator[str]:
-    label = rf"\textbf{{{escaped(made.name.value)}}} " if made.name else ""
-    fires = rf"when \({math.inequality(made.when.value)}\) is reached" if made.when else ""
-    fires = fires or rf"together with \texttt{{{escaped(made.on.value)}}}"
-    condition = rf" while \({math.condition(made.condition.value)}\)" if made.condition else ""
-    changed = [(rf"{math.symbol(state)}^{{+}}", math.expression(text)) for state, text in pairs(made.reset)]
-    target = made.target or mode
-    priority = f", with priority {made.priority}" if made.priority else ""
-    yield rf"\item {label}to {escaped(target)}, {fires}{condition}{priority}" + (":" if changed else ".")
-    yield from equations(changed)
-
-
-def _instances(found: Automata, math: Mathematics) -> Iterator[str]:
-    yield from [r"\subsection*{Instances}", r"\begin{itemize}"]
-    for group in found.groups:
-        initial = group.given.initial
-        mode = f", starting in mode {escaped(initial.mode.value)}" if initial and initial.mode else ""
-        extra = pairs(initial.__pydantic_extra__ or {}) if initial else []
-        rows = [(math.symbol(name), math.expression(text)) for name, text in pairs(group.given.inputs)]
-        rows += [(math.symbol(name), math.expression(text)) for name, text in pairs(group.given.parameters)]
-        rows += [(rf"{math.symbol(name)}(0)", math.expression(text)) for name, text in extra]
-        colon = ":" if rows else "."
-        kind = escaped(group.given.automaton.value)
-        yield rf"\item \textbf{{{escaped(group.label)}}}, of the automaton {kind}{mode}{colon}"
-        yield from equations(rows)
-        if group.ends:
-            yield from ["Beyond its ends", *_defined(group.ends, math)]
-    yield r"\end{itemize}"

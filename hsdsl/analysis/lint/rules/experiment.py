@@ -124,7 +124,16 @@ def large_relaxation(subject: Subject) -> Iterator[Finding]:
     if not subject.relaxed or not any(mode.edges for mode in subject.system.modes):
         return
     place, relaxation = (experiment.relaxation or experiment.until).place, subject.relaxation
-    step, until, dwell = subject.setting("step"), subject.setting("until"), _shortest_dwell(subject)
+    gaps: list[Number] = []
+    step, until = subject.setting("step"), subject.setting("until")
+    for reference in subject.document.reference:
+        written = (event if isinstance(event, Scalar) else event.time for event in reference.transitions)
+        times = [time for time in map(subject.read, written) if numeric.finite(time)]
+        ties = (_TIE_OF_WRITTEN_TIMES * max(until or 0, abs(time)) for time in times[1:])
+        gaps += [
+            after - before for (before, after), tie in zip(pairwise(times), ties, strict=True) if after - before > tie
+        ]
+    dwell = min(gaps, default=None)
     if step is not None and relaxation >= step:
         yield Finding(place.span, "the relaxation is not smaller than the step", _SMALLER)
     if numeric.finite(until) and until > 0 and relaxation * 10 >= until:
@@ -132,17 +141,3 @@ def large_relaxation(subject: Subject) -> Iterator[Finding]:
     if dwell is not None and relaxation >= dwell:
         between = f"{float(dwell):.3g}, a time between two transitions of the reference"
         yield Finding(place.span, f"the relaxation is not smaller than {between}", _SMALLER)
-
-
-def _shortest_dwell(subject: Subject) -> Number | None:
-    """The shortest time between two transitions of a reference that are not simultaneous."""
-    gaps: list[Number] = []
-    until = subject.setting("until") or 0
-    for reference in subject.document.reference:
-        written = (event if isinstance(event, Scalar) else event.time for event in reference.transitions)
-        times = [time for time in map(subject.read, written) if numeric.finite(time)]
-        ties = (_TIE_OF_WRITTEN_TIMES * max(until, abs(time)) for time in times[1:])
-        gaps += [
-            after - before for (before, after), tie in zip(pairwise(times), ties, strict=True) if after - before > tie
-        ]
-    return min(gaps, default=None)

@@ -36,11 +36,7 @@ def prepare(name: str, scene: Scene) -> Callable[[float], Result]:
         peer = PEERS[name]
     except ImportError as error:
         raise Refused(f"not installed ({error.name}); pip install 'hsdsl[peers]'") from None
-    return _guarded(peer(scene), scene)
-
-
-def _guarded(run: Callable[[float], Result], scene: Scene) -> Callable[[float], Result]:
-    """Turn an exception of a tool into a failed result, which the chart shows."""
+    run = peer(scene)
     import numpy as np
 
     def guarded(tolerance: float) -> Result:
