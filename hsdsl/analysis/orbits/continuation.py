@@ -26,7 +26,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
-from hsdsl.analysis.orbits.level import Level
+from hsdsl.analysis.orbits.mathematics import Level
 from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, Orbit, multipliers_of
 from hsdsl.analysis.orbits.section import CLOSED, Closed, NoReturn, Return, gap
 from hsdsl.analysis.report.json_form import named, plain

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.analysis.orbits.level import within
+from hsdsl.analysis.orbits.mathematics import within
 from hsdsl.analysis.orbits.section import Closed
 from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import condensed, number, values

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hsdsl.analysis.orbits.level import Level
+from hsdsl.analysis.orbits.mathematics import Level
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.analysis.sensitivity.targets import derivative_name, own, shift_name
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits, applied, uncollected
 from hsdsl.base.names import did_you_mean
-from hsdsl.base.numbers.arithmetic import TIE, Arithmetic, Number
+from hsdsl.base.numbers.arithmetic import FLOAT64, TIE, Arithmetic, Number
 from hsdsl.base.numbers.roundoff import following, moved
 from hsdsl.base.parts import numbered
 from hsdsl.engine import ahead
@@ -222,13 +222,14 @@ class Pipeline:
         call = {"completion": arguments.get("completion")}
         return self.resolve(arguments.get("settings"), call).values["completion"].value == "auto"
 
-    def values(self, arithmetic: Arithmetic) -> Values:
-        """The numbers of the model in an arithmetic, without overrides."""
+    def values(self, arithmetic: Arithmetic = FLOAT64, parameters: Mapping[str, Any] | None = None) -> Values:
+        """The numbers of the model in an arithmetic, with overrides of parameters where there are any."""
         if arithmetic.digits not in self.kernels:
             program = self.program
             with self._stage():
                 self.kernels[arithmetic.digits] = PythonKernel(program, arithmetic)
-        return Values(lambda: self.system, self.program, self.kernels[arithmetic.digits])
+        values = Values(lambda: self.system, self.program, self.kernels[arithmetic.digits])
+        return values if parameters is None else with_parameters(values, parameters)
 
     def _compile(self) -> CompiledModel:
         """Compile the model, once: a failure is kept as well."""
@@ -252,7 +253,7 @@ class Pipeline:
             raise UsageError(f"there is no engine '{engine}'", did_you_mean(engine, ENGINES))
         if options.values["completion"].value == "auto" and self.sliding is not self:
             return self.sliding.prepare(arguments)
-        values = with_parameters(self.values(arithmetic_of(precision)), parameters)
+        values = self.values(arithmetic_of(precision), parameters)
         with applied(None if self._files is None else self._files.limits):
             settings = settings_of(options, values, recorded(parameters, initial, options))
         initial, waiting = waiting_apart(self.program, initial)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping
+from functools import partialmethod
 from typing import Any
 
 from sympy.printing.latex import LatexPrinter
@@ -113,16 +114,15 @@ class _Printer(LatexPrinter):
         text = rf"\left\lfloor{{{self._print(expr.args[0])}}}\right\rfloor"
         return f"{text}^{{{exp}}}" if exp is not None else text
 
-    def _named(self, name: str, expr: Any, exp: Any) -> str:
+    def _named(self, name: str, expr: Any, exp: Any = None) -> str:
         arguments = ", ".join(self._print(argument) for argument in expr.args)
         power = f"^{{{exp}}}" if exp is not None else ""
         return rf"{name}{power}\left({arguments}\right)"
 
-    def _print_minimum(self, expr: Any, exp: Any = None) -> str:
-        return self._named(r"\min", expr, exp)
-
-    def _print_maximum(self, expr: Any, exp: Any = None) -> str:
-        return self._named(r"\max", expr, exp)
+    _print_minimum = partialmethod(_named, r"\min")
+    _print_maximum = partialmethod(_named, r"\max")
+    _print_sign = partialmethod(_named, r"\operatorname{sign}")
+    _print_atan2 = partialmethod(_named, r"\operatorname{atan2}")
 
     def _print_below(self, expr: Any, exp: Any = None) -> str:
         text = self._print_Piecewise(cases(expr))
@@ -133,12 +133,6 @@ class _Printer(LatexPrinter):
 
     def _needs_add_brackets(self, expr: Any) -> bool:
         return isinstance(expr, below) or super()._needs_add_brackets(expr)
-
-    def _print_sign(self, expr: Any, exp: Any = None) -> str:
-        return self._named(r"\operatorname{sign}", expr, exp)
-
-    def _print_atan2(self, expr: Any, exp: Any = None) -> str:
-        return self._named(r"\operatorname{atan2}", expr, exp)
 
 
 def _decimal(p: int, q: int) -> str | None:

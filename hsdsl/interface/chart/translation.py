@@ -15,7 +15,6 @@ import numpy as np
 import sympy as sp
 
 from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
-from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.interface.chart.scene import Array, Refused, Result, Scene
 from hsdsl.language.system import TIME, Edge, Mode
 from hsdsl.mathematics.lower.printer import KernelPrinter
@@ -72,7 +71,7 @@ def translate(scene: Scene) -> PlainModel:
     system = scene.model.system
     if any(hasattr(signal, "times") for signal in system.inputs):
         raise Refused("sampled inputs are not translated")
-    values = with_parameters(scene.model.pipeline.values(FLOAT64), scene.parameters).parameters
+    values = scene.model.pipeline.values(parameters=scene.parameters).parameters
     named = zip(system.parameters, values, strict=True)
     numbers = {sp.Symbol(parameter.name, real=True): sp.Float(value, 17) for parameter, value in named}
     index = {mode.name: k for k, mode in enumerate(system.modes)}

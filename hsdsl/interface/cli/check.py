@@ -160,7 +160,23 @@ class DiagnosticReport:
 
     def finish(self) -> None:
         """Print everything, errors as text to standard error, all else to standard output; exit."""
-        {"json": self._json, "sarif": self._sarif, "github": self._github, "text": self._text}[self.format]()
+        if self.format == "json":
+            errors = [*map(measured, self.errors), *self.refused]
+            content: dict[str, Any] = {"models": self.entries, "errors": errors}
+            if self.success == "clean":
+                content["findings"] = [finding(diagnostic) for diagnostic in self.findings]
+                content["ignored"] = [{**finding(i.diagnostic), "reason": i.reason} for i in self.ignored]
+            print_json(content)
+        elif self.format == "sarif":
+            from hsdsl.analysis.lint.pages import pages, titles
+
+            ignored = [(i.diagnostic, i.reason) for i in self.ignored]
+            print_json(as_sarif([*self.errors, *self.findings], ignored, titles(), pages(), __version__))
+        elif self.format == "github":
+            for diagnostic in (*self.errors, *self.findings):
+                print(as_annotation(diagnostic))
+        else:
+            self._text()
         raise Exit(self.code)
 
     def _text(self) -> None:
@@ -174,21 +190,3 @@ class DiagnosticReport:
         if hidden and self.chatty:
             about = " on the mathematics" if all(code.startswith("HS5") for code in hidden) else ""
             print(f"{counted(len(hidden), 'note')}{about}: hsdsl lint --notes")
-
-    def _json(self) -> None:
-        errors = [*map(measured, self.errors), *self.refused]
-        content: dict[str, Any] = {"models": self.entries, "errors": errors}
-        if self.success == "clean":
-            content["findings"] = [finding(diagnostic) for diagnostic in self.findings]
-            content["ignored"] = [{**finding(i.diagnostic), "reason": i.reason} for i in self.ignored]
-        print_json(content)
-
-    def _github(self) -> None:
-        for diagnostic in (*self.errors, *self.findings):
-            print(as_annotation(diagnostic))
-
-    def _sarif(self) -> None:
-        from hsdsl.analysis.lint.pages import pages, titles
-
-        ignored = [(i.diagnostic, i.reason) for i in self.ignored]
-        print_json(as_sarif([*self.errors, *self.findings], ignored, titles(), pages(), __version__))

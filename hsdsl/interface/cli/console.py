@@ -47,12 +47,7 @@ def prepare() -> None:
 
 def say(text: str) -> None:
     """Write a message of one line to standard error."""
-    say_lines(visible(text))
-
-
-def say_lines(text: str) -> None:
-    """Write several lines to standard error, each of them visible."""
-    print(text, file=sys.stderr)
+    print(visible(text), file=sys.stderr)
 
 
 def print_json(content: Any) -> None:
@@ -106,8 +101,7 @@ def print_errors(errors: Sequence[Diagnostic]) -> None:
     """Print the errors of models as text."""
     from hsdsl.language.diagnose import render
 
-    say_lines("\n\n".join(map(render, errors)))
-    say_lines(f"\n{counted(len(errors), 'error')}")
+    print("\n\n".join(map(render, errors)), f"\n{counted(len(errors), 'error')}", sep="\n", file=sys.stderr)
 
 
 def usage_entry(error: UsageError, path: str | None = None) -> dict[str, Any]:
@@ -119,7 +113,8 @@ def report_usage(error: UsageError, json: bool) -> None:
     """Print what is wrong with a request."""
     if json:
         print_json({"errors": [usage_entry(error)]})
-    say_lines(f"hsdsl: {visible(str(error))}" + (f"\n  hint: {visible(error.hint)}" if error.hint else ""))
+    hint = f"\n  hint: {visible(error.hint)}" if error.hint else ""
+    print(f"hsdsl: {visible(str(error))}{hint}", file=sys.stderr)
 
 
 @contextmanager

@@ -257,13 +257,8 @@ def answering(json: bool, allow_path: AllowPath, limit: Limit) -> Generator[None
         yield
 
 
-def split(overrides: list[str] | None) -> tuple[dict[str, str], dict[str, str], dict[str, str]]:
-    """Parameters, initial values and settings of ``--set``."""
-    from hsdsl.interface.model import split_overrides
-
-    return split_overrides(overrides or ())
-
-
 def values_of(overrides: list[str] | None) -> dict[str, Any]:
     """Parameters, initial values and settings of ``--set``, as arguments of `Model.simulate`."""
-    return dict(zip(("parameters", "initial", "settings"), split(overrides), strict=True))
+    from hsdsl.interface.model import split_overrides
+
+    return dict(zip(("parameters", "initial", "settings"), split_overrides(overrides or ()), strict=True))

@@ -27,7 +27,7 @@ from hsdsl.interface.cli.options import (
     option,
     overriding,
     pairs_of,
-    split,
+    values_of,
 )
 
 if TYPE_CHECKING:
@@ -127,11 +127,11 @@ def distance(
 ) -> None:
     """Measure the distance between two states, or two runs, in the hybrid metric."""
     with answering(json, allow_path, limit):
-        parameters, initial, settings = split(overrides)
-        others: list[Any] = [*(f"initial.{name}" for name in initial), *(f"experiment.{name}" for name in settings)]
+        given = values_of(overrides)
+        others = [f"initial.{name}" for name in given["initial"]] + [f"experiment.{name}" for name in given["settings"]]
         if others:
             raise UsageError(f"a distance depends on parameters alone; --set {others[0]} has no meaning here")
-        options = {"relaxation": relaxation, "parameters": parameters, "hops": hops, "seconds": seconds}
+        options = {"relaxation": relaxation, "parameters": given["parameters"], "hops": hops, "seconds": seconds}
         check_target(plot, "--plot")
         if second is not None:
             if start is not None or end is not None:

@@ -21,7 +21,7 @@ from hsdsl.engine.preparation import automatic
 from hsdsl.engine.preparation.experiment import initial_layout, initial_state, start_of_parts
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.values import Values, arithmetic_of, with_parameters
+from hsdsl.engine.preparation.values import Values, arithmetic_of
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.simulate.verdict.errors import SAFE
 from hsdsl.interface.model.call_cache import CallCache, call_key
@@ -82,7 +82,7 @@ class Differentiator:
         plain = self.pipeline.prepare(call)
         parameters = overrides_of(call, "parameters", self.pipeline.program)
         initial = start_of_parts(self.pipeline.program, overrides_of(call, "initial", self.pipeline.program))
-        values = with_parameters(self.pipeline.values(arithmetic_of(call.get("precision"))), parameters)
+        values = self.pipeline.values(arithmetic_of(call.get("precision")), parameters)
         states, parts = initial_layout(values, initial)[1], values.program.parts
         own = present(parts, {part.name: part.start + 1 for part in parts} | dict(initial))
         by = targets(wrt, self.pipeline.program, [name for name in states if not parts or name in own])

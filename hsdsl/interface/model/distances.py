@@ -27,11 +27,10 @@ from hsdsl.analysis.orbits.sampling import OrbitalStability, directions, sampled
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, checks_arguments, did_you_mean
-from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import check_arguments, overrides_of, parameters_of
 from hsdsl.engine.preparation.pipeline import pipeline_of
-from hsdsl.engine.preparation.values import Values, whole, with_parameters
+from hsdsl.engine.preparation.values import Values, whole
 from hsdsl.engine.simulate.stops import show
 from hsdsl.interface.model.differentiate import LOCATED_ALONE, located_arguments, start_by, varied
 from hsdsl.interface.model.runs import Runs
@@ -143,8 +142,6 @@ class _RunSpace:
 
     @cached_property
     def values(self) -> Values:
-        from hsdsl.engine.preparation.values import with_parameters
-
         model = self.model if isinstance(self.model, Runs) else _load(self.model, self.run)
         if model.system.digest != self.run.digest:
             raise UsageError(
@@ -154,10 +151,9 @@ class _RunSpace:
         if "auto" in (run.settings.get("completion") for run in (self.run, self.other)):
             model = model.sliding
         first, second = (parameters_of(run.overrides) | dict(self.parameters or {}) for run in (self.run, self.other))
-        plain = model.pipeline.values(FLOAT64)
-        values = with_parameters(plain, first)
+        values = model.pipeline.values(parameters=first)
         if first != second:
-            self.note = _differences(values, with_parameters(plain, second))
+            self.note = _differences(values, model.pipeline.values(parameters=second))
         return values
 
     def depth(self, relaxation: Any) -> float:
@@ -301,7 +297,7 @@ def orbital_stability(
     if len(radii) < 2 or not all(0 < b < a for a, b in pairwise(radii)):
         raise UsageError(f"expected at least two radii that fall, got {', '.join(map(str, radii))}")
     call = located_arguments(model.pipeline, arguments)
-    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(call, "parameters", model.program))
+    values = model.pipeline.values(parameters=overrides_of(call, "parameters", model.program))
     by, known = start_by(wrt, call, values)
     run = model.simulate(**call)
     sizes = run.sizes()

@@ -20,7 +20,7 @@ import numpy as np
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import INITIAL
-from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
+from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.base.numbers.columns import Column, varies
 from hsdsl.engine.execution import Array, Ensemble, Execution, Transition, TransitionTable
 from hsdsl.engine.execution.run import columns_by_name
@@ -74,42 +74,42 @@ class PreparedEnsemble:
         kept = Kept(len(self.places), width, len(program.outputs), len(self.names), samples, crossings, logs)
         if plan is None:
             with suppress(KeyboardInterrupt):  # those that are done are kept
-                self._run_in_turn(kept, progress)
+                for i, place in enumerate(self.places):
+                    execution = self.request.run(place)
+                    if execution.stop.reason == "interrupted":
+                        break
+                    self._record(kept, i, execution)
+                    if progress is not None:
+                        progress(i + 1, len(self.places))
         else:
             run_compiled(plan, self.instances, kept, self.names, threads, progress)
         for i in np.flatnonzero(kept.stop == "stuck").tolist():  # only the message of such a run tells its reason
             kept.stop[i] = self.request.run(self.places[i]).stop.reason
         return self._ensemble(kept, time.perf_counter() - began)
 
-    def _run_in_turn(self, kept: Kept, progress: Progress | None) -> None:
-        """Run all instances one after the other, and record each."""
-        for i, place in enumerate(self.places):
-            execution = self.request.run(place)
-            if execution.stop.reason == "interrupted":
-                return
-            last, program = execution.arcs[-1], self.base.program
-            n, end = len(last.states), execution.times[-1]
-            kept.stop[i] = execution.stop.reason
-            modes = program.mode_names
-            kept.noted[i] = execution.noted(execution) if execution.noted else ""
-            kept.mode[i] = modes.index(last.mode)
-            kept.kind[i] = self.kinds.index(last.states)
-            kept.transitions[i] = len(execution.transitions)
-            kept.ended[i] = end
-            kept.final[i, :n] = execution.values[-1, :n]
-            kept.outputs[i] = execution.outputs[-1]
-            times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
-            kept.crossed[i, : len(times)] = times
-            inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
-            samples = execution.sample(self.instances.time[i][inside])
-            for k, name in enumerate(self.names):
-                if name in samples.states:
-                    kept.states[i, k, inside] = samples[name]
-            kept.results[i, inside] = samples.output_columns
-            if kept.logs:
-                kept.log[i] = self._logged(kept.width, execution.transitions)
-            if progress is not None:
-                progress(i + 1, len(self.places))
+    def _record(self, kept: Kept, i: int, execution: Execution) -> None:
+        """Record the execution of an instance."""
+        last, program = execution.arcs[-1], self.base.program
+        n, end = len(last.states), execution.times[-1]
+        kept.stop[i] = execution.stop.reason
+        modes = program.mode_names
+        kept.noted[i] = execution.noted(execution) if execution.noted else ""
+        kept.mode[i] = modes.index(last.mode)
+        kept.kind[i] = self.kinds.index(last.states)
+        kept.transitions[i] = len(execution.transitions)
+        kept.ended[i] = end
+        kept.final[i, :n] = execution.values[-1, :n]
+        kept.outputs[i] = execution.outputs[-1]
+        times = [t.time for t in execution.transitions[: kept.crossed.shape[1]]]
+        kept.crossed[i, : len(times)] = times
+        inside = np.flatnonzero(self.instances.time[i] <= end + TIE * abs(float(end)))
+        samples = execution.sample(self.instances.time[i][inside])
+        for k, name in enumerate(self.names):
+            if name in samples.states:
+                kept.states[i, k, inside] = samples[name]
+        kept.results[i, inside] = samples.output_columns
+        if kept.logs:
+            kept.log[i] = self._logged(kept.width, execution.transitions)
 
     def _logged(self, width: int, transitions: Sequence[Transition]) -> Logged:
         nan, program = float("nan"), self.base.program
@@ -198,7 +198,7 @@ def prepare_ensemble(request: EnsembleRequest) -> PreparedEnsemble:
     """
     model, call = request.model, request.call
     pipeline = model.pipeline
-    table = InstanceTable.of_many(pipeline.values(FLOAT64), math.prod(request.shape))
+    table = InstanceTable.of_many(pipeline.values(), math.prod(request.shape))
     evaluate_parameters(table, call["parameters"], request.arrays(initial=False))
     finite = np.logical_and.reduce([np.isfinite(array) for array in request.varied.values()] or [[True]])
     first = next((k for k in np.flatnonzero(finite).tolist() if k not in table.refused), None)
@@ -248,7 +248,7 @@ def _timelines(
     if not varies(timed, *(column for k, column in enumerate(parameters) if f"p{k}" in decisive)):
         return [base.timeline]
     rows = zip(*(column_of(column, count).tolist() for column in (*parameters, until)), strict=True)
-    return [pipeline.timeline(pipeline.values(FLOAT64), row, end) for *row, end in rows]
+    return [pipeline.timeline(pipeline.values(), row, end) for *row, end in rows]
 
 
 def parameters_of(routines: Routines, name: str) -> set[str]:

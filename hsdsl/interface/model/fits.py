@@ -14,10 +14,8 @@ from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.analysis.sensitivity.targets import Target
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import counted, did_you_mean
-from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.engine.execution import Array
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
-from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.interface.model.differentiate import start_by, varied
 
 if TYPE_CHECKING:
@@ -46,7 +44,7 @@ def fit(
     if starts < 1:
         raise UsageError(f"starts: expected at least 1, got {starts}")
     measured = measurements(data, model.columns)
-    values = with_parameters(model.pipeline.values(FLOAT64), overrides_of(arguments, "parameters", model.program))
+    values = model.pipeline.values(parameters=overrides_of(arguments, "parameters", model.program))
     by, start = start_by(wrt, arguments, values)
     if measured.count < len(by):
         raise UsageError(f"{counted(measured.count, 'measurement')} cannot determine {counted(len(by), 'value')}")

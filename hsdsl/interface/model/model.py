@@ -11,13 +11,11 @@ from typing import TYPE_CHECKING, Any
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits
 from hsdsl.base.names import NO_FILE, called, checks_arguments, checks_methods, visible
-from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import written_modes
 from hsdsl.base.progress import counted, counted_runs, in_notebook
 from hsdsl.engine.execution import Ensemble, Execution
 from hsdsl.engine.preparation.options import arguments_of
 from hsdsl.engine.preparation.pipeline import pipeline_of
-from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.preparation.visible import with_output_function
 from hsdsl.interface.model.runs import Runs, elsewhere
 
@@ -533,7 +531,7 @@ class Model(Runs):
 
         self._flat("a distance of two points")
 
-        values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
+        values = self.pipeline.values(parameters=parameters or {})
         return distance_of_points(values, p, q, metric, relaxation, hops, budget_of(seconds), plot)
 
 

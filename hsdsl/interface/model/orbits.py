@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.analysis.orbits.continuation import CIRCLE, Branch, Follower, branch
+from hsdsl.analysis.orbits.mathematics import PHASE, Level, forced, forcing_period, level_of, quantity, shifted
 from hsdsl.analysis.orbits.orbit import Orbit, judged, multipliers_of, returning
 from hsdsl.analysis.orbits.section import (
     COARSER,
@@ -24,7 +25,7 @@ from hsdsl.analysis.orbits.section import (
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import counted, did_you_mean, without_memory
-from hsdsl.base.numbers.arithmetic import FLOAT64, TIE
+from hsdsl.base.numbers.arithmetic import TIE
 from hsdsl.base.parts import meant_alone, numbers_of, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import check_arguments, overrides_of
@@ -33,7 +34,6 @@ from hsdsl.engine.preparation.values import whole, with_parameters
 from hsdsl.interface.model.differentiate import FINEST, LOCATED_ALONE, located_arguments
 
 if TYPE_CHECKING:
-    from hsdsl.analysis.orbits.level import Level
     from hsdsl.engine.execution import Array
     from hsdsl.interface.model.runs import Runs
 
@@ -85,8 +85,6 @@ class Orbits:
         arguments: Mapping[str, Any],
         keep: str | None = None,
     ) -> None:
-        from hsdsl.analysis.orbits.forcing import PHASE, forced, shifted
-
         check_arguments(arguments, "an orbit", LOCATED_ALONE)
         self.model, self.laps, self.arguments = model, whole(laps, "laps", 1), dict(arguments)
         names = [edge.name for mode in model.program.modes for edge in written_edges(mode.edges)]
@@ -97,7 +95,7 @@ class Orbits:
             raise UsageError(f"the model has no transition '{section}'", hint)
         self.edge = section
         given = overrides_of(arguments, "parameters", model.program)
-        values = with_parameters(model.pipeline.values(FLOAT64), given)
+        values = model.pipeline.values(parameters=given)
         self._parameters = {name: values.parameters[model.program.parameters.index(name)] for name in given}
         self.forced = forced(model.system)
         if period is not None and not self.forced:
@@ -115,12 +113,10 @@ class Orbits:
         """The level that an orbit near a guess is to be on."""
         if self._keep is None:
             return None
-        from hsdsl.analysis.orbits.level import level_of, quantity
-
         name, states = guess.entered
         system = self.model.system
         mode = system.modes[0] if self.model.program.parts else next(m for m in system.modes if m.name == name)
-        values = with_parameters(self.model.pipeline.values(FLOAT64), parameters)
+        values = self.model.pipeline.values(parameters=parameters)
         expr = quantity(system, mode, states, self._keep)
         first = self._first
         begins = first is not None and first.arcs[0].mode == name  # its start has the value of the level
@@ -131,12 +127,10 @@ class Orbits:
         """The period of the forcing with these parameters."""
         if not self.forced:
             return None
-        values = with_parameters(self.model.pipeline.values(FLOAT64), parameters)
+        values = self.model.pipeline.values(parameters=parameters)
         if self._period is not None:
             found = float(values.number(self._period, "period"))
         else:
-            from hsdsl.analysis.orbits.forcing import forcing_period
-
             found = abs(float(values.evaluate({"period": forcing_period(self.model.system)})["period"]))
         if not found > 0:
             raise UsageError(f"the period of the forcing must be positive, not {found:g}")
@@ -344,7 +338,7 @@ class Orbits:
         known = self.model.program.parameters
         if parameter not in known:
             raise UsageError(f"the model has no parameter '{parameter}'", meant_alone(parameter, known))
-        values = with_parameters(self.model.pipeline.values(FLOAT64), self._parameters)
+        values = self.model.pipeline.values(parameters=self._parameters)
         low, high = (float(values.number(value, f"the range of {parameter}")) for value in (start, end))
         if not low != high:
             raise UsageError(f"expected a range of {parameter}, got {low:g} to {high:g}")

@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_arguments, checks_methods, did_you_mean
-from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.progress import in_notebook, is_notebook, running
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.preparation.options import Options, overrides_of
 from hsdsl.engine.preparation.pipeline import Pipeline
-from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.preparation.visible import visible_run
 from hsdsl.engine.simulate import Prepared
 from hsdsl.interface.model.call_cache import CallCache, call_key
@@ -266,5 +264,5 @@ class Runs:
         """
         from hsdsl.interface.model.guards import guard_lines
 
-        values = with_parameters(self.pipeline.values(FLOAT64), parameters or {})
+        values = self.pipeline.values(parameters=parameters or {})
         return {"guards": guard_lines(values), "units": self.program.units, "program": self.program}

@@ -21,11 +21,10 @@ from hsdsl.analysis.sweep.manifest import Manifest, library, refused, table
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import INITIAL, without_memory
-from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import meant, of_all
 from hsdsl.base.processes import can_fork
 from hsdsl.engine.preparation.options import KEYS, as_written, check_arguments, overrides_of
-from hsdsl.engine.preparation.values import Values, with_parameters
+from hsdsl.engine.preparation.values import Values
 from hsdsl.interface.model.ensemble import NothingToRunError, Progress, run_ensemble
 
 if TYPE_CHECKING:
@@ -101,8 +100,7 @@ def _planned(
     }
     check_arguments(given, "a sweep", without=("samples", "precision"))
     fixed: dict[str, Mapping[str, Any]] = {group: given.get(group) or {} for group in ("parameters", "initial")}
-    shared = overrides_of(given, "parameters", model.program)
-    values = with_parameters(model.pipeline.values(FLOAT64), shared)
+    values = model.pipeline.values(parameters=overrides_of(given, "parameters", model.program))
     vary = _with_ranges(values, vary, given.get("initial") or {})
     varied = variation.read(vary, random, seed, lambda value, where: float(values.number(value, where)))
     _check_names(model, varied.names, fixed)

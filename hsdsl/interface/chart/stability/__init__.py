@@ -18,10 +18,8 @@ from hsdsl.analysis.report.words import condensed, form
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import did_you_mean, shown
-from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.processes import Lost, in_processes
 from hsdsl.engine.integrators import METHODS
-from hsdsl.engine.preparation.values import with_parameters
 from hsdsl.engine.simulate import SCHEMES
 from hsdsl.interface.chart.peers import PEERS
 from hsdsl.interface.chart.rows import csv_text
@@ -238,7 +236,7 @@ def _axis(model: Model, part: str, until: float, base: Mapping[str, Any]) -> Axi
     if kind in DEFAULTS:
         low, high = (end * (until if kind in IN_TIME else 1.0) for end in DEFAULTS[kind])
         return Axis(name, kind, _spaced(low, high, COUNT), True)
-    values = with_parameters(model.pipeline.values(FLOAT64), base.get("parameters", {}))
+    values = model.pipeline.values(parameters=base.get("parameters", {}))
     value = start_by([name], base, values)[1][name]
     if not value > 0:
         raise UsageError(f"--map {name}: its value is {value:g}, so give a range", f"for example {name}=-1:1:20:lin")
