@@ -83,7 +83,8 @@ def files_of(source: Source, target: str, modes: Modes | None = None) -> dict[st
 def check_target(target: str) -> None:
     """Refuse a target that there is not."""
     if target not in TARGETS:
-        raise UsageError(f"there is no export target '{target}'", did_you_mean(target, TARGETS, _choices()))
+        hint = did_you_mean(target, TARGETS, f"choose from {', '.join(TARGETS)}")
+        raise UsageError(f"there is no export target '{target}'", hint)
 
 
 def check_scheme(model: ExportedModel, target: str, arguments: Mapping[str, Any]) -> None:
@@ -93,10 +94,6 @@ def check_scheme(model: ExportedModel, target: str, arguments: Mapping[str, Any]
     scheme = model.pipeline.resolve(arguments.get("settings"), given).values["scheme"].value
     if scheme == "paoli-schatzman" and target not in DOCUMENTS:
         raise UsageError(f"{target} has no scheme '{scheme}'", "--scheme relaxed or --scheme located")
-
-
-def _choices() -> str:
-    return f"choose from {', '.join(TARGETS)}"
 
 
 def check_folder(folder: Path, force: bool) -> None:

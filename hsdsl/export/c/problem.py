@@ -24,7 +24,7 @@ from hsdsl.engine.runtime.structures import METHOD_KINDS, SCHEMES, Row, array_at
 from hsdsl.engine.simulate import Problem, Settings
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.moving import LEAST_UNITS
-from hsdsl.engine.simulate.settings import Interpolation, along_steps, interpolation
+from hsdsl.engine.simulate.settings import along_steps, interpolation
 from hsdsl.export.source import Source, derived, filled, given, structural
 from hsdsl.mathematics.program import ModeProgram, Program
 
@@ -90,12 +90,18 @@ def numbers(source: Source) -> str:
     """The text of ``problem.c``."""
     problem = source.problem
     pair = tuple(zip(_both(problem.settings), PRECISIONS, strict=True))
+    segments = problem.timeline.segments
+    rows = [number for segment in segments for number in segment.data]
     parts = [
         comment(source.heading),
         '\n#include "problem.h"\n\n#include "hs_math.h"\n\n',
         in_both(*(_method(settings) for settings, _ in pair)),
         in_both(*(_interpolation(settings, arithmetic) for settings, arithmetic in pair)),
-        _timeline(problem),
+        array("static const hs_time", "starts", (literal(s.start) for s in segments))
+        + array("static const hs_time", "ends", (literal(s.end) for s in segments))
+        + array("static const int32_t", "jumps", (str(int(s.jump)) for s in segments))
+        + array("static const hs_real", "data", map(constant, rows))
+        + f"const hs_timeline problem_timeline = {{{len(segments)}, starts, ends, jumps, data}};\n",
         in_both(*(_settings(settings, problem.program, arithmetic) for settings, arithmetic in pair)),
         f"const int problem_mode = {problem.mode}, problem_dimension = {len(problem.x)};\n",
         array("const hs_real", "problem_x", map(constant, problem.x)),
@@ -107,24 +113,30 @@ def numbers(source: Source) -> str:
 
 def _method(settings: Settings) -> str:
     assert settings.method is not None
-    return method_text(method_table(settings.method))
+    table = method_table(settings.method)
+    rows = _Rows()
+    count = table.stages + 1 + table.extra if table.c else 0
+    own = table.dense and structures.INTERPOLANTS[table.interpolant] == "dense"
+    c = _numbers(array_at(ctypes.c_double, table.c, count))
+    parts = [f"static const hs_real method_c[] = {{{c or '0'}}};\n"]
+    for name, length in (("a", count), ("dense", table.degree if own else 0)):
+        listed = ",\n  ".join(rows.row(row) for row in array_at(Row, getattr(table, name), length))
+        parts.append(f"static const hs_row method_{name}[] = {{\n  {listed or '{0, 0, 0}'}}};\n")
+    single = ", ".join(rows.row(getattr(table, name)) for name in ("b", "error", "coarse"))
+    collocation = _collocation(table)
+    numbers = f"{table.kind}, {table.stages}, {table.extra}, {table.order}, {table.interpolant}, {table.degree}"
+    last = f"method_dense, {constant(table.gain)}, {'&method_collocation' if collocation else 0}"
+    method = f"const hs_method problem_method = {{\n  {numbers}, method_c, method_a, {single}, {last}}};\n"
+    return "".join([*rows.tables, *parts, collocation, method])
 
 
 def _interpolation(settings: Settings, arithmetic: Arithmetic) -> str:
     degree, share = along_steps(settings)
-    return interpolation_text(interpolation(degree, arithmetic), share)
-
-
-def _timeline(problem: Problem) -> str:
-    segments = problem.timeline.segments
-    rows = [number for segment in segments for number in segment.data]
-    return (
-        array("static const hs_time", "starts", (literal(s.start) for s in segments))
-        + array("static const hs_time", "ends", (literal(s.end) for s in segments))
-        + array("static const int32_t", "jumps", (str(int(s.jump)) for s in segments))
-        + array("static const hs_real", "data", map(constant, rows))
-        + f"const hs_timeline problem_timeline = {{{len(segments)}, starts, ends, jumps, data}};\n"
-    )
+    by = interpolation(degree, arithmetic)
+    columns = {"nodes": by.nodes, "tests": by.tests, "matrix": [number for line in by.matrix for number in line]}
+    tables = "".join(f"static const hs_real {name}[] = {{{_numbers(list(c))}}};\n" for name, c in columns.items())
+    row = f"{len(by.nodes) - 1}, nodes, tests, matrix, {constant(share + by.rounding)}"
+    return f"{tables}const hs_interpolation problem_interpolation = {{{row}}};\n"
 
 
 def _settings(settings: Settings, program: Program, arithmetic: Arithmetic) -> str:
@@ -231,24 +243,6 @@ def _strings(name: str, texts: Iterable[str], static: str = "") -> str:
     return array(f"{static}{STRINGS}", name, map(string, texts))
 
 
-def method_text(table: Any) -> str:
-    """The definition of ``problem_method``."""
-    rows = _Rows()
-    count = table.stages + 1 + table.extra if table.c else 0
-    own = table.dense and structures.INTERPOLANTS[table.interpolant] == "dense"
-    c = _numbers(array_at(ctypes.c_double, table.c, count))
-    parts = [f"static const hs_real method_c[] = {{{c or '0'}}};\n"]
-    for name, length in (("a", count), ("dense", table.degree if own else 0)):
-        listed = ",\n  ".join(rows.row(row) for row in array_at(Row, getattr(table, name), length))
-        parts.append(f"static const hs_row method_{name}[] = {{\n  {listed or '{0, 0, 0}'}}};\n")
-    single = ", ".join(rows.row(getattr(table, name)) for name in ("b", "error", "coarse"))
-    collocation = _collocation(table)
-    numbers = f"{table.kind}, {table.stages}, {table.extra}, {table.order}, {table.interpolant}, {table.degree}"
-    last = f"method_dense, {constant(table.gain)}, {'&method_collocation' if collocation else 0}"
-    method = f"const hs_method problem_method = {{\n  {numbers}, method_c, method_a, {single}, {last}}};\n"
-    return "".join([*rows.tables, *parts, collocation, method])
-
-
 class _Rows:
     """Rows of a table; ``tables`` are the arrays that they point into."""
 
@@ -281,14 +275,6 @@ def _nested(value: Any) -> str:
 
 def _numbers(values: Sequence[Number]) -> str:
     return ", ".join(map(constant, values))
-
-
-def interpolation_text(by: Interpolation, share: Number) -> str:
-    """The definition of ``problem_interpolation``: how surfaces along steps are interpolated."""
-    columns = {"nodes": by.nodes, "tests": by.tests, "matrix": [number for line in by.matrix for number in line]}
-    tables = "".join(f"static const hs_real {name}[] = {{{_numbers(list(c))}}};\n" for name, c in columns.items())
-    row = f"{len(by.nodes) - 1}, nodes, tests, matrix, {constant(share + by.rounding)}"
-    return f"{tables}const hs_interpolation problem_interpolation = {{{row}}};\n"
 
 
 FLOAT32 = replace(FLOAT64, name="float32", bits=24, unit=2.0**-24)  # its numbers are rounded where they are compiled

@@ -73,23 +73,21 @@ class Unit:
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
         """All variables; a name that is taken gets underscores."""
+        source, system, units = self.source, self.source.system, self.source.system.units
+        outputs = (Variable("output", k, name, units.get(name)) for k, name in enumerate(system.outputs))
+        surfaces = max(len(mode.surfaces) for mode in self.problem.program.flows)
+        indicators = (Variable("indicator", k, f"indicator[{k}]") for k in range(surfaces))
+        modes = () if self.modes == "none" else _modes(source)
+        given = (Variable("time", 0, "time"), *_states(source), *_parameters(source), *_inputs(source))
         found: list[Variable] = []
         taken: set[str] = set()
-        for variable in (*_time(), *_states(self.source), *_parameters(self.source), *self._others()):
+        for variable in (*given, *outputs, *modes, *indicators):
             name = variable.name
             while name in taken:
                 name += "_"
             taken.add(name)
             found.append(replace(variable, name=name))
         return tuple(found)
-
-    def _others(self) -> tuple[Variable, ...]:
-        system, units = self.source.system, self.source.system.units
-        outputs = (Variable("output", k, name, units.get(name)) for k, name in enumerate(system.outputs))
-        surfaces = max(len(mode.surfaces) for mode in self.problem.program.flows)
-        indicators = (Variable("indicator", k, f"indicator[{k}]") for k in range(surfaces))
-        modes = () if self.modes == "none" else _modes(self.source)
-        return (*_inputs(self.source), *outputs, *modes, *indicators)
 
     @property
     def nominals(self) -> list[float]:
@@ -108,10 +106,6 @@ class Unit:
 
 def unit_of(source: Source, modes: Modes = "local") -> Unit:
     return Unit(drivable(source), modes)
-
-
-def _time() -> tuple[Variable, ...]:
-    return (Variable("time", 0, "time"),)
 
 
 def _states(source: Source) -> tuple[Variable, ...]:

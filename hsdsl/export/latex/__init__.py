@@ -122,7 +122,12 @@ def _mode(system: HybridSystem, mode: Mode, written: ModeDocument, math: Mathema
     if edges or events:
         lines.append(r"\begin{itemize}")
         for edge in edges:
-            lines += _edge(edge, math)
+            when = rf"when \({math.inequality(edge.surface.text)}\) is reached"
+            condition = rf" while \({math.condition(edge.condition_text)}\)" if edge.condition_text else ""
+            changed = [(rf"{math.name(name)}^{{+}}", math.expression(text)) for name, text in _changes(edge)]
+            priority = f", with priority {edge.priority}" if edge.priority else ""
+            line = rf"\item \textbf{{{escaped(edge.name)}}} to {escaped(edge.target)}, {when}{condition}{priority}"
+            lines += [line + (":" if changed else "."), *equations(changed)]
         for made in events:
             lines += _event(mode.name, made, math)
         lines.append(r"\end{itemize}")
@@ -161,15 +166,6 @@ def _changes(edge: Edge) -> Pairs:
     known = without_memory(edge.target_states)
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     return [(name, text) for name, text in resets if name in known and text != name]
-
-
-def _edge(edge: Edge, math: Mathematics) -> list[str]:
-    when = rf"when \({math.inequality(edge.surface.text)}\) is reached"
-    condition = rf" while \({math.condition(edge.condition_text)}\)" if edge.condition_text else ""
-    changed = [(rf"{math.name(name)}^{{+}}", math.expression(text)) for name, text in _changes(edge)]
-    priority = f", with priority {edge.priority}" if edge.priority else ""
-    line = rf"\item \textbf{{{escaped(edge.name)}}} to {escaped(edge.target)}, {when}{condition}{priority}"
-    return [line + (":" if changed else "."), *equations(changed)]
 
 
 def _event(mode: str, made: TransitionDocument, math: Mathematics) -> list[str]:

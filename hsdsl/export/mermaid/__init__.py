@@ -10,7 +10,7 @@ from hsdsl.base.names import visible, without_memory
 from hsdsl.base.parts import event_text, written_edges, written_modes
 from hsdsl.export.automata import Automata, automata_of, pairs
 from hsdsl.export.source import Source
-from hsdsl.language.system import Edge, Mode
+from hsdsl.language.system import Edge
 
 _ALIKE = str.maketrans({"*": "\u2217", "`": "\u02cb", "~": "\u223c"})
 _OUTER = re.compile(r"(?<![^\W_])_|_(?![^\W_])")  # underscores that are not inside a word
@@ -26,12 +26,16 @@ def diagram(source: Source) -> str:
     Modes are ``m0, m1, ...``, since a name of the model may be a word of the diagram's language.
     """
     numbers = {mode.name: f"m{k}" for k, mode in enumerate(source.system.modes)}
-    lines = [*(f"%% {_comment(line)}" for line in source.heading), "stateDiagram-v2"]
+    comments = (line.replace("{", "(").replace("}", ")") for line in source.heading)  # braces would open a directive
+    lines = [*(f"%% {line}" for line in comments), "stateDiagram-v2"]
     if source.system.parts:
         return "\n".join([*lines, *_automata(automata_of(source))]) + "\n"
     modes = written_modes(source.system.modes)
     for mode in modes:
-        lines.append(f"    {numbers[mode.name]} : {_label(_mode_lines(mode))}")
+        flows = dict(zip(mode.states, mode.flow_texts, strict=True))
+        flow = [f"d{name}/dt = {flows[name]}" for name in without_memory(mode.states)]
+        text = _label([mode.name, *flow, *(f"domain {wall.text}" for wall in mode.walls)])
+        lines.append(f"    {numbers[mode.name]} : {text}")
     lines.append(f"    [*] --> {numbers[source.system.modes[source.problem.mode].name]}")
     for mode in modes:
         edges = written_edges(mode.edges)
@@ -76,12 +80,6 @@ def _transition_lines(made: Any) -> list[str]:
     return [*name, *fires, *condition, *made.options, *(f"{state} := {text}" for state, text in pairs(made.reset))]
 
 
-def _mode_lines(mode: Mode) -> list[str]:
-    flows = dict(zip(mode.states, mode.flow_texts, strict=True))
-    flow = [f"d{name}/dt = {flows[name]}" for name in without_memory(mode.states)]
-    return [mode.name, *flow, *(f"domain {wall.text}" for wall in mode.walls)]
-
-
 def _edge_lines(edge: Edge) -> list[str]:
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     condition = [] if edge.condition is None else [f"if {edge.condition_text}"]
@@ -101,8 +99,3 @@ def _label(lines: list[str]) -> str:
 
 def _entity(sign: str) -> str:
     return sign if sign.isascii() and (sign.isalnum() or sign in " _.,+-/()") else f"#{ord(sign)};"
-
-
-def _comment(text: str) -> str:
-    """A comment; braces would open a directive."""
-    return text.replace("{", "(").replace("}", ")")

@@ -53,7 +53,13 @@ class MathML:
         if expression.is_Symbol:
             return _leaf("ci", self.identifiers[expression.name])
         if expression.is_Number:
-            return _number(expression)
+            if expression.is_Integer and len(str(expression)) <= MOST_DIGITS:
+                return _leaf("cn", str(expression), type="integer")
+            if expression.is_Rational and max(len(str(expression.p)), len(str(expression.q))) <= MOST_DIGITS:
+                node = _leaf("cn", str(expression.p), type="rational")
+                SubElement(node, "sep").tail = str(expression.q)
+                return node
+            return _leaf("cn", repr(float(expression)))
         if isinstance(expression, functions.sign):
             return self.node(sp.Piecewise(*_signs(expression.args[0])))
         if isinstance(expression, functions.below):
@@ -87,17 +93,6 @@ def condition(trigger: Trigger) -> Any:
 
 def _signs(number: Any) -> list[tuple[Any, Any]]:
     return [(sp.S.One, sp.Gt(number, 0)), (sp.S.NegativeOne, sp.Lt(number, 0)), (sp.S.Zero, sp.true)]
-
-
-def _number(value: Any) -> Element:
-    """An exact number, or the nearest float of one of many digits."""
-    if value.is_Integer and len(str(value)) <= MOST_DIGITS:
-        return _leaf("cn", str(value), type="integer")
-    if value.is_Rational and max(len(str(value.p)), len(str(value.q))) <= MOST_DIGITS:
-        node = _leaf("cn", str(value.p), type="rational")
-        SubElement(node, "sep").tail = str(value.q)
-        return node
-    return _leaf("cn", repr(float(value)))
 
 
 def _apply(word: str, *arguments: Element) -> Element:

@@ -111,7 +111,8 @@ def _parameters(source: Source) -> Iterator[Data]:
     frozen = fixed(source.problem)
     for i, parameter in enumerate(source.system.parameters):
         name, (least, most) = parameter.name, bounds_of(source, i)  # those of later values are checked in the page
-        low, high = _range(float(values[name]))
+        low, high = sorted((0.0, 2 * float(values[name])))
+        low, high = (low, high) if low < high else (-1.0, 1.0)
         yield {
             "name": name,
             "group": "parameters",
@@ -144,12 +145,6 @@ def _starts(source: Source, run: Execution) -> Iterator[Data]:
             "fixed": hidden,
             "hidden": hidden,
         }
-
-
-def _range(value: float) -> tuple[float, float]:
-    """A range without a scale of its own: from zero to twice the value."""
-    low, high = sorted((0.0, 2 * value))
-    return (low, high) if low < high else (-1.0, 1.0)
 
 
 def _layout(kind: Any) -> Data:
@@ -284,14 +279,9 @@ def _switches(problem: Problem) -> str:
         if f"line_{i}" in bodies:
             rows.append(f"{head}switch_line_{i}, 0, 0, 0}}")
             continue
-        cuts, values = _changes(problem, i)
+        segments, place = problem.timeline.segments, i - len(problem.program.switches)
+        changed = [b for a, b in pairwise(segments) if not same(a.data[place], b.data[place])]
+        cuts, values = [s.start for s in changed], [segments[0].data[place], *(s.data[place] for s in changed)]
         parts += [_numbers(f"switch_cuts_{i}", cuts), _numbers(f"switch_numbers_{i}", values)]
         rows.append(f"{head}0, {len(cuts)}, switch_cuts_{i}, switch_numbers_{i}}}")
     return "".join(parts) + array("static const page_switch", "page_switches", rows or ["{0, 0, 0, 0, 0, 0, 0}"])
-
-
-def _changes(problem: Problem, i: int) -> tuple[list[Number], list[Number]]:
-    """When a switch changes in the exported run, and its numbers before and after."""
-    segments, place = problem.timeline.segments, i - len(problem.program.switches)
-    changed = [b for a, b in pairwise(segments) if not same(a.data[place], b.data[place])]
-    return [s.start for s in changed], [segments[0].data[place], *(s.data[place] for s in changed)]
