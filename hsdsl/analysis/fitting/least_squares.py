@@ -373,7 +373,7 @@ class Objective:
     def _at(self, x: Array) -> tuple[bytes, Array, Array, Sensitivity | None]:
         key = np.asarray(x, float).tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = (key, *self._computed(x))
+            self._last = key, *self._computed(x)
             self.evaluations += 1
             if self.progress is not None:
                 self.progress(self.evaluations, self.named(x), float(np.sum(self._last[1] ** 2)))

@@ -71,20 +71,15 @@ def configured(path: str | os.PathLike[str]) -> dict[str, list[str]]:
     for place in (folder, *folder.parents):
         for file, keys in ((place / OWN_FILE, ("lint",)), (place / "pyproject.toml", ("tool", "hsdsl", "lint"))):
             if file.is_file():
-                table = _table(file, keys)
+                try:
+                    table: Any = tomllib.loads(file.read_text(encoding="utf-8"))
+                except (OSError, ValueError) as error:
+                    raise UsageError(f"{file}: {error}") from None
+                for key in keys:
+                    table = cast("dict[str, Any]", table).get(key) if isinstance(table, dict) else None
                 if table is not None or file.name == OWN_FILE:
                     return _checked(file, table or {})
     return {}
-
-
-def _table(file: Path, keys: tuple[str, ...]) -> Any:
-    try:
-        found: Any = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise UsageError(f"{file}: {error}") from None
-    for key in keys:
-        found = cast("dict[str, Any]", found).get(key) if isinstance(found, dict) else None
-    return found
 
 
 def _checked(file: Path, table: Any) -> dict[str, list[str]]:

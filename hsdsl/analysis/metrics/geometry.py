@@ -55,7 +55,7 @@ class Domain:
         size = max(size, float(np.linalg.norm(x)), 1e-300)
         flat = (self.normals @ x - self.levels) / (size + np.abs(self.levels))
         beyond = [*flat.tolist(), *(_beyond(value, x) / size for value in self.curved)]
-        worst = max(range(len(beyond)), key=lambda k: _or_infinite(beyond[k]), default=None)
+        worst = max(range(len(beyond)), key=lambda k: np.inf if np.isnan(beyond[k]) else beyond[k], default=None)
         return (0.0, None) if worst is None else (beyond[worst], self.texts[worst])
 
 
@@ -63,10 +63,6 @@ def _beyond(formula: Formula, x: Array) -> float:
     value = formula(x)
     slope = float(np.linalg.norm(formula.gradient(x))) if value > 0 else 1.0
     return value / slope if slope > 0 else value * np.inf
-
-
-def _or_infinite(value: float) -> float:
-    return np.inf if np.isnan(value) else value
 
 
 @dataclass(frozen=True, eq=False)

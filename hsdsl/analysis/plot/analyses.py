@@ -327,7 +327,14 @@ def plot_path(space: Space, pieces: Sequence[PathPiece], title: str) -> Figure:
     Raises UsageError: no path, a mode on it that has not two coordinates, an unknown suffix, or a file that cannot be
     written.
     """
-    modes = _visited(space, pieces)
+    if not pieces:
+        raise UsageError("there is no path to draw: either none was found or the points are the same")
+    modes = [space.mode_index(name) for name in dict.fromkeys(piece.mode for piece in pieces)]
+    for mode in modes:
+        names = space.domains[mode].coordinates
+        if len(names) != 2:
+            has = f"mode {space.modes[mode]} has {len(names)}: {', '.join(names) or 'none'}"
+            raise UsageError(f"a path is drawn in modes of two coordinates, and {has}")
     columns = min(3, len(modes))
     rows = -(-len(modes) // columns)
     figure = empty(1.5 + 4.2 * columns, 0.6 + 3.8 * rows)
@@ -338,18 +345,6 @@ def plot_path(space: Space, pieces: Sequence[PathPiece], title: str) -> Figure:
         axis.set_visible(False)
     figure.suptitle(title, x=0.01, ha="left", parse_math=False)
     return figure
-
-
-def _visited(space: Space, pieces: Sequence[PathPiece]) -> list[int]:
-    if not pieces:
-        raise UsageError("there is no path to draw: either none was found or the points are the same")
-    modes = [space.mode_index(name) for name in dict.fromkeys(piece.mode for piece in pieces)]
-    for mode in modes:
-        names = space.domains[mode].coordinates
-        if len(names) != 2:
-            has = f"mode {space.modes[mode]} has {len(names)}: {', '.join(names) or 'none'}"
-            raise UsageError(f"a path is drawn in modes of two coordinates, and {has}")
-    return modes
 
 
 def _panel(axis: Any, space: Space, mode: int, pieces: Sequence[PathPiece]) -> None:

@@ -368,14 +368,11 @@ def _draw_guards(
             axis.plot(times, values, zorder=1, **LEVEL)
             if guard.label not in {name for _, name in labels}:
                 labels[min(max(float(values[finite[-1]]), low), high), guard.label] = None
-    _label_levels(axis, sorted(labels), 0.13 / tall * (high - low))
-
-
-def _label_levels(axis: Axes, levels: Sequence[tuple[float, str]], line: float) -> None:
-    """Write labels at rising levels, those that would collide on top of each other; a line of text is so high."""
+    # Write labels at rising levels, those that would collide on top of each other; a line of text is so high
+    room = 0.13 / tall * (high - low)
     groups: list[list[tuple[float, str]]] = []
-    for level, text in levels:
-        if groups and level - groups[-1][-1][0] < line * min(len(groups[-1]), MOST_LABELS):
+    for level, text in sorted(labels):
+        if groups and level - groups[-1][-1][0] < room * min(len(groups[-1]), MOST_LABELS):
             groups[-1].append((level, text))
         else:
             groups.append([(level, text)])
@@ -395,7 +392,11 @@ def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, view: View) -> No
     across, up = (with_guards(limits_of(runs, name), at) for name, at in zip(pair, levels, strict=True))
     axis.set(xlim=across, ylim=up)
     for run, look in zip(runs, looks(len(runs)), strict=True):
-        parts = _parts(run, look, len(runs) == 1)
+        modes = list(dict.fromkeys([*(mode for mode in run.modes if mode != SEVERAL), *run.samples.mode.tolist()]))
+        parts = [(look, np.ones(len(run.samples), dtype=bool))]
+        if len(runs) == 1 and 1 < len(modes) <= MOST_BANDS:  # else there are no colours to tell modes by
+            shades = colours(modes).items()
+            parts = [({**look, "color": curve(shade)}, run.samples.mode == mode) for mode, shade in shades]
         x, y = run.column(pair[0]), run.column(pair[1])
         for shade, here in parts:
             wide: Look = {"linewidth": 1.1 if len(run.jumps) <= AFTER_ONLY else 0.6, **shade}
@@ -412,11 +413,3 @@ def draw_phase(axis: Axes, runs: Sequence[Curves], pair: Pair, view: View) -> No
     axis.set_xlabel(label(pair[0], view.units), parse_math=False)
     axis.set_ylabel(label(pair[1], view.units), parse_math=False)
     axis.set_box_aspect(1)
-
-
-def _parts(run: Curves, look: Look, alone: bool) -> list[tuple[Look, Array]]:
-    """Divide the points by mode, each with its colour; all in one where there are no colours to tell modes by."""
-    modes = list(dict.fromkeys([*(mode for mode in run.modes if mode != SEVERAL), *run.samples.mode.tolist()]))
-    if not alone or not 1 < len(modes) <= MOST_BANDS:
-        return [(look, np.ones(len(run.samples), dtype=bool))]
-    return [({**look, "color": curve(shade)}, run.samples.mode == mode) for mode, shade in colours(modes).items()]

@@ -47,7 +47,15 @@ class Strip(NamedTuple):
             return cls({}, fills([*first.shares.of], light=False), first.shares)
         if len(modes) <= (PLAIN if parts_in(modes) else MOST_BANDS):
             return cls({"": first.bands}, fills(modes, light=False)) if len(first.bands) > MOST_BEHIND else None
-        rows = _rows_of(first)
+        parts = parts_in([mode for mode in first.modes if mode != SEVERAL])
+        rows = (
+            {mode: [band for band in first.bands if band[0] == mode] for mode in first.modes}
+            if parts is None
+            else {
+                part: merged([(modes.get(mode, SEVERAL), begin, end) for mode, begin, end in first.bands])
+                for part, modes in parts.items()
+            }
+        )
         named = list(dict.fromkeys(mode for bands in rows.values() for mode, _, _ in bands))
         one: Look = {"facecolor": INK, "linewidth": 0}
         return cls(rows, fills(named, light=False) if named != [*rows] else dict.fromkeys(named, one))
@@ -71,14 +79,3 @@ class Strip(NamedTuple):
         axis.set_ylim(len(names) - 0.5, -0.5)
         named = range(0, len(names), ceil(NAMED * len(names) / (self.inches - LINE)))
         axis.set_yticks(named, [shown(names[row], LONGEST_LABEL) for row in named], parse_math=False)
-
-
-def _rows_of(run: Curves) -> dict[str, list[tuple[str, float, float]]]:
-    """Bands of many modes by what is written beside them: for each part with several modes, else for each mode."""
-    parts = parts_in([mode for mode in run.modes if mode != SEVERAL])
-    if parts is None:
-        return {mode: [band for band in run.bands if band[0] == mode] for mode in run.modes}
-    return {
-        part: merged([(modes.get(mode, SEVERAL), begin, end) for mode, begin, end in run.bands])
-        for part, modes in parts.items()
-    }

@@ -71,7 +71,17 @@ def ties(run: RunView, wrt: Sequence[str], moving: Sequence[bool]) -> Iterator[T
         tie = run.problem.tie(made.time)
         others = () if made.entry else _others(run, made, moving)
         if others:
-            yield _tie(run, made, others, wrt)
+            place, _ = run.before(made)
+            since = 2 * run.problem.tie(made.time)
+            orders: list[Order] = []
+            for edge in (made.edge, *others):
+                try:
+                    landed = land_after(run, place, run.edge_at(place, edge), since, run.tails_before(made).copy())
+                except DOMAIN_ERRORS:
+                    landed = None
+                if landed is not None:
+                    orders.append(_order(run, edge, *landed, wrt))
+            yield Tie(made.time, made.index, tuple(orders), _disagreement(run, made, others, orders))
             tied_at = made.time
         elif tied_at is not None and made.time - tied_at <= tie:
             pass  # a part of what the tie leads to
@@ -123,20 +133,6 @@ def _nearby(
         t, *rest = (v + share * size for v, share, size in zip(values, shares.tolist(), sizes, strict=True))
         x, parameters = rest[: len(place.x)], rest[len(place.x) :]
         yield run.problem.kernel.bind(run.index(place.mode.name), data_at(run, parameters, t)), [t, *x]
-
-
-def _tie(run: RunView, made: Transition, others: Sequence[str], wrt: Sequence[str]) -> Tie:
-    place, _ = run.before(made)
-    since = 2 * run.problem.tie(made.time)
-    orders: list[Order] = []
-    for edge in (made.edge, *others):
-        try:
-            landed = land_after(run, place, run.edge_at(place, edge), since, run.tails_before(made).copy())
-        except DOMAIN_ERRORS:
-            landed = None
-        if landed is not None:
-            orders.append(_order(run, edge, *landed, wrt))
-    return Tie(made.time, made.index, tuple(orders), _disagreement(run, made, others, orders))
 
 
 def _order(run: RunView, edge: str, mode: str, values: Sequence[Number], wrt: Sequence[str]) -> Order:

@@ -189,7 +189,10 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
                 if passed_by > len(mode.edges):
                     problem = f"stays at t = {t:.6g}, at a guard whose conditions do not hold"
                     break
-                t, x = _past(flows[k], t, arc.x, min(tie, until - t))
+                # A point right behind a surface that is passed, where the tool does not find it again
+                nudge = min(tie, until - t)
+                x = [float(value) + nudge * rate for value, rate in zip(arc.x, flows[k](t, *arc.x), strict=True)]
+                t += nudge
                 if t >= until:
                     break
                 continue
@@ -213,13 +216,6 @@ def _alternatives(mode: PlainMode, guard: object) -> list[Choice]:
     """The edges with the same guard, in the order of the file, and their conditions."""
     edges = [i for i, edge in enumerate(mode.edges) if edge.guard == guard]
     return [(i, as_function(mode, (mode.edges[i].condition,))) for i in edges]
-
-
-def _past(
-    flow: Callable[..., tuple[float, ...]], t: float, x: Sequence[float], tie: float
-) -> tuple[float, list[float]]:
-    """A point right behind a surface that is passed, where the tool does not find it again."""
-    return t + tie, [float(value) + tie * rate for value, rate in zip(x, flow(t, *x), strict=True)]
 
 
 def _modes(passed: Sequence[tuple[int, int]], model: PlainModel, samples: int) -> Array:

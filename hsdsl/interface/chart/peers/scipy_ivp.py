@@ -16,12 +16,12 @@ from hsdsl.interface.chart.translation import ToolArc, as_function, by_arcs, tra
 def prepare(scene: Scene) -> Callable[[float], Result]:
     """See `hsdsl.interface.chart.peers`."""
     model = translate(scene)
-    flows = [_of_vector(as_function(mode, mode.flow)) for mode in model.modes]
+    flows = [as_function(mode, mode.flow) for mode in model.modes]
     events = [[_event(as_function(mode, (edge.guard,))) for edge in mode.edges] for mode in model.modes]
 
     def integrate(tolerance: float, k: int, t: float, x: Sequence[float], times: Array, until: float) -> ToolArc:
         solution: Any = solve_ivp(
-            flows[k],
+            lambda t, x: flows[k](t, *x),
             (t, until),
             x,
             method="DOP853",
@@ -39,10 +39,6 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
         return ToolArc(end, z, fired, solution.y.T if len(solution.t) else np.empty((0, len(x))))
 
     return by_arcs(scene, model, integrate)
-
-
-def _of_vector(function: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda t, x: function(t, *x)
 
 
 def _event(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -56,7 +56,20 @@ def plot_stability(found: StabilityMap) -> Figure:
         axes.set_ylabel(found.y.label, parse_math=False)
     heading(figure, found.name)
     shown = f"{measure} 1e{span[0]:.0f} (dark) to 1e{span[1]:.0f} (pale)" if shades else ""
-    _legend(figure, found, columns + (columns > 2), shown)
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    present = {cell.word for panel in found.panels for row in panel.cells for cell in row}
+    handles: list[Any] = [
+        Patch(facecolor=colour, edgecolor="#888888", label=word, hatch=HATCH if word == UNKNOWN else None)
+        for word, colour in COLOURS.items()
+        if word in present
+    ]
+    if shown and handles:
+        handles[0].set_label(f"converged, {shown}")
+    if any(_has_limit(panel, found.x) for panel in found.panels):
+        handles.append(Line2D([], [], color=LIMIT, linewidth=2.2, label="limit of linear stability"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns + (columns > 2), frameon=False, fontsize=8)
     return figure
 
 
@@ -104,20 +117,3 @@ def _shaded(word: str, shade: float | None, span: tuple[float, float]) -> tuple[
         return tuple(colour)
     white = PALEST * (shade - span[0]) / (span[1] - span[0] or 1.0)
     return tuple(colour * (1 - white) + white)
-
-
-def _legend(figure: Figure, found: StabilityMap, columns: int, shades: str) -> None:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    present = {cell.word for panel in found.panels for row in panel.cells for cell in row}
-    handles: list[Any] = [
-        Patch(facecolor=colour, edgecolor="#888888", label=word, hatch=HATCH if word == UNKNOWN else None)
-        for word, colour in COLOURS.items()
-        if word in present
-    ]
-    if shades and handles:
-        handles[0].set_label(f"converged, {shades}")
-    if any(_has_limit(panel, found.x) for panel in found.panels):
-        handles.append(Line2D([], [], color=LIMIT, linewidth=2.2, label="limit of linear stability"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False, fontsize=8)
