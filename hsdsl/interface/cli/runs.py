@@ -137,7 +137,7 @@ def distance(
             if start is not None or end is not None:
                 raise UsageError("give two runs, or one model with --from and --to")
             position = None if coordinates is None else names_of(coordinates)
-            _between_runs((first, second), metric, position, plot, json, options)
+            found, record = _between_runs((first, second), metric or "rho", position, plot, options)
         elif first.suffix.lower() == ".npz":
             hint = "give a second run, or the model file with --from and --to"
             raise UsageError(f"{first} is a run: expected two runs, or a model and two states", hint)
@@ -152,19 +152,21 @@ def distance(
                 "for example: hsdsl distance {} --from {} --to {}".format(first, *two),
             )
         else:
-            _between_points(first, (start, end), metric, plot, json, options)
+            name = metric or ("quotient" if relaxation is None else "relaxed")
+            found, record = _between_points(first, (start, end), name, plot, options)
+        if plot is not None:
+            say(f"wrote {plot}")
+        if json:
+            print_json(record)
+        else:
+            print(found.sentence)
 
 
 def _between_points(
-    path: Path, points: tuple[str, str], metric: str | None, plot: Path | None, json: bool, options: dict[str, Any]
-) -> None:
-    name = metric or ("quotient" if options["relaxation"] is None else "relaxed")
-    result = hsdsl.load(path).distance(*points, metric=name, plot=plot, **options)
-    if plot is not None:
-        say(f"wrote {plot}")
-    if not json:
-        print(result.sentence)
-        return
+    path: Path, points: tuple[str, str], metric: str, plot: Path | None, options: dict[str, Any]
+) -> Any:
+    """The distance of two points, and what ``--json`` prints of it."""
+    result = hsdsl.load(path).distance(*points, metric=metric, plot=plot, **options)
     pieces = [
         {
             "mode": piece.mode, "from": list(piece.start), "to": list(piece.end),
@@ -173,32 +175,23 @@ def _between_points(
         for piece in result.path
     ]  # fmt: skip
     bounds = {"lower": result.interval.lower, "upper": result.interval.upper, "status": result.status}
-    print_json({**bounds, "metric": name, "certified": result.certified, "path": pieces})
+    return result, {**bounds, "metric": metric, "certified": result.certified, "path": pieces}
 
 
 def _between_runs(
-    paths: tuple[Path, Path],
-    metric: str | None,
-    coordinates: list[str] | None,
-    plot: Path | None,
-    json: bool,
-    options: dict[str, Any],
-) -> None:
-    from hsdsl.interface.model.distances import distance_of_runs as between_runs
-    from hsdsl.interface.model.distances import plot_distance
+    paths: tuple[Path, Path], metric: str, coordinates: list[str] | None, plot: Path | None, options: dict[str, Any]
+) -> Any:
+    """The distance of two runs, and what ``--json`` prints of it."""
+    from hsdsl.interface.model.distances import distance_of_runs, plot_distance
 
     (run, model), (other, _) = (run_of(path, options["parameters"]) for path in paths)
     options = {**options, "model": model}
     with progress() as show:
         watch = show and partial(_show_bounds, show)
-        result = between_runs(run, other, metric or "rho", coordinates=coordinates, watch=watch, **options)
+        result = distance_of_runs(run, other, metric, coordinates=coordinates, watch=watch, **options)
     if plot is not None:
         plot_distance(run, other, plot, **options)
-        say(f"wrote {plot}")
-    if json:
-        print_json(result.as_json())
-    else:
-        print(result.sentence)
+    return result, result.as_json()
 
 
 def _show_bounds(show: Callable[[Text], None], lower: float, upper: float) -> None:
