@@ -13,7 +13,7 @@ from curve_spaces import Apart, Bent, Line, Plane
 
 from hsdsl.analysis.metrics.curves import rho
 from hsdsl.analysis.metrics.labelled import profiles, rho_hat, skorokhod, sup_norm, tau_epsilon
-from hsdsl.analysis.metrics.table import CURVE_METRICS, CurvePair, between
+from hsdsl.analysis.metrics.table import CURVE_METRICS, between
 from hsdsl.analysis.store import load
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers import decimals
@@ -222,12 +222,12 @@ RUNS = {
 def test_zero_against_itself_and_against_the_saved_run(run, metric, tmp_path):
     a = RUNS[run]()
     a.save(tmp_path / "run.npz")
-    request = CurvePair(a, load(tmp_path / "run.npz"), lambda depth: Plane())
+    request = a, load(tmp_path / "run.npz"), lambda depth: Plane()
     if metric == "rho-hat" and run == "states that come and go":
         with pytest.raises(UsageError, match="these runs have none"):
-            between(metric, request)
+            between(metric, *request)
         return
-    found = between(metric, request)
+    found = between(metric, *request)
     assert found.lower == 0.0
     assert found.upper == 0.0
 
@@ -324,13 +324,13 @@ def test_runs_of_different_models_are_refused():
     other = replace(hand_made.jumping_input(), digest="1" * 64)
     for metric in CURVE_METRICS:
         with pytest.raises(UsageError, match="runs are of different models"):
-            between(metric, CurvePair(hand_made.jumping_input(), other, lambda depth: Plane()))
+            between(metric, hand_made.jumping_input(), other, lambda depth: Plane())
 
 
 def test_an_unknown_metric_is_refused_with_the_nearest():
     run = hand_made.jumping_input()
     with pytest.raises(UsageError, match="no distance 'skorohod' between runs") as caught:
-        between("skorohod", CurvePair(run, run, lambda depth: Plane()))
+        between("skorohod", run, run, lambda depth: Plane())
     assert caught.value.hint is not None and "skorokhod" in caught.value.hint
 
 
@@ -369,7 +369,7 @@ def test_every_metric_is_documented_and_answers_to_its_name(metric):
     theory = (Path(__file__).parents[2] / "docs" / "theory.md").read_text(encoding="utf-8")
     assert f"`{metric}`" in theory
     a, b = ramp((0, 0), (2, 2)), ramp((0, 0), (2, 1))
-    found = between(metric, CurvePair(a, b, lambda depth: Plane()))
+    found = between(metric, a, b, lambda depth: Plane())
     assert found.metric == metric
     assert found.lower <= 1.0 <= found.upper + 1e-12
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean
@@ -19,17 +19,6 @@ if TYPE_CHECKING:
     from hsdsl.engine.execution import Execution
 
 SpaceMaker = Callable[[float | None], "SpaceMetric"]  # the model's, relaxed or not
-
-
-class CurvePair(NamedTuple):
-    """Two runs and what else a distance may need; only those that measure on it make the ``space``."""
-
-    a: Execution
-    b: Execution
-    space: SpaceMaker
-    relaxation: float | None = None
-    coordinates: Sequence[str] | None = None
-    hops: int | None = None
 
 
 # Modules are imported when the distance is computed: the command line needs the names alone.
@@ -47,7 +36,7 @@ CURVE_METRICS = Table[Callable[..., Any]](
     },
     function_expected("a function of two executions"),
 )
-# Which fields of a pair a distance takes beyond the runs.
+# Which options of :func:`between` a distance takes.
 TAKES: dict[str, tuple[str, ...]] = {
     "rho": ("relaxation", "hops"),
     "quotient": ("hops",),
@@ -57,11 +46,21 @@ TAKES: dict[str, tuple[str, ...]] = {
 POINT_METRICS = ("quotient", "relaxed")  # those that are also between points
 
 
-def between(metric: str, request: CurvePair) -> CurveDistance:
-    """Compute a distance between two executions by its name; refuse options that it does not take."""
+def between(
+    metric: str,
+    a: Execution,
+    b: Execution,
+    space: SpaceMaker,
+    relaxation: float | None = None,
+    coordinates: Sequence[str] | None = None,
+    hops: int | None = None,
+) -> CurveDistance:
+    """Compute a distance between two executions by its name; refuse options that it does not take.
+
+    Only distances that measure on it make the ``space``.
+    """
     if metric not in CURVE_METRICS:
         raise UsageError(f"there is no distance '{metric}' between runs", did_you_mean(metric, tuple(CURVE_METRICS)))
-    a, b, space, relaxation, coordinates, hops = request
     check_same_model(a, b)
     function, takes = CURVE_METRICS[metric], TAKES.get(metric, ())
 

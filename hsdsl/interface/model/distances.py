@@ -22,7 +22,7 @@ from hsdsl.analysis.metrics.interval import Budget
 from hsdsl.analysis.metrics.points import PointDistance, SpaceMetric, SpacePoint, coordinates
 from hsdsl.analysis.metrics.points import distance as shortest
 from hsdsl.analysis.metrics.space import make_space
-from hsdsl.analysis.metrics.table import CURVE_METRICS, POINT_METRICS, CurvePair, between, check_same_model
+from hsdsl.analysis.metrics.table import CURVE_METRICS, POINT_METRICS, between, check_same_model
 from hsdsl.analysis.orbits.sampling import OrbitalStability, directions, sampled
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
@@ -84,7 +84,7 @@ def distance_of_runs(
     check_hops(hops)
     source = _RunSpace(run, other, model, parameters, budget_of(seconds, watch), hops)
     depth = None if relaxation is None else source.depth(relaxation)
-    result = between(metric, CurvePair(run, other, source.space, depth, coordinates, hops))
+    result = between(metric, run, other, source.space, depth, coordinates, hops)
     return replace(result, note="\n".join(filter(None, (result.note, source.note))))
 
 
