@@ -198,14 +198,8 @@ class Follower:
 
     def point(self, here: Solution) -> Point:
         """What is reported of a solution."""
-        n = len(here.unknowns) - 2
-        return Point(
-            float(here.unknowns[-1]),
-            here.unknowns[:n],
-            float(here.unknowns[n]),
-            here.passage.time,
-            self.multipliers(here),
-        )
+        *_, phase, value = here.unknowns.tolist()
+        return Point(value, here.unknowns[:-2], phase, here.passage.time, self.multipliers(here))
 
     def multipliers(self, here: Solution) -> Array:
         """The multipliers of a solution, the largest first."""

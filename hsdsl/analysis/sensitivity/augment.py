@@ -47,6 +47,8 @@ from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, HybridSystem, Mode, Parameter, SampledInput, started
 from hsdsl.mathematics.lower.switches import with_switches
 
+OF_RUNS = ("scheme", "method", "step", "tolerance", "samples", "every")  # settings that a sensitivity gives
+
 
 def augmented(given: Overridden, by: Sequence[Target], entries: bool = False, implicit: bool = False) -> HybridSystem:
     """Write a system with the derivatives of its states.
@@ -108,16 +110,7 @@ class _Writer:
             outputs=tuple(self._output_names()),
             units={},
             initial=started(base.initial.mode, states, tuple(values.items())),
-            experiment=replace(
-                base.experiment,
-                until=symbol(SPAN),
-                scheme=None,
-                method=None,
-                step=None,
-                tolerance=None,
-                samples=None,
-                every=None,
-            ),
+            experiment=replace(base.experiment, until=symbol(SPAN), **dict.fromkeys(OF_RUNS)),
             reference=(),
             scene=(),
         )

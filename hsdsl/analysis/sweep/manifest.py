@@ -322,10 +322,9 @@ def refused(manifest: Manifest, first: int, last: int, why: str) -> Any:
 
 
 def _columns(manifest: Manifest, first: int, ensemble: Ensemble) -> Iterator[tuple[str, Any]]:
-    count = ensemble.stop.size
+    count, judged = ensemble.stop.size, manifest.recording.verdict
     yield "row", np.arange(first, first + count)
     yield "stop", ensemble.stop
-    count, judged = ensemble.stop.size, manifest.recording.verdict
     messages, verdicts, reasons = (np.full(count, None, object) for _ in range(3))
     warnings = ensemble.warnings.astype(object)
     warnings[np.isin(ensemble.stop, ("refused", "interrupted"))] = None

@@ -120,7 +120,10 @@ def _read(text: str, number: NumberOf) -> Grid | Draw:
         raise UsageError(f"--vary: expected NAME=VALUES or NAME~DISTRIBUTION(...), got '{shown(text)}'", EXAMPLE)
     if len(found.groups()) == 2:
         return _grid(found[1], found[2], number)
-    return _draw(found[1], found[2], found[3], number)
+    name, distribution, listed = found.groups()
+    given = tuple(number(part.strip(), f"--vary {name}") for part in listed.split(",") if part.strip())
+    check(name, distribution, given)
+    return Draw(name, distribution, given)
 
 
 def _of(name: str, value: Any, number: NumberOf) -> Grid | Draw:
@@ -150,12 +153,6 @@ def _grid(name: str, text: str, number: NumberOf) -> Grid:
         raise UsageError(f"{where}: expected positive ends for :log, got '{shown(text)}'")
     spaced = np.geomspace if logarithmic else np.linspace
     return _checked(Grid(name, tuple(spaced(low, high, count).tolist()), logarithmic))
-
-
-def _draw(name: str, distribution: str, text: str, number: NumberOf) -> Draw:
-    given = tuple(number(part.strip(), f"--vary {name}") for part in text.split(",") if part.strip())
-    check(name, distribution, given)
-    return Draw(name, distribution, given)
 
 
 def _checked(grid: Grid) -> Grid:

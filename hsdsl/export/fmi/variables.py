@@ -131,21 +131,14 @@ def _modes(source: Source) -> tuple[Variable, ...]:
     """The number of the mode, or of a system of parts those of each part's mode, from 1 on, among its states."""
     system, program = source.system, source.problem.program
     if not program.parts:
-        return (Variable("mode", 0, "mode", about=f"the mode: {_listed([mode.name for mode in system.modes], 0)}"),)
-    return tuple(
-        Variable(
-            "mode",
-            program.all_states.index(part.name),
-            f"{part.name}.mode",
-            about=f"the mode: {_listed(part.modes, 1)}",
-        )
-        for part in program.parts
-        if part.is_numbered
-    )
+        return (Variable("mode", 0, "mode", about=_listed([mode.name for mode in system.modes], 0)),)
+    place = program.all_states.index
+    parts = (part for part in program.parts if part.is_numbered)
+    return tuple(Variable("mode", place(p.name), f"{p.name}.mode", about=_listed(p.modes, 1)) for p in parts)
 
 
 def _listed(modes: Sequence[str], first: int) -> str:
-    return "; ".join(f"{k} {name}" for k, name in enumerate(modes, first))
+    return "the mode: " + "; ".join(f"{k} {name}" for k, name in enumerate(modes, first))
 
 
 def nominals(source: Source) -> list[float]:
@@ -189,24 +182,12 @@ def _parameters(source: Source) -> list[Variable]:
     own, fixed, hidden = derived(problem), structural(problem), set(switched(source).values())
     values = problem.timeline.segments[0].data
     found: list[Variable] = []
-    for i, parameter in enumerate(source.system.parameters):
-        if i in hidden:
-            continue
-        start = None if parameter.name in own else float(values[i])
-        least, most = bounds_of(source, i)
-        found.append(
-            Variable(
-                "parameter",
-                i,
-                parameter.name,
-                parameter.unit,
-                start,
-                parameter.about,
-                fixed=parameter.name in fixed,
-                minimum=least,
-                maximum=most,
-            )
-        )
+    for i, p in enumerate(source.system.parameters):
+        if i not in hidden:
+            start = None if p.name in own else float(values[i])
+            given = Variable("parameter", i, p.name, p.unit, start, p.about, p.name in fixed)
+            least, most = bounds_of(source, i)
+            found.append(replace(given, minimum=least, maximum=most))
     return found
 
 

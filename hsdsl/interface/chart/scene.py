@@ -99,19 +99,9 @@ class Scene:
         clear = (near > clearance) & (grid <= end - clearance)
         if not clear.any():
             raise UsageError(f"no sample is farther than {clearance:g} from a jump and the end", "lower --clearance")
-        values, modes = sampled(exact, grid, chosen)
-        return Scene(
-            Path(model.program.path).stem + (f"-{block}" if block else ""),
-            model,
-            initial,
-            exact,
-            chosen,
-            grid,
-            clear,
-            values,
-            modes(),
-            _countable(exact, jumps, end - clearance),
-        )
+        (values, modes), countable = sampled(exact, grid, chosen), _countable(exact, jumps, end - clearance)
+        name = Path(model.program.path).stem + (f"-{block}" if block else "")
+        return Scene(name, model, initial, exact, chosen, grid, clear, values, modes(), countable)
 
     def result(self, execution: Execution) -> Result:
         """An execution by hsdsl as the result of a tool."""

@@ -92,15 +92,9 @@ class Differentiator:
         until, samples = time_slopes(change, by)
         times = [dict(zip((t.label for t in by), row, strict=True)) for row in _numbers([until, *samples], values)]
         rows = _numbers(list(parameter_slopes(change, by).values()), values)
-        setting = Setting(
-            plain,
-            plain,
-            self.pipeline.program.outputs,
-            times[0],
-            times[1:],
-            {target.label: tuple(row[k] for row in rows) for k, target in enumerate(by)},
-            partial(visible_run, prepared=plain),
-        )
+        moving = {target.label: tuple(row[k] for row in rows) for k, target in enumerate(by)}
+        shown, outputs = partial(visible_run, prepared=plain), self.pipeline.program.outputs
+        setting = Setting(plain, plain, outputs, times[0], times[1:], moving, shown)
         return self._prepare(_Ready(by, change, call, setting, firsts, exact=arguments.get("tolerance") is not None))
 
     def _run(self, ready: _Ready) -> tuple[_Ready, Execution]:

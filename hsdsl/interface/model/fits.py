@@ -57,13 +57,8 @@ def fit(
     def evaluate(given: Mapping[str, float], until: float) -> Sensitivity:
         return model.sensitivity(labels, **varied({**arguments, "until": until}, by, given, model.program))
 
-    objective = Objective(
-        evaluate,
-        measured,
-        _weights(measured, _by_column(measured, sigma), _by_column(measured, weights)),
-        start,
-        progress,
-    )
+    own = _weights(measured, _by_column(measured, sigma), _by_column(measured, weights))
+    objective = Objective(evaluate, measured, own, start, progress)
     scales = {label: abs(value) or _span(bounds[label]) for label, value in start.items()}
     return replace(fitted(objective, bounds, bool(sigma), scales, level, starts), units=model.program.units)
 

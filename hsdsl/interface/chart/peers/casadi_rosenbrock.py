@@ -69,13 +69,8 @@ def _problem(model: PlainModel) -> tuple[dict[str, Any], Any]:
             after = ca.if_else(index == len(zero), ca.vertcat(reset, edge.target), after)
             zero.append(-(ca.if_else(mode == k, guard, -1) if len(model.modes) > 1 else guard))
     nothing = [ca.SX(0, 1)] * 3
-    transition = ca.Function(
-        "transition",
-        [index, t, x, *nothing],
-        [after, ca.SX(0, 1)],
-        ["index", "t", "x", "z", "p", "u"],
-        ["post_x", "post_z"],
-    )
+    names = ["index", "t", "x", "z", "p", "u"], ["post_x", "post_z"]
+    transition = ca.Function("transition", [index, t, x, *nothing], [after, ca.SX(0, 1)], *names)
     return {"t": t, "x": x, "ode": ode, "zero": ca.vertcat(*zero)}, transition
 
 

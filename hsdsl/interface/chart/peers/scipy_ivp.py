@@ -20,16 +20,9 @@ def prepare(scene: Scene) -> Callable[[float], Result]:
     events = [[_event(as_function(mode, (edge.guard,))) for edge in mode.edges] for mode in model.modes]
 
     def integrate(tolerance: float, k: int, t: float, x: Sequence[float], times: Array, until: float) -> ToolArc:
-        solution: Any = solve_ivp(
-            lambda t, x: flows[k](t, *x),
-            (t, until),
-            x,
-            method="DOP853",
-            t_eval=np.append(times, until) if not len(times) or times[-1] < until else times,
-            rtol=tolerance,
-            atol=tolerance,
-            events=events[k],
-        )
+        at = np.append(times, until) if not len(times) or times[-1] < until else times
+        how = {"t_eval": at, "events": events[k], "rtol": tolerance, "atol": tolerance}
+        solution: Any = solve_ivp(lambda t, x: flows[k](t, *x), (t, until), x, method="DOP853", **how)
         if solution.status < 0:
             raise Refused(solution.message)
         if solution.status == 0:
