@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# What COPASI does with events that SBML allows: python-copasi 4.48.311 and copasi-basico 0.92, beside libroadrunner 2.10.0.
+# What COPASI (python-copasi 4.48.311, copasi-basico 0.92) does with events that SBML allows, beside libroadrunner 2.10.0.
 #
 # - If an event changes two conditions of a `piecewise` in rate rules at one instant, as where a mode is a number that
 #   three cases read, COPASI executes one of the two and stops with "Internal step limit exceeded". With two cases, or
