@@ -38,9 +38,9 @@ def sources_of(unit: Unit, version: int) -> dict[str, bytes]:
     flat["variables.h"] = variables.header(unit, token_of(unit, version)).encode()
     flat["variables.c"] = variables.numbers(unit).encode()
     flat["fmi_version.h"] = f'#include "fmi{version}.h"\n'.encode()
-    names = ("fmu", "surfaces", "events", "fmi", f"fmi{version}")
-    parts = (f"{name}.{kind}" for name in names for kind in "hc")
-    return flat | {part: (FOLDER / "parts" / part).read_bytes() for part in parts}
+    names = {"fmu", "surfaces", "events", "fmi", f"fmi{version}"}
+    parts = (path for path in sorted((FOLDER / "parts").glob("*.[hc]")) if path.stem in names)
+    return flat | {path.name: path.read_bytes() for path in parts}
 
 
 def platform_folder(version: int) -> tuple[str, str]:
