@@ -85,14 +85,14 @@ def test_the_worst_rows_are_listed_with_the_command_of_the_first(command, model,
     pytest.importorskip("pyarrow")
     words = ["--vary", "rate=0.1,3,0.5", "--processes", 1, "--out", tmp_path / "s"]
     answer = command("sweep", model(DECAY), *words, "--worst", "final.x", "--best", "time")
-    table = answer.out.partition("worst rows by final.x\n")[2].splitlines()
+    table = answer.out.partition("rows with the largest final.x\n")[2].splitlines()
     assert [line.split()[:2] for line in table[:4]] == [["row", "rate"], ["0", "0.1"], ["2", "0.5"], ["1", "3"]]
     again = table[4].partition("again: hsdsl ")[2].split()
     assert "0.818730753" in table[1] and "x = 0.8187307531" in command(*again).out
     shown = command("sweep", "--show", tmp_path / "s", "--best", "final.x", "--json")
     assert [row["rate"] for row in shown.json["best"]] == [3, 0.5, 0.1]
     listed = command("sweep", "--show", tmp_path / "s", "--worst", "final.x", "--quiet").out
-    assert listed.startswith("worst rows by final.x\n") and len(listed.splitlines()) == 6
+    assert listed.startswith("rows with the largest final.x\n") and len(listed.splitlines()) == 6
 
 
 def test_without_pyarrow_there_is_a_hint(command, model, tmp_path, monkeypatch):

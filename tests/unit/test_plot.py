@@ -15,7 +15,7 @@ from matplotlib.colors import to_rgb
 
 import hsdsl
 from hsdsl.analysis.plot import GuardLine, View, plot
-from hsdsl.analysis.plot.curves import CELLS, SEVERAL, curves, limits, line
+from hsdsl.analysis.plot.curves import CELLS, SEVERAL, curves, limits, limits_of, line
 from hsdsl.analysis.plot.figure import picture
 from hsdsl.analysis.plot.style import RUNS as RUN_COLOURS
 from hsdsl.analysis.plot.style import colours
@@ -439,3 +439,23 @@ def test_colours_of_many_modes_differ_and_are_no_black():
     chosen = [np.array(to_rgb(colour)) for colour in colours([f"m{k}" for k in range(60)]).values()]
     assert len({tuple(colour) for colour in chosen}) == 60
     assert min(colour.max() for colour in chosen) > 0.25
+
+
+ROUNDED = """hsdsl: 1
+parameters: {a: 0.1, b: 0.2, c: 0.3, e: 1.6e-19}
+modes:
+  air:
+    flow: {h: v, v: -9.81, p: (a + b - c)*v, q: e*h}
+    transitions: [{when: h <= 0, to: air, reset: {v: -0.8*v}}]
+initial: {mode: air, h: 1, v: 0, p: 0, q: 0}
+experiment: {until: 2}
+"""
+
+
+def test_a_state_of_round_off_is_drawn_as_zero_and_a_small_one_is_not():
+    """0.1 + 0.2 - 0.3 is zero, and p with it; q is a charge."""
+    run = hsdsl.loads(ROUNDED).simulate()
+    assert 0 < run.sizes()["p"] < 1e-15 and 0 < run.sizes()["q"] < 1e-18
+    drawn = curves(run)
+    assert not drawn.column("p").any() and drawn.column("q")[-1] == run.final.state["q"]
+    assert limits_of([drawn], "p") == (-1, 1)

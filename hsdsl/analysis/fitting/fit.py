@@ -96,7 +96,7 @@ class Fit:
         known = named(self, "values deviations covariance deviation success message evaluations at_bound")
         known |= {"intervals": self.intervals, "level": self.level} if self.level else {}
         known |= {"chance": self.chance, "warnings": self.warnings} if self.chance is not None else {}
-        return plain(known | {"measurements": self.measured.count, "nonsmooth": self.nonsmooth})
+        return plain(known | {"measurements": self.measured.count, "nonsmooth": condensed(self.nonsmooth)})
 
     @property
     def warnings(self) -> tuple[str, ...]:

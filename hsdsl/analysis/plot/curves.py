@@ -28,6 +28,7 @@ MOVING = 1000  # points of a guard that moves
 MOST_PANELS = 6  # with one column each, where nobody chose them and parts are alike
 INDEX = re.compile(r"\[(\d+)\]")
 SEVERAL = "several modes"
+SMALL = 1e-10  # of the largest state
 ROUND_OFF = 1e-12  # of the size of a state
 CLOSE = 1e-9  # of a period
 
@@ -60,7 +61,7 @@ class Curves:
     the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many, and then
     ``shares`` says how much of a time each mode takes.
     ``error`` is how much of its size a state may be off: one that changes by less is drawn as a constant. ``parts`` is
-    for each jump the name of the part that its edge is of, or nothing.
+    for each jump the name of the part that its edge is of, or nothing. ``zeros`` are states that are zero to round-off.
     """
 
     samples: Samples
@@ -71,6 +72,7 @@ class Curves:
     error: float = ROUND_OFF
     shares: Shares | None = None
     parts: Sequence[str] = ()
+    zeros: frozenset[str] = frozenset()
 
     def jumps_of(self, name: str) -> Array:
         """The jumps that a column of a part may make: those of the part, and of what is in no part."""
@@ -97,7 +99,7 @@ class Curves:
         """Return a state or output, not-a-number where there is nothing to draw."""
         if name not in self.samples.names:
             return np.full(len(self.samples), np.nan)
-        values = self.samples[name]
+        values = 0 * self.samples[name] if name in self.zeros else self.samples[name]
         return np.where(np.isfinite(values), values, np.nan)
 
 
@@ -142,7 +144,27 @@ def curves(execution: Execution) -> Curves:
     stays = merged([(arc.mode, float(run.times[arc.first]), float(run.times[arc.last])) for arc in run.arcs])
     shares = _shares(stays) if len(stays) > BANDS else None
     parts = [made.edge.rpartition(".")[0] for made in run.transitions]
-    return Curves(samples, begins, jumps, _bands(stays), not run.stop.complete, error, shares, parts)
+    zeros = _zeros(execution)
+    return Curves(samples, begins, jumps, _bands(stays), not run.stop.complete, error, shares, parts, zeros)
+
+
+def _zeros(execution: Execution) -> frozenset[str]:
+    """The states that are zero but for round-off: the run's shadow shows that they may be off by all that they are.
+
+    Only states far smaller than others are looked at.
+    """
+    from hsdsl.engine.simulate.compiled import CompiledRun
+    from hsdsl.engine.simulate.verdict import RunView
+    from hsdsl.engine.simulate.verdict.shadow import has_shadow
+
+    sizes, run = execution.sizes(), execution.compiled
+    small = [name for name, size in sizes.items() if 0 < size < SMALL * max(sizes.values())]
+    if not small or not isinstance(run, CompiledRun) or not has_shadow(run.plan.problem, execution):
+        return frozenset()
+    errors = RunView(run.plan.problem, execution, by_shadow=True).errors
+    assert errors is not None
+    off = np.max(errors.by_row, axis=0)
+    return frozenset(name for name in small if not sizes[name] > off[errors.columns[name]])
 
 
 def lap(run: Curves, period: float) -> Curves:

@@ -36,7 +36,8 @@ OVER = "Draw samples, such as --of sample.x, over time: one curve per row, colou
 CHUNK = "Rows per file. Default: hsdsl times a few runs and chooses."
 SLICE = "Draw only the rows where a grid has its value nearest to this, or the tenth of a draw's rows. May be repeated."
 WORST = "List the ten rows with the largest numbers of a column, such as final.v; --best lists the smallest."
-BEST = "List the ten rows with the smallest numbers of a column."
+BEST = "List the ten rows with the smallest numbers of a column, such as a criterion; --worst lists the largest."
+ENDS = {"worst": "largest", "best": "smallest"}
 TAIL = "The last share of each run, whose transitions and samples a bifurcation diagram shows. Default: 0.5."
 
 
@@ -146,7 +147,7 @@ def _numbers_of(texts: list[str] | None) -> dict[str, float]:
 def _listed(found: Sweep, rows: Mapping[str, list[dict[str, Any]]], ranked: Mapping[str, str | None]) -> Iterator[str]:
     """The rows at one end as a table, and the command that makes the first of them again."""
     for how, kept in rows.items():
-        yield f"\n{how} rows by {ranked[how]}" + ("" if kept else ": no row has a number")
+        yield f"\nrows with the {ENDS[how]} {ranked[how]}" + ("" if kept else ": no row has a number")
         cells = [[f"{x:.9g}" if isinstance(x, float) else visible(str(x)) for x in row.values()] for row in kept]
         table = [[*map(visible, kept[0])], *cells] if kept else []
         widths = [max(map(len, column)) for column in zip(*table, strict=True)]
