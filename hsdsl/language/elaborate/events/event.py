@@ -1,22 +1,23 @@
 # pyright: basic
-"""An event as mathematics: its condition, the states that remember what it did, and the executions that can wait.
+"""An event as mathematics: its condition, the states that remember what it did, and the edges that it becomes.
 
 States have the first that waits; where several can, `hsdsl.engine.simulate.transitions` keeps the others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from math import prod
 from typing import Any
 
 from hsdsl.base.functions import below, maximum, replaced
 from hsdsl.base.names import memory
 from hsdsl.language.expression.algebra import either, is_mode, select, total, whole
-from hsdsl.language.expression.conditions import Reached, comparisons, number, reached
+from hsdsl.language.expression.conditions import Reached, comparisons, condition, number, reached
 from hsdsl.language.expression.scope import symbol
-from hsdsl.language.system import HALF, ONE, TIME, ZERO, Edge, Mode, Queue, Surface, at_least
+from hsdsl.language.system import HALF, ONE, TIME, TRUTH, ZERO, Edge, Mode, Queue, Surface, all_of, at_least
 
 Values = dict[str, Any]
 
@@ -202,7 +203,7 @@ def chosen(event: Event, truth: Any, values: Values, others: Values) -> Values:
     return {name: select(truth, event.guarded(value, truth), others[name]) for name, value in values.items()}
 
 
-def begins_to_wait(event: Event) -> Values:
+def _begins_to_wait(event: Event) -> Values:
     """The values where an event is triggered: those of the execution that begins to wait."""
     delay = maximum(event.delay, ZERO) if event.delay != 0 else ZERO
     given, waiting = event.edge.values, event.symbol("waiting")
@@ -214,7 +215,7 @@ def dropped(event: Event) -> Values:
     return {} if event.event.persistent or event.delay is None else {event.names["waiting"]: ZERO}
 
 
-def executes(event: Event) -> Edge:
+def _executes(event: Event) -> Edge:
     """The edge that gives the states, after the delay, the values that were stored."""
     edge, waiting = replace(event.edge, event=None), event.symbol("waiting")
     texts = dict(zip(edge.target_states, edge.reset_texts, strict=True))
@@ -227,3 +228,79 @@ def executes(event: Event) -> Edge:
     return replace(
         edge, reset_texts=tuple(texts.get(name, name) for name in states), condition_text=f"{waiting.name} >= 1/2"
     )
+
+
+Draft = tuple[Edge, Event | None, Reached | None]
+
+
+def _turn(event: Event, events: Sequence[Event]) -> Any | None:
+    """1 where no event of a higher priority is to be made at this instant, else 0; None where the edges' own decide.
+
+    Each pair is compared by itself, so that an error of a state that priorities read decides nothing between others.
+    """
+    if all(other.event.priority is None for other in events):
+        return None
+    others = [other for other in events if other is not event]
+    higher = ((other, below(event.priority - other.priority, ZERO, ONE, ZERO)) for other in others)
+    return prod((ONE - rank * other.ready for other, rank in higher if rank != 0), start=ONE)
+
+
+def edges_of(event: Event, events: Sequence[Event]) -> Iterator[Draft]:
+    """The edges of one of a mode's events: which of them fires it, and the comparison that was reached."""
+    edge, trigger, armed = replace(event.edge, event=None), event.event.trigger, event.symbol("armed")
+    fires = edge if event.delay is None else _staying(event, f"{edge.name} triggers", _begins_to_wait(event))
+    if event.delay is not None:  # what only remembers goes before anything that changes states
+        fires = replace(fires, priority=1 + max(other.priority for other in event.mode.edges))
+    turn = _turn(event, events)
+    goes = () if turn is None or turn == 1 else (at_least(turn, HALF),)
+    free = goes if event.delay is None else ()
+    for part in comparisons(trigger):
+        others = condition(trigger, partial(_with, event, part, True))
+        surface = event.surface(part.left, part.right, part.text)
+        when = all_of(at_least(armed, HALF), others, *free)
+        fires = replace(fires, strict=part.strict)
+        yield replace(fires, surface=surface, condition=when, condition_text=event.event.text), event, part
+    if event.jumps:
+        now = event.due
+        if turn is not None and event.delay is None:
+            now *= turn
+        for other in events if event.delay is None else ():
+            if other.delay is not None and other.goes_before(event):
+                alike = ONE if turn is None else below(other.priority - event.priority, ZERO, ZERO, ONE)
+                now *= 1 - other.ready * alike
+            elif turn is None and other.delay is None and other.edge.priority > event.edge.priority:
+                now *= 1 - other.ready
+        yield _when_due(fires, event, now), event, None
+    if event.delay is not None:
+        made = _executes(event)
+        yield replace(made, condition=all_of(made.condition, *goes)), None, None
+    arms = _staying(event, f"{edge.name} re-arms", {event.names["armed"]: ONE} | dropped(event))
+    for part in comparisons(trigger):
+        holds = condition(trigger, partial(_with, event, part, False))
+        surface = event.surface(part.right, part.left, part.opposite)
+        when = all_of(at_least(HALF, armed), ~holds)
+        if dropped(event):  # what waits is gone where a strict comparison ends, and is made where another one does
+            others = [edge.priority for edge in event.mode.edges]
+            arms = replace(arms, priority=max(others) + 1 if part.strict else min(others) - 1)
+        yield replace(arms, surface=surface, condition=when, condition_text=f"not ({event.event.text})"), None, None
+
+
+def _when_due(edge: Edge, event: Event, truth: Any) -> Edge:
+    """An edge that goes where a number is 1 or more, and not where it is 0 or less."""
+    surface = event.surface(truth, HALF, f"{event.names['due']} >= 1/2")
+    return replace(edge, surface=surface, condition=None, condition_text=None, strict=False)
+
+
+def _with(event: Event, reached: Reached, value: bool, part: Reached) -> Any:
+    """The Boolean of a comparison where another one turns to a value."""
+    turns = part.turns(reached)
+    return part.follows(event.rates[part.residual], TIME) if turns is None else TRUTH[value == turns]
+
+
+def _staying(event: Event, name: str, values: Values) -> Edge:
+    """An edge that changes some memory of an event, and nothing else."""
+    mode = event.mode
+    states = (*mode.states, *values)
+    reset = (*map(symbol, mode.states), *values.values())
+    edge = replace(event.edge, event=None, name=name, target=mode.name, target_states=states, reset=reset)
+    return replace(edge, reset_texts=states, stays=True, condition_text=None)
