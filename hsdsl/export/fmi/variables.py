@@ -28,7 +28,7 @@ from hsdsl.export import Modes
 from hsdsl.export.c.problem import array, comment, function, string
 from hsdsl.export.source import Source, bounds_of, derived, drivable, filled, structural, used_by, with_sources
 from hsdsl.language.elaborate.inputs import switch_name
-from hsdsl.mathematics.lower.slopes import Slopes, lower_given, lower_slopes
+from hsdsl.mathematics.lower import Slopes, lower_given, lower_slopes
 
 Kind = Literal["time", "state", "derivative", "parameter", "input", "output", "mode", "indicator"]
 _FIRST = re.compile(r"\ba(\d+)\b")

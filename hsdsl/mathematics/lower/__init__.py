@@ -3,15 +3,15 @@
 
 The pipeline is in :func:`lower`. `program.ModeProgram` lists the routines. `switches` takes out what jumps with time,
 `constants` has numbered names and the routines of parameters alone, `mode` those of a mode with bounds on round-off and
-an order of elimination for implicit steps, `slopes` those that only exports need. `straight` writes each by `printer`,
-in steps that are small, and `tape` the operations for Taylor coefficients.
+an order of elimination for implicit steps. `straight` writes each by `printer`, in steps that are small, and `tape` the
+operations for Taylor coefficients. Only exports need :func:`lower_slopes` and :func:`lower_given`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import sympy as sp
 
@@ -19,7 +19,7 @@ from hsdsl.base import limits
 from hsdsl.base.errors import TOO_LONG, Diagnostic, ModelError
 from hsdsl.language.expression.scope import slope_symbol
 from hsdsl.language.expression.timebox import OutOfTime, deep_stack, timebox
-from hsdsl.language.system import HybridSystem, SampledInput
+from hsdsl.language.system import TIME, HybridSystem, SampledInput
 from hsdsl.mathematics import program as lowered
 from hsdsl.mathematics.completion import ConstrainedMode, constrained_modes
 from hsdsl.mathematics.completion.nearby import slopes_of_inputs
@@ -34,10 +34,10 @@ from hsdsl.mathematics.lower.constants import (
     ranges_of,
 )
 from hsdsl.mathematics.lower.mode import LoweredMode, idle_states, lowered_constrained
-from hsdsl.mathematics.lower.straight import print_routines
+from hsdsl.mathematics.lower.straight import Definition, Gradient, print_routines
 from hsdsl.mathematics.lower.switches import switch_programs, switch_routines, with_switches
 
-__all__ = ["in_turn", "lower", "lower_constants", "lower_expressions"]
+__all__ = ["Slopes", "in_turn", "lower", "lower_constants", "lower_expressions", "lower_given", "lower_slopes"]
 
 Both = Callable[[Callable[[], Any], Callable[[], Any]], tuple[Any, Any]]
 
@@ -128,3 +128,60 @@ def _sampled(given: SampledInput, sloped: bool) -> lowered.SampledInput:
     exact = not any(isinstance(v, sp.Basic) for v in given.times + given.values)
     times, values = (given.times, given.values) if exact else (None, None)
     return lowered.SampledInput(given.name, given.hold, times, values, sloped)
+
+
+class Slopes(NamedTuple):
+    """Derivatives of the flow and outputs of a mode by states and inputs: the routine ``slopes`` has those not 0.
+
+    ``places`` has for each its row and column: rows are the flow of each state, then the outputs, columns the states,
+    then the sampled inputs. ``uses`` has for each row, and for each surface behind them, the columns that it depends
+    on; behind those of slopes are time and the parameters.
+    """
+
+    routines: lowered.Routines
+    places: tuple[tuple[int, int], ...]
+    uses: tuple[frozenset[int], ...]
+
+
+def lower_slopes(system: HybridSystem) -> tuple[Slopes, ...]:
+    """The slopes of each mode, then of those with motion along guards: in the order of `Program.flows`."""
+    with deep_stack():
+        whole, switches = with_switches(system)
+        names = number(whole, switches.symbols)
+        held = (lowered_constrained(found, names) for found in constrained_modes(whole) if found)
+        flows = (*(LoweredMode(mode, names) for mode in whole.modes), *held)
+        return tuple(map(_slopes, flows))
+
+
+def lower_given(system: HybridSystem) -> lowered.Routines:
+    """Routines ``given_i`` of time: the expression of input i, where it may be driven from outside."""
+    with deep_stack():
+        whole, switches = with_switches(system)
+        names = number(whole, switches.symbols)
+        placed = ((i, given.given) for i, given in enumerate(whole.inputs) if given.given is not None)
+        definitions = [Definition(f"given_{i}", (TIME,), (expr.xreplace(names.shared),)) for i, expr in placed]
+        return print_routines(definitions, names.data)
+
+
+def _slopes(mode: LoweredMode) -> Slopes:
+    given = [k for k, output in enumerate(mode.mode.outputs) if output is not None]
+    outputs = mode.place(mode.mode.outputs[k] for k in given)
+    rows = [*range(len(mode.flow)), *(len(mode.flow) + k for k in given)]
+    columns = (*mode.states, *mode.names.inputs)
+    slopes = Gradient((*mode.flow, *outputs), columns)
+    order = {symbol: i for i, symbol in enumerate(columns)}
+    places = [(row, order[symbol]) for row, sparse in zip(rows, slopes.sparse, strict=True) for symbol in sparse]
+    values = tuple(slope for sparse in slopes.sparse for slope in sparse.values())
+    definition = Definition("slopes", (TIME, *mode.states), values, slopes.statements)
+    routines = print_routines((definition,), mode.names.data)
+    return Slopes(routines, tuple(places), _uses(mode, dict(zip(given, outputs, strict=True)), order))
+
+
+def _uses(mode: LoweredMode, outputs: dict[int, sp.Basic], order: dict[sp.Symbol, int]) -> tuple[frozenset[int], ...]:
+    """The columns that flows, outputs and surfaces depend on; an output that a mode does not have has none."""
+    places = order | {name: k for k, name in enumerate((TIME, *mode.names.parameters), len(order))}
+    every = (outputs.get(k, sp.S.Zero) for k in range(len(mode.mode.outputs)))
+    return tuple(
+        frozenset(places[name] for name in expr.free_symbols & places.keys())
+        for expr in (*mode.flow, *every, *mode.residuals)
+    )
