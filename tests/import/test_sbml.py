@@ -16,7 +16,7 @@ from hsdsl.base import limits
 from hsdsl.interface.cli.verbs import obey
 from hsdsl.interface.imports.sbml import imported
 from hsdsl.interface.imports.sbml.formulas import TAKEN
-from hsdsl.interface.imports.sbml.readable import readable
+from hsdsl.interface.imports.sbml.text import readable
 from hsdsl.language.source.xml import read_xml
 
 MATH = '<math xmlns="http://www.w3.org/1998/Math/MathML">{}</math>'

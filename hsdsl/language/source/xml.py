@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, NoReturn
 from xml.parsers import expat
@@ -35,6 +36,10 @@ class Passage(NamedTuple):
         """A diagnostic about some characters of the text, about all of them by default."""
         return self.file.diagnostic(code, message, self.span(start, len(self.text) if end is None else end), hint)
 
+    def refusal(self, code: str, message: str, *place: Any) -> ModelError:
+        """The error of one such diagnostic."""
+        return ModelError([self.fault(code, message, *place)])
+
 
 @dataclass
 class Element:
@@ -63,6 +68,16 @@ class Element:
         """A diagnostic about the element."""
         return self.file.fault(code, message, self.line, self.column, hint, len(self.tag) + 1)
 
+    def refusal(self, code: str, message: str, hint: str | None = None) -> ModelError:
+        """The error of one such diagnostic."""
+        return ModelError([self.fault(code, message, hint)])
+
+    def within(self) -> Iterator[Element]:
+        """The element and all in it, in the order of the file."""
+        yield self
+        for child in self.children:
+            yield from child.within()
+
     def all(self, tag: str) -> list[Element]:
         return [child for child in self.children if child.tag == tag]
 
@@ -73,7 +88,7 @@ class Element:
         """
         found = self.all(tag)
         if len(found) > 1:
-            raise ModelError([found[1].fault("HS331", f"a <{self.tag}> has one <{tag}> at most, this is its second")])
+            raise found[1].refusal("HS331", f"a <{self.tag}> has one <{tag}> at most, this is its second")
         return found[0].passage if found else None
 
     def attribute(self, name: str) -> str:
@@ -82,7 +97,7 @@ class Element:
         Raises ModelError: it does not.
         """
         if name not in self.attributes:
-            raise ModelError([self.fault("HS331", f"this <{self.tag}> lacks the attribute '{name}'")])
+            raise self.refusal("HS331", f"this <{self.tag}> lacks the attribute '{name}'")
         return self.attributes[name]
 
 

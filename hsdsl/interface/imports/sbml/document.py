@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from hsdsl.base import limits
-from hsdsl.base.errors import ModelError
 from hsdsl.base.names import shown
 from hsdsl.language.source.xml import Element
 
@@ -266,28 +265,24 @@ def model_of(root: Element) -> SbmlModel:
     level = root.attributes.get("level", "")
     if level not in ("2", "3"):
         hint = "save it as Level 3, with COPASI or libSBML"
-        raise ModelError([root.fault("HS331", f"SBML of Level {level or '1'} is not read", hint)])
+        raise root.refusal("HS331", f"SBML of Level {level or '1'} is not read", hint)
     for name, value in root.attributes.items():
         if name.endswith(":required") and value == "true":
             raise NotExpressible(f"the package '{name.partition(':')[0]}'", root)
     found = root.all("model")
     if not found:
-        raise ModelError([root.fault("HS331", "the file has no <model>")])
+        raise root.refusal("HS331", "the file has no <model>")
     return _Reader(found[0], int(level)).model
 
 
 def _without_prefixes(root: Element) -> None:
     """Leave out of tags what a file calls the spaces of names; elements of packages keep theirs."""
-    prefix = root.tag.rpartition(":")[0]
-    math = {key.partition(":")[2] for key, value in root.attributes.items() if value.endswith("Math/MathML")}
-    open_ = [root]
-    while open_:
-        element = open_.pop()
+    prefix, math = root.tag.rpartition(":")[0], set[str]()
+    for element in root.within():
         before, _, tag = element.tag.rpartition(":")
         math |= {key.partition(":")[2] for key, value in element.attributes.items() if value.endswith("Math/MathML")}
         if before in (prefix, *math):
             element.tag = tag
-        open_ += element.children
 
 
 class _Reader:
@@ -321,14 +316,14 @@ class _Reader:
         try:
             return words[text.strip()] if text.strip() in words else float(text)
         except ValueError:
-            raise ModelError([element.fault("HS331", f"'{key}' is no number here")]) from None
+            raise element.refusal("HS331", f"'{key}' is no number here") from None
 
     def flag(self, element: Element, key: str, default: bool = False) -> bool:
         text = element.attributes.get(key)
         if text is None:
             return default
         if text.strip() not in ("true", "1", "false", "0"):
-            raise ModelError([element.fault("HS331", f"'{key}': expected true or false, got '{shown(text)}'")])
+            raise element.refusal("HS331", f"'{key}': expected true or false, got '{shown(text)}'")
         return text.strip() in ("true", "1")
 
     def quantities(self, element: Element) -> None:

@@ -1,10 +1,13 @@
-"""The text of a model of SBML: YAML for people, with units, and with names, terms and notes of the file as comments."""
+"""The text of a model of SBML: YAML for people, with units, and with names, terms and notes of the file as comments.
+
+Formulas have no more parentheses, signs and factors than they need: the same operations in the same order.
+"""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,7 +15,18 @@ from hsdsl import __version__
 from hsdsl.base.names import shown, visible
 from hsdsl.interface.imports.sbml.convert import Converter
 from hsdsl.interface.imports.sbml.document import Species
-from hsdsl.interface.imports.sbml.readable import readable
+from hsdsl.language.expression.parse import (
+    Call,
+    Comparison,
+    ExpressionError,
+    Logic,
+    Number,
+    Power,
+    Product,
+    Sum,
+    Tree,
+    parse,
+)
 from hsdsl.language.source.xml import Element
 
 _PLAIN = re.compile(r"[A-Za-z0-9_.(-][\w .()*/+<>=-]*")
@@ -24,9 +38,9 @@ _BASE = {
 _SHORT = {"mole": "mol", "gram": "g", "kilogram": "kg", "kelvin": "K", "volt": "V", "ampere": "A", "joule": "J"}
 _SCALES = {-15: "f", -12: "p", -9: "n", -6: "u", -3: "m", -2: "c", -1: "d", 3: "k", 6: "M"}
 _OLD = {"substance": "mol", "volume": "L", "area": "m**2", "length": "m", "time": "s"}  # of Level 2
-
-
-LONGEST_NOTE = 100
+_LONGEST_NOTE = 100
+_OR, _AND, _NOT, _COMPARE, _ADD, _NEGATIVE, _MULTIPLY, _POWER, _ATOM = range(9)
+Written = tuple[str, int]  # a text, and how strongly its weakest operator binds
 
 
 def written(converter: Converter, document: dict[str, Any], path: str) -> str:
@@ -47,7 +61,7 @@ def written(converter: Converter, document: dict[str, Any], path: str) -> str:
     for key, value in document.items():
         if key == "modes":  # one mode, of formulas and transitions
             (name, mode), *_ = value.items()
-            inner = (line for part in mode for line in _entry(part, mode[part], remarks))
+            inner = (line for part in mode for line in _entry(part, mode[part], remarks, readable))
             lines += ["modes:", f"  {name}:", *(f"    {line}" for line in inner), ""]
         elif key != "hsdsl" and value:
             formula = str if key == "assumptions" else readable
@@ -60,22 +74,17 @@ def written(converter: Converter, document: dict[str, Any], path: str) -> str:
 def _remark(name: str, element: Element) -> str:
     given = element.attributes.get("name", "").strip()
     words = [given if given != name else "", element.attributes.get("sboTerm", ""), _note(element)]
-    return "; ".join(shown(word, LONGEST_NOTE) for word in words if word)
+    return "; ".join(shown(word, _LONGEST_NOTE) for word in words if word)
 
 
 def _note(element: Element) -> str:
     """The text of an element's notes."""
-    return shown(" ".join(text for notes in element.all("notes") for text in _said(notes)), LONGEST_NOTE)
-
-
-def _said(element: Element) -> Iterator[str]:
-    yield from (text for text, *_ in element.pieces)
-    for child in element.children:
-        yield from _said(child)
+    said = (text for notes in element.all("notes") for one in notes.within() for text, *_ in one.pieces)
+    return shown(" ".join(said), _LONGEST_NOTE)
 
 
 def _entry(
-    key: str, value: Any, remarks: Mapping[str, str], formula: Callable[[str], str] = readable, remark: str = ""
+    key: str, value: Any, remarks: Mapping[str, str], formula: Callable[[str], str], remark: str = ""
 ) -> list[str]:
     """The lines of a key; ``remarks`` are on what is directly below it."""
     if isinstance(value, bool):
@@ -162,8 +171,93 @@ def _part(element: Element) -> str | None:
         name, scale = f"{_SCALES[scale]}{name}", 0
     size = multiplier * 10.0**scale
     name = name if size == 1 else f"({size!r}*{name})"
-    return name if exponent == 1 else f"{name}**{_exponent(int(exponent))}"
+    if exponent == 1:
+        return name
+    return f"{name}**({exponent:.0f})" if exponent < 0 else f"{name}**{exponent:.0f}"
 
 
-def _exponent(exponent: int) -> str:
-    return f"({exponent})" if exponent < 0 else str(exponent)
+def readable(text: str) -> str:
+    """A formula as people write it; a text that is no formula, or too long, is returned unchanged."""
+    try:
+        return _Printer(text).written(parse(text, "condition"))[0]
+    except ExpressionError:
+        return text
+
+
+class _Printer:
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def written(self, tree: Tree) -> Written:
+        match tree:
+            case Sum(((True, Sum(((True, operand),))),)):
+                return self.written(operand)
+            case Sum(((True, operand),)):
+                return self.negative(self.written(operand))
+            case Sum():
+                return self.sum(tree)
+            case Product():
+                return self.product(tree)
+            case Power():
+                return f"{self.within(tree.base, _ATOM)}**{self.within(tree.exponent, _POWER)}", _POWER
+            case Call():
+                return f"{tree.function}({', '.join(self.within(part, _OR) for part in tree.arguments)})", _ATOM
+            case Comparison():
+                first, *others = (self.within(part, _ADD) for part in tree.operands)
+                pairs = zip(tree.operators, others, strict=True)
+                return first + "".join(f" {sign} {other}" for sign, other in pairs), _COMPARE
+            case Logic("not", (operand,)):
+                return f"not {self.within(operand, _COMPARE)}", _NOT
+            case Logic():
+                binding = _OR if tree.operator == "or" else _AND
+                return f" {tree.operator} ".join(self.within(part, binding) for part in tree.operands), binding
+            case _:
+                return self.text[tree.start : tree.end], _ATOM
+
+    def within(self, tree: Tree, weakest: int) -> str:
+        return _enclosed(self.written(tree), weakest)
+
+    def negative(self, operand: Written) -> Written:
+        """The opposite: of a product it is that of its first factor, with the same rounding."""
+        if operand[0].startswith("-") and operand[1] >= _NEGATIVE:
+            return operand[0][1:], _MULTIPLY
+        return f"-{_enclosed(operand, _MULTIPLY)}", _NEGATIVE
+
+    def sum(self, tree: Sum) -> Written:
+        text = ""
+        for minus, term in tree.terms:
+            one, binding = self.written(term)
+            if not text:
+                text = one if binding >= _ADD else f"({one})"
+                continue
+            if one.startswith("-") and binding == _NEGATIVE:
+                minus, one, binding = not minus, one[1:], _MULTIPLY
+            text += f" {'-' if minus else '+'} {_enclosed((one, binding), _MULTIPLY)}"
+        return text, _ADD
+
+    def product(self, tree: Product) -> Written:
+        """A product without its factors of 1, and with the sign of one of -1 before it."""
+        factors, sign = list(tree.factors), False
+        while len(factors) > 1 and not factors[1][0] and (one := _unit(factors[0][1])):
+            sign ^= one < 0
+            del factors[0]
+        factors = [factors[0], *(pair for pair in factors[1:] if _unit(pair[1]) != 1)]
+        text, binding = self.written(factors[0][1])
+        if len(factors) > 1:
+            text = _enclosed((text, binding), _NEGATIVE)
+            text += "".join(f"{'/' if below else '*'}{self.within(factor, _POWER)}" for below, factor in factors[1:])
+            binding = _NEGATIVE if text.startswith("-") else _MULTIPLY
+        return self.negative((text, binding)) if sign else (text, binding)
+
+
+def _enclosed(written: Written, weakest: int) -> str:
+    return written[0] if written[1] >= weakest else f"({written[0]})"
+
+
+def _unit(tree: Tree) -> int:
+    """1 or -1 where a factor is that number, else 0."""
+    match tree:
+        case Sum(((True, operand),)):
+            return -_unit(operand)
+        case _:
+            return int(isinstance(tree, Number) and tree.value == 1)

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hsdsl.base.errors import Findings, ModelError
+from hsdsl.base.errors import Findings
 from hsdsl.base.names import did_you_mean, shown
 from hsdsl.interface.imports import end_of_run
 from hsdsl.interface.imports.spaceex.document import Component, Configuration, components, configuration
@@ -107,11 +107,11 @@ def _system(known: Mapping[str, Component], configured: Configuration) -> Compon
         if name in known:
             return known[name]
         message = f"the model has no component '{shown(name)}'"
-        raise ModelError([configured.system.fault("HS333", message, did_you_mean(name, known))])
+        raise configured.system.refusal("HS333", message, did_you_mean(name, known))
     inner = {bind.component for component in known.values() for bind in component.binds}
     outer = [component for name, component in known.items() if name not in inner]
     if len(outer) == 1:
         return outer[0]
     element = next(iter(known.values())).element
     hint = "name it in the configuration: system = " + (outer[0].name if outer else element.attributes["id"])
-    raise ModelError([element.fault("HS333", "which component is the system is not given", hint)])
+    raise element.refusal("HS333", "which component is the system is not given", hint)

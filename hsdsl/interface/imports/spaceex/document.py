@@ -94,7 +94,7 @@ def components(path: str, data: bytes) -> dict[str, Component]:
     """
     root = read_xml(path, data)
     if root.tag != "sspaceex":
-        raise ModelError([root.fault("HS331", f"expected <sspaceex> or <sbml>, got <{shown(root.tag, 40)}>")])
+        raise root.refusal("HS331", f"expected <sspaceex> or <sbml>, got <{shown(root.tag, 40)}>")
     found: dict[str, Component] = {}
     for element in root.all("component"):
         component = Component(element.attribute("id"), _note(element), element)
@@ -105,18 +105,16 @@ def components(path: str, data: bytes) -> dict[str, Component]:
         component.jumps += [_jump(child, component) for child in element.all("transition")]
         component.binds += [_bind(child) for child in element.all("bind")]
         if component.locations and component.binds:
-            raise ModelError(
-                [component.binds[0].element.fault("HS331", "a component has locations or instances, not both")]
-            )
+            raise component.binds[0].element.refusal("HS331", "a component has locations or instances, not both")
         _once(found, element.attribute("id"), component, element)
     if not found:
-        raise ModelError([root.fault("HS331", "the file has no <component>")])
+        raise root.refusal("HS331", "the file has no <component>")
     return found
 
 
 def _once(found: dict[str, T], name: str, entry: T, element: Element) -> None:
     if name in found:
-        raise ModelError([element.fault("HS331", f"there are two of '{shown(name)}' here")])
+        raise element.refusal("HS331", f"there are two of '{shown(name)}' here")
     found[name] = entry
 
 
@@ -125,10 +123,9 @@ def _name(element: Element, attribute: str) -> str:
     if element.attributes.get("type") == "label":
         return name
     if not _NAME.fullmatch(name):
-        message = f"expected a name of letters, digits and underscores, got '{shown(name)}'"
-        raise ModelError([element.fault("HS331", message)])
+        raise element.refusal("HS331", f"expected a name of letters, digits and underscores, got '{shown(name)}'")
     if name in RESERVED and name != "t":
-        raise ModelError([element.fault("HS332", f"`{name}` has a meaning of its own in expressions", "rename it")])
+        raise element.refusal("HS332", f"`{name}` has a meaning of its own in expressions", "rename it")
     return name
 
 
@@ -140,7 +137,7 @@ def _param(element: Element) -> Param:
     kind = element.attributes.get("type", "real")
     if kind not in ("real", "int", "label") or any(element.attributes.get(d, "1") != "1" for d in ("d1", "d2")):
         message = "expected a label or a real number, got a vector, a matrix or another type"
-        raise ModelError([element.fault("HS332", message, "write a parameter for each component")])
+        raise element.refusal("HS332", message, "write a parameter for each component")
     constant = element.attributes.get("dynamics", "any") == "const"
     meaning = "label" if kind == "label" else "constant" if constant else "variable"
     return Param(element.attribute("name"), meaning, element.attributes.get("local", "false") == "true", element)
@@ -152,7 +149,7 @@ def _location(element: Element) -> Location:
     passing = flow is None or flow.text.strip(" ()\t\n") != "false"
     invariant = element.passage_of("invariant")
     if invariant is not None and invariant.text.strip() == "false":
-        raise ModelError([invariant.fault("HS332", "nothing can be in a location whose invariant is `false`")])
+        raise invariant.refusal("HS332", "nothing can be in a location whose invariant is `false`")
     return Location(name, _note(element), _checked(invariant), _checked(flow) if passing else (), element, passing)
 
 
@@ -165,16 +162,16 @@ def _jump(element: Element, component: Component) -> Jump:
     for end in ends:
         if end not in component.locations:
             message = f"there is no location with the id '{shown(end)}' in '{shown(component.name)}'"
-            raise ModelError([element.fault("HS331", message)])
+            raise element.refusal("HS331", message)
     label = element.passage_of("label")
     name = label.text.strip() if label else ""
     if label and name and (name not in component.params or component.params[name].kind != "label"):
         near = closest(name, [p.name for p in component.params.values() if p.kind == "label"])
         hint = f"did you mean '{near}'?" if near else "declare it as a <param> of type label"
-        raise ModelError([label.fault("HS331", f"no label is called '{shown(name)}'", hint)])
+        raise label.refusal("HS331", f"no label is called '{shown(name)}'", hint)
     guard, assignment = element.passage_of("guard"), element.passage_of("assignment")
     if guard is not None and guard.text.strip() == "false":
-        raise ModelError([guard.fault("HS332", "a transition whose guard is `false` is never made", "remove it")])
+        raise guard.refusal("HS332", "a transition whose guard is `false` is never made", "remove it")
     urgent = element.attributes.get("asap", "false") == "true"
     return Jump(ends[0], ends[1], name, _note(element), _checked(guard), _checked(assignment), urgent, element)
 
@@ -211,9 +208,9 @@ class Relation:
         """A diagnostic about it."""
         return self.passage.fault(code, message, hint, self.start, self.end)
 
-    def refusal(self, message: str, hint: str | None = None) -> ModelError:
+    def refusal(self, message: str, hint: str | None = None, code: str = "HS332") -> ModelError:
         """The error that it cannot be kept."""
-        return ModelError([self.fault(message, hint)])
+        return ModelError([self.fault(message, hint, code)])
 
     @property
     def text(self) -> str:
@@ -250,7 +247,7 @@ def relations(passage: Passage | None) -> list[Relation]:
     if either := _EITHER.search(passage.text):
         message = "alternatives and negations cannot be kept: a set here is a conjunction of inequalities"
         hint = "write a transition or a location for each alternative"
-        raise ModelError([passage.fault("HS332", message, hint, either.start(), either.end())])
+        raise passage.refusal("HS332", message, hint, either.start(), either.end())
     return list(_conjunction(passage, 0, len(passage.text)))
 
 
@@ -279,13 +276,13 @@ def _chain(passage: Passage, start: int, end: int) -> Iterator[Relation]:
     operators = list(_RELATION.finditer(passage.text, start, end))
     if not operators:
         message = f"expected a relation such as `x >= 1`, got `{shown(passage.text[start:end], 40)}`"
-        raise ModelError([passage.fault("HS332", message, None, start, end)])
+        raise passage.refusal("HS332", message, None, start, end)
     cuts = [start, *(m.end() for m in operators)], [*(m.start() for m in operators), end]
     sides = list(zip(*cuts, strict=True))
     for operator, left, right in zip(operators, sides, sides[1:], strict=False):
         sign = "==" if operator.group() == "=" else operator.group()
         if sign == "!=":
-            raise ModelError([passage.fault("HS332", "`!=` is no closed set", None, start, end)])
+            raise passage.refusal("HS332", "`!=` is no closed set", None, start, end)
         yield _related(passage, left, sign, right, (start, end))
 
 
@@ -305,7 +302,7 @@ def _related(
         sign, other = (MIRRORED[sign], f"-({other})") if negative and sign in MIRRORED else (sign, other)
         return Relation(name[1], sign, other, passage, *whole, primed=True)
     message = BOUNDED if sign not in ("==", ":=") else "a derivative belongs on the left-hand side"
-    raise ModelError([passage.fault("HS332", message, DERIVED, *whole)])
+    raise passage.refusal("HS332", message, DERIVED, *whole)
 
 
 def _side(passage: Passage, start: int, end: int) -> str:
@@ -316,7 +313,7 @@ def _side(passage: Passage, start: int, end: int) -> str:
         parse(text)
     except ExpressionError as error:
         at = start + len(raw) - len(raw.lstrip()) + error.start  # off by what blanks and `^` have changed
-        raise ModelError([passage.fault(error.code, error.message, error.hint, at, end)]) from None
+        raise passage.refusal(error.code, error.message, error.hint, at, end) from None
     return text
 
 
@@ -344,7 +341,7 @@ def checked(relation: Relation) -> Relation:
         for side in (relation.left, relation.right):
             value(side)
     except ExpressionError as error:
-        raise ModelError([relation.fault(error.message, error.hint, error.code)]) from None
+        raise relation.refusal(error.message, error.hint, error.code) from None
     return relation
 
 

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hsdsl.base.errors import Findings, ModelError
+from hsdsl.base.errors import Findings
 from hsdsl.base.functions import replaced
 from hsdsl.base.names import shown
 from hsdsl.interface.imports.spaceex.document import Relation, names_in, value, within
@@ -44,7 +44,7 @@ def mode_drafts(
                 message = (
                     f"'{name}' has no derivative in location {source.place.name}, and no value after this transition"
                 )
-                raise ModelError([arrow.element.fault("HS332", message, f"assign a value: {name} := ...")])
+                raise arrow.element.refusal("HS332", message, f"assign a value: {name} := ...")
     return drafts
 
 
@@ -69,8 +69,7 @@ def _draft(network: Network, place: Place, arrows: list[Arrow], constants: Mappi
         if relation.operator == "==":
             rate = lie_derivative(draft.excess(relation), draft.flow)
             if not all(decide([*draft.inside, beyond]).never for beyond in (positive(rate), negative(rate))):
-                message = "the flow does not keep this equation of the invariant: time cannot pass"
-                raise relation.refusal(message)
+                raise relation.refusal("the flow does not keep this equation of the invariant: time cannot pass")
             draft.comments.append(f"`{relation.text}` holds all along")
             draft.equalities.append(draft.excess(relation))
         else:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from itertools import islice, product
 
 from hsdsl.base import limits
-from hsdsl.base.errors import ModelError
 from hsdsl.base.names import closest, shown
 from hsdsl.interface.imports.spaceex.document import (
     BOUNDED,
@@ -91,7 +90,7 @@ class _Flattening:
                 self.origins[path, param.name] = param
         if depth > DEEPEST or len(self.instances) >= MOST_INSTANCES:
             message = f"the network has more than {MOST_INSTANCES} instances or {DEEPEST} levels"
-            raise ModelError([component.element.fault("HS332", message)])
+            raise component.element.refusal("HS332", message)
         if not component.binds:
             self.instances.append((path, component, own))
         for bind in component.binds:
@@ -104,8 +103,7 @@ class _Flattening:
             return self.components[bind.component]
         near = closest(bind.component, self.components)
         hint = f"did you mean '{near}'?" if near else None
-        message = f"there is no component '{shown(bind.component)}'"
-        raise ModelError([bind.element.fault("HS331", message, hint)])
+        raise bind.element.refusal("HS331", f"there is no component '{shown(bind.component)}'", hint)
 
     def given(self, bind: Bind, path: str, parent: Component, names: dict[str, Origin]) -> dict[str, Origin]:
         """What the maps of an instance bind: names of its parent, or numbers."""
@@ -114,8 +112,7 @@ class _Flattening:
         for key, passage in bind.values.items():
             param = component.params.get(key)
             if param is None or param.local:
-                message = f"'{shown(bind.component)}' has no parameter '{shown(key)}' to bind"
-                raise ModelError([passage.fault("HS331", message)])
+                raise passage.refusal("HS331", f"'{shown(bind.component)}' has no parameter '{shown(key)}' to bind")
             text = passage.text.strip()
             if text in names:
                 self.match(param, parent.params[text], passage)
@@ -127,13 +124,13 @@ class _Flattening:
         for param in component.params.values():
             if not param.local and param.name not in found and param.kind != "label":
                 message = f"'{param.name}' of '{shown(bind.component)}' is not bound"
-                raise ModelError([bind.element.fault("HS331", message, f'add <map key="{param.name}">')])
+                raise bind.element.refusal("HS331", message, f'add <map key="{param.name}">')
         return found
 
     def match(self, param: Param, outer: Param, passage: Passage) -> None:
         """Refuse a label for a number, and a variable for a constant."""
         if (param.kind == "label") != (outer.kind == "label"):
-            raise ModelError([passage.fault("HS331", f"'{param.name}' is a {param.kind}, this is a {outer.kind}")])
+            raise passage.refusal("HS331", f"'{param.name}' is a {param.kind}, this is a {outer.kind}")
 
 
 def _number(passage: Passage, parent: Component) -> str:
@@ -142,12 +139,12 @@ def _number(passage: Passage, parent: Component) -> str:
         names = names_in(text)
         parse(text)
     except ExpressionError as error:
-        raise ModelError([passage.fault(error.code, error.message, error.hint)]) from None
+        raise passage.refusal(error.code, error.message, error.hint) from None
     if not names:
         return text
     near = closest(text, parent.params)
     hint = f"did you mean '{near}'?" if near else "a map has a name or a number"
-    raise ModelError([passage.fault("HS331", f"'{shown(parent.name)}' has no parameter '{shown(text)}'", hint)])
+    raise passage.refusal("HS331", f"'{shown(parent.name)}' has no parameter '{shown(text)}'", hint)
 
 
 def flattened(components: dict[str, Component], system: Component) -> Network:
@@ -159,10 +156,10 @@ def flattened(components: dict[str, Component], system: Component) -> Network:
     base = not system.binds
     work.add("", system, {})
     if not system.locations and base:
-        raise ModelError([system.element.fault("HS332", f"'{shown(system.name)}' has neither locations nor instances")])
+        raise system.element.refusal("HS332", f"'{shown(system.name)}' has neither locations nor instances")
     for path, component, _ in work.instances:
         if not component.locations:
-            raise ModelError([component.element.fault("HS332", f"'{shown(path or component.name)}' has no locations")])
+            raise component.element.refusal("HS332", f"'{shown(path or component.name)}' has no locations")
     names = _named(work.origins)
     instances = tuple(
         Instance(path or component.name, component, {key: names[origin] for key, origin in own.items()})
@@ -237,7 +234,7 @@ def automaton(network: Network, start: Key) -> tuple[dict[Key, Place], list[Arro
             continue
         if len(places) >= most or len(arrows) > MOST_EDGES:
             message = f"the network has more than {most:,} locations or {MOST_EDGES:,} transitions"
-            raise ModelError([network.instances[0].component.element.fault("HS332", message)])
+            raise network.instances[0].component.element.refusal("HS332", message)
         places[key] = place(network, key, [known.name for known in places.values()])
         leaving = list(islice(_arrows(network, key), MOST_EDGES))
         arrows += leaving
@@ -281,7 +278,7 @@ def _known_names(relation: Relation, instance: Instance) -> None:
     for name in sorted(relation.names):
         if name not in known:
             message = f"'{instance.component.name}' has no variable or constant '{name}'"
-            raise ModelError([relation.fault(message, "declare it as a <param>", "HS331")])
+            raise relation.refusal(message, "declare it as a <param>", "HS331")
 
 
 def _flow(network: Network, locations: Iterable[Location]) -> dict[str, Relation]:

@@ -79,24 +79,22 @@ def candidates(network: Network, configured: Configuration, system: str) -> Iter
         assert configured.initially is not None
         path = name.removeprefix(f"{system}.")
         path = next(iter(paths)) if len(paths) == 1 and path in ("", system) else path
-        fault = configured.initially.fault
+        refusal = configured.initially.refusal
         if path not in paths:
             message = f"there is no instance '{shown(name)}' in '{shown(system)}'"
-            raise ModelError([fault("HS333", message, did_you_mean(path, paths), *span)])
+            raise refusal("HS333", message, did_you_mean(path, paths), *span)
         ids = {known.name: key for key, known in paths[path].component.locations.items()}
         if location not in ids:
             message = f"'{shown(path)}' has no location '{shown(location)}'"
-            raise ModelError([fault("HS333", message, did_you_mean(location, ids), *span)])
+            raise refusal("HS333", message, did_you_mean(location, ids), *span)
         if chosen.setdefault(path, ids[location]) != ids[location]:
-            raise ModelError([fault("HS333", f"'{shown(path)}' starts in two locations", None, *span)])
+            raise refusal("HS333", f"'{shown(path)}' starts in two locations", None, *span)
     ways = [[chosen[p]] if p in chosen else list(i.component.locations) for p, i in paths.items()]
     return islice(product(*ways), limits.current().modes)
 
 
-def _place_of(configured: Configuration, element: Element, message: str, hint: str) -> Any:
-    if configured.initially is not None:
-        return configured.initially.fault("HS333", message, hint)
-    return element.fault("HS333", message, hint)
+def _refusal(configured: Configuration, element: Element, message: str, hint: str) -> ModelError:
+    return (configured.initially or element).refusal("HS333", message, hint)
 
 
 def with_inputs(
@@ -138,7 +136,7 @@ def start(network: Network, configured: Configuration, system: str, corner: str 
         if name not in work.texts:
             message = f"the constant '{name}' has no value"
             hint = f"write {name} == and its value under `initially`, or give --at {name}=NUMBER"
-            raise ModelError([network.params[name].element.fault("HS333", message, hint)])
+            raise network.params[name].element.refusal("HS333", message, hint)
     for relation in relations:
         work.hold(relation)
     constants = {name: text for name, text in work.texts.items() if name in network.constants}
@@ -155,10 +153,10 @@ def _named_place(relation: Relation, network: Network, system: str) -> Relation:
         if dotted not in network.qualified:
             near = closest(dotted, network.qualified)
             hint = f"did you mean '{near}'?" if near else None
-            raise ModelError([relation.fault(f"nothing is called '{shown(dotted)}'", hint, "HS333")])
+            raise relation.refusal(f"nothing is called '{shown(dotted)}'", hint, "HS333")
         names[name] = network.qualified[dotted]
     if relation.operator == ":=" or relation.primed:
-        raise ModelError([relation.fault("an initial set has relations such as x == 1", None, "HS333")])
+        raise relation.refusal("an initial set has relations such as x == 1", None, "HS333")
     return relation.renamed(names)
 
 
@@ -262,14 +260,13 @@ class _Solving:
         if free:
             names = ", ".join(f"'{s.name}'" for s in free)
             hint = f"choose a point of it: --at {free[0].name}=NUMBER"
-            message = f"a run starts at one point, and this leaves {names} open"
-            raise ModelError([relation.fault(message, hint, "HS333")])
+            raise relation.refusal(f"a run starts at one point, and this leaves {names} open", hint, "HS333")
         if excess.free_symbols:
             outside = [positive(excess), *([negative(excess)] if relation.operator == "==" else [])]
             sides = [side for side in self.sides if side.expr.free_symbols & excess.free_symbols]
             if not all(decide([*sides, beyond]).never for beyond in outside):
                 message = "the initial set is no box: this holds in a part of it alone"
-                raise ModelError([relation.fault(message, f"choose a point of it: {self.inside()}", "HS333")])
+                raise relation.refusal(message, f"choose a point of it: {self.inside()}", "HS333")
             return
         beyond = excess >= 0 if relation.operator in STRICT else excess > 0
         if (excess != 0) if relation.operator == "==" else bool(beyond):
@@ -277,7 +274,7 @@ class _Solving:
             hint = None
             if self.chosen or self.network.given:
                 message, hint = "this does not hold at the point that --at chose", "choose another one"
-            raise ModelError([relation.fault(message, hint, "HS333")])
+            raise relation.refusal(message, hint, "HS333")
 
     def inside(self) -> str:
         """The --at that chooses a point of a set that is no box."""
@@ -308,17 +305,17 @@ def refuse_outside(draft: ModeDraft, begin: Start, configured: Configuration, el
         if name not in begin.variables:
             message = f"where '{name}' starts is not given"
             hint = f"write {name} == and a number under `initially`, or give --at {name}=NUMBER"
-            raise ModelError([_place_of(configured, element, message, hint)])
+            raise _refusal(configured, element, message, hint)
     for facet, relation in draft.facets.items():
         if bool(replaced(draft.placed(facet), begin.numbers, {}) > 0):
-            raise ModelError([relation.fault("the run starts where this invariant does not hold")])
+            raise relation.refusal("the run starts where this invariant does not hold")
     for equality in draft.equalities:
         if replaced(equality, begin.numbers, {}) != 0:
             message = "the run starts where an equation of the invariant does not hold"
-            raise ModelError([_place_of(configured, element, message, "change `initially`")])
+            raise _refusal(configured, element, message, "change `initially`")
 
 
 def no_location(configured: Configuration, element: Element) -> ModelError:
     """The error that the initial point is in no invariant."""
     message, hint = "no location admits the initial point", "change `initially`, or give another point by --at"
-    return ModelError([_place_of(configured, element, message, hint)])
+    return _refusal(configured, element, message, hint)
