@@ -36,7 +36,8 @@ typedef struct {
   double *values, *weights, *gradient, *shares, *slopes;
   /* what is found on a step: where each surface is crossed that is still open, and the sizes of largest() at the first */
   double *theta, *time, *q, *sizes, *first;
-  /* a bit for each lane; of lanes of none of these all that a run brings along is that behind the step */
+  /* a bit for each lane; where it passed, or none of the next ones is set, a run brings along what is behind the step */
+  int32_t passed;   /* it goes on before its limit */
   int32_t failed;   /* the step is not known to be what the loop for one run would make */
   int32_t slow;     /* no step: there were too many */
   int32_t doubtful; /* of the others: its error is to be looked at */

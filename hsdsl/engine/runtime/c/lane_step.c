@@ -160,7 +160,7 @@ static int step_lanes(hs_lanes *l) {
   const hs_mask all = t == t, few = counted(l);
   hs_mask good = few, exact = all;
   l->failed = -1;
-  l->crossed = l->doubtful = 0;
+  l->crossed = l->doubtful = l->passed = 0;
   l->slow = (int32_t)bits_of(~few);
   if (mode->series(p, order, t, x, lines)) return 0;
   hs_real h = proposed_step(l, n);
@@ -195,6 +195,7 @@ static int step_lanes(hs_lanes *l) {
   l->crossed = (int32_t)bits_of(crossed & good);
   l->doubtful = (int32_t)bits_of(good & ~exact);
   go_to_ends(l, n, passed);
+  l->passed = (int32_t)bits_of(passed & (t1 < *(hs_real *)l->limit));
   return 0;
 }
 

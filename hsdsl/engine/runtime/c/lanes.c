@@ -1,187 +1,17 @@
 /* Instances of an ensemble whose steps are made together, in lanes of vectors. Each place has one run under way, which
    is that of located.c up to where a flow needs steps; there it parks. Runs of one mode then live in lanes, where code
    that is compiled for the model (lane_step.c) makes their steps, until something happens. Runs on whose last step a
-   surface is crossed wait until so many do that their crossings are found together. What that code does not decide is
-   done by the functions for one run, on the same step. So a run has the bits that it has alone. */
+   surface is crossed wait until so many do that their crossings are found together, and their transitions made. What that
+   code does not decide is done by the functions for one run, on the same step. So a run has the bits that it has alone. */
 
-#include "hs_lanes.h"
+#include "lane_rows.c"
 
 #define LOST 4 /* steps that lanes must make for one that they leave, */
 #define MOST_LOST 4096 /* but for so many */
 #define KEPT_OF_PLACE 64 /* rows, arcs and transitions that it keeps before it lets go: all places fit into a cache */
 
-typedef struct hs_seat hs_seat;
-
-/* Lanes, and who has them: 0 where a lane is free. */
-typedef struct {
-  hs_lanes l;
-  int64_t columns, carried; /* numbers of a run and its step, and of those what a run brings along */
-  int lanes, count;
-  hs_seat *seat[HS_MOST_LANES];
-} hs_row_of_lanes;
-
-struct hs_seat {
-  hs_ensemble *instance;
-  hs_run run;
-  hs_time limit;
-  int32_t *mode; /* in which it may make a step in a lane; -1 where it may not, or is there */
-  hs_row_of_lanes own; /* of one lane, with what the run brings along to the next one that it gets */
-  int unwritten; /* whether a step was made whose end is no row yet */
-};
-
-static hs_seat *seat_of(const hs_team *team, int64_t i) { return (hs_seat *)team->seats + i; }
-
-static void take_columns(hs_store *store, int64_t count, double **const *each) {
-  for (; *each; each++) **each = numbers(store, count);
-}
-
-static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_method *method, int64_t lanes,
-                          hs_store *store) {
-  const int64_t n = model->width, m = model->surfaces, order = method->order, most = (order + 1) * (order + 2) / 2;
-  const hs_row_of_lanes none = {0};
-  *row = none;
-  hs_lanes *const l = &row->l;
-  double **const one[] = {&l->t, &l->limit, &l->longest, &l->made, &l->since, &l->brief, 0};
-  double **const states[] = {&l->x, &l->scales, &l->scale, &l->entered, &l->before, 0};
-  double **const step[] = {&l->h, &l->t1, &l->first, 0};
-  double **const surfaces[] = {&l->starts, &l->ends, &l->open, 0};
-  double **const found[] = {&l->values, &l->weights, &l->shares, &l->slopes, &l->theta, &l->time, 0};
-  double **const scratch[] = {&l->end, &l->error, &l->sizes, 0};
-  const int64_t begun = store->used;
-  take_columns(store, lanes, one);
-  l->p = numbers(store, (int64_t)model->data * lanes);
-  take_columns(store, n * lanes, states);
-  l->known = numbers(store, (int64_t)model->states * lanes);
-  l->standing = numbers(store, m * lanes);
-  row->carried = (store->used - begun) / lanes;
-  take_columns(store, lanes, step);
-  l->z = numbers(store, n * lanes);
-  take_columns(store, m * lanes, surfaces);
-  l->piece = numbers(store, n * order * lanes);
-  l->curves = numbers(store, m * (order + 1) * lanes);
-  row->columns = (store->used - begun) / lanes;
-  l->lines = numbers(store, (int64_t)model->lines * (order + 2) * lanes);
-  l->gradient = numbers(store, (n + 1) * lanes);
-  take_columns(store, n * lanes, scratch);
-  take_columns(store, m * lanes, found);
-  l->q = numbers(store, m * n * lanes);
-  l->inverse = numbers(store, (most + lanes - 1) / lanes * lanes);
-  if (store->numbers) fill_binomials(l->inverse, (int)order);
-  for (int64_t i = 0; store->numbers && i < most; i++) l->inverse[i] = 1 / l->inverse[i];
-  l->modes = model->mode;
-  l->order = method->order;
-  l->most = MOST_SHORT;
-  row->lanes = (int)lanes;
-}
-
-int64_t hs_lane_memory(const hs_model *model, const hs_method *method, int64_t places, int32_t lanes) {
-  hs_store store = {0, HS_MOST_LANES};
-  hs_row_of_lanes row;
-  for (int i = 0; i < 2; i++) lay_out_lanes(&row, model, method, lanes, &store);
-  for (int64_t i = 0; i < places; i++) lay_out_lanes(&row, model, method, 1, &store);
-  take(&store, places, sizeof(hs_seat));
-  take(&store, model->flows, sizeof(int64_t));
-  take(&store, places, sizeof(int32_t));
-  return store.used;
-}
-
-/* Copy numbers of a lane. */
-static void copy_lane(const hs_row_of_lanes *from, int lane, const hs_row_of_lanes *to, int other, int64_t count) {
-  for (int64_t i = 0; i < count; i++) to->l.t[i * to->lanes + other] = from->l.t[i * from->lanes + lane];
-}
-
-static void gather(const double *column, hs_real *to, int n, int lanes, int lane) {
-  for (int i = 0; i < n; i++) to[i] = column[i * lanes + lane];
-}
-
-static void scatter(const hs_real *from, double *column, int n, int lanes, int lane) {
-  for (int i = 0; i < n; i++) column[i * lanes + lane] = from[i];
-}
-
-/* Lay ready what the run of a seat brings along into a lane. */
-static void make_ready(hs_seat *seat) {
-  hs_run *const run = &seat->run;
-  const hs_lanes *const l = &seat->own.l;
-  const int n = run->here.dimension, lane = 0, lanes = 1;
-  l->t[lane] = run->here.t;
-  l->limit[lane] = seat->limit;
-  l->longest[lane] = run->control.tolerance > 0 ? run->control.largest : run->control.h;
-  l->made[lane] = run->pace.made, l->since[lane] = run->pace.since, l->brief[lane] = run->pace.brief;
-  scatter(run->here.p, l->p, run->model->data, lanes, lane);
-  scatter(run->x, l->x, n, lanes, lane);
-  scatter(run->sizes.scales, l->scales, n, lanes, lane);
-  scatter(run->sizes.scale, l->scale, n, lanes, lane);
-  scatter(run->entered, l->entered, n, lanes, lane);
-  scatter(run->sizes.known, l->known, run->model->states, lanes, lane);
-  for (int s = 0; s < n; s++) l->before[s * lanes + lane] = run->has_before ? span_size(run, &run->before, 1.0, s) : 0.0;
-  for (int k = 0; k < run->here.table->surfaces; k++) l->standing[k * lanes + lane] = run->surfaces.active[k];
-  *seat->mode = run->here.mode;
-}
-
-/* Put it there. */
-static void enter_lane(hs_row_of_lanes *row, int lane, hs_seat *seat) {
-  copy_lane(&seat->own, 0, row, lane, row->carried);
-  row->seat[lane] = seat, row->count++;
-  *seat->mode = -1;
-}
-
-/* Take it out of a lane, to bring it along into another one that makes steps in its mode. */
-static void clear_lane(hs_row_of_lanes *row, int lane) {
-  hs_seat *const seat = row->seat[lane];
-  copy_lane(row, lane, &seat->own, 0, row->carried);
-  row->seat[lane] = 0, row->count--;
-  *seat->mode = seat->run.here.mode;
-}
-
-/* Have the run of a seat where a lane has taken it; `written`: its last row as well, if it has none. */
-static void leave_lane(hs_row_of_lanes *row, int lane, hs_seat *seat, int written) {
-  hs_run *const run = &seat->run;
-  const hs_lanes *const l = &row->l;
-  const int n = run->here.dimension, lanes = row->lanes;
-  run->here.t = l->t[lane];
-  run->pace.made = (int)l->made[lane], run->pace.since = l->since[lane];
-  gather(l->x, run->x, n, lanes, lane);
-  gather(l->scales, run->sizes.scales, n, lanes, lane);
-  gather(l->scale, run->sizes.scale, n, lanes, lane);
-  gather(l->entered, run->entered, n, lanes, lane);
-  gather(l->known, run->sizes.known, run->model->states, lanes, lane);
-  gather(l->before, run->before.largest, n, lanes, lane);
-  run->has_before = run->before.sized = 1;
-  run->here.active = run->surfaces.has_starts = 0;
-  for (int k = 0; k < run->here.table->surfaces; k++)
-    run->here.active += run->surfaces.active[k] = l->standing[k * lanes + lane] != 0;
-  if (written && seat->unwritten) append(run, run->here.t, run->x, 0);
-  if (written) seat->unwritten = 0;
-  row->seat[lane] = 0, row->count--;
-}
-
-/* Put the step of a lane where try_series() writes its own. */
-static void step_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
-  const hs_lanes *const l = &row->l;
-  const int n = run->here.dimension, w = run->width, lanes = row->lanes;
-  begin_span(run, l->h[lane], l->t1[lane]);
-  gather(l->z, run->z, n, lanes, lane);
-  run->span.piece.degree = l->order;
-  for (int m = 0; m < l->order; m++) gather(l->piece + m * n * lanes, run->span.piece.c + m * w, n, lanes, lane);
-}
-
-/* The same of surfaces along it: see series_curves(). */
-static void curves_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) {
-  const hs_lanes *const l = &row->l;
-  const int count = run->here.table->surfaces, order = l->order, lanes = row->lanes;
-  hs_curves *const curves = &run->curves;
-  begin_curves(curves, count);
-  gather(l->starts, run->surfaces.starts, count, lanes, lane);
-  gather(l->ends, run->surfaces.ends, count, lanes, lane);
-  for (int k = 0; k < count; k++) {
-    hs_real *const c = coefficients_of(curves, 0, k);
-    gather(l->curves + k * (order + 1) * lanes, c, order + 1, lanes, lane);
-    c[0] = run->surfaces.starts[k];
-    *degree_of(curves, 0, k) = degree_without_zeros(c, order);
-    *off_of(curves, 0, k) = 0;
-    curves->certain[k] = 1;
-  }
-}
+/* Whether of runs only the last row counts. */
+static int is_bare(const hs_ensemble *e) { return !e->samples && !e->slides && !e->watch.names; }
 
 /* Begin the next instance at a place: 0 where none is left. */
 static int begin_next(hs_team *team, hs_seat *seat, int *outcome) {
@@ -191,7 +21,7 @@ static int begin_next(hs_team *team, hs_seat *seat, int *outcome) {
   begin_instance(e);
   open_run(&seat->run, &e->task);
   seat->run.lanes.parks = 1;
-  seat->run.lanes.bare = !e->samples && !e->slides && !e->watch.names;
+  seat->run.lanes.bare = is_bare(e);
   *outcome = begin_run(&seat->run, &e->task, 0.0);
   return 1;
 }
@@ -224,7 +54,7 @@ static void go_ahead(hs_team *team, hs_seat *seat, int outcome, int flows) {
       return;
     }
   }
-  make_ready(seat);
+  *seat->mode = run->here.mode;
 }
 
 /* Put the crossings that were found in a lane where crossings_along() writes its own; 0 where one may not count. */
@@ -250,8 +80,7 @@ static int behind_crossing(const hs_row_of_lanes *row, int lane, hs_seat *seat) 
   hs_run *const run = &seat->run;
   const hs_lanes *const l = &row->l;
   const int landed = l->landed >> lane & 1 && crossings_of_lane(row, lane, run);
-  if (!landed && seat->unwritten) append(run, run->here.t, run->x, 0);
-  seat->unwritten = 0;
+  if (!landed && run->lanes.bare) append(run, run->here.t, run->x, 0);
   if (!landed || !run->lanes.bare)
     step_of_lane(row, lane, run);
   else
@@ -308,12 +137,13 @@ static void behind_jump(hs_team *team, hs_row_of_lanes *row, int lane) {
   gather(l->x, run->x, edge->target_dimension, row->lanes, lane);
   begin_following(run);
   comes_back(run, 1);
-  seat->unwritten = 1;
+  seat->has_jumped = 1;
   if (run->lanes.bare && !may_end(run, chosen->time) && !steps_alone(team, run)) {
     clear_lane(row, lane);
     return;
   }
   leave_lane(row, lane, seat, 1);
+  if (!run->lanes.bare) append(run, run->here.t, run->x, 0);
   go_ahead(team, seat, ends_tail(run, mode, k), 0);
 }
 
@@ -384,14 +214,13 @@ static void behind_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of
   const int doubtful = l->doubtful >> lane & 1, wrong = doubtful && is_wrong_in_lane(row, lane, run);
   int standing = 0, outcome = GOES_ON;
   for (int k = 0; doubtful && k < run->here.table->surfaces; k++) standing |= l->standing[k * row->lanes + lane] != 0;
-  team->lost[l->mode] += failed ? LOST : -1;
+  if (failed) team->lost[l->mode] += LOST + 1;
   team->failed += failed, team->doubtful += doubtful, team->crossed += crossed;
   if (crossed && !wrong) {
     wait_for_crossing(team, row, lane, waiting);
     return;
   }
   if (!failed && !wrong && !(doubtful && standing)) {
-    seat->unwritten = run->lanes.bare;
     if (!run->lanes.bare) step_of_lane(row, lane, run), pass(run);
     if (doubtful) pass_lane(row, lane, n);
     if (l->t[lane] < seat->limit) return;
@@ -472,7 +301,7 @@ void hs_run_team(hs_team *team) {
     hs_seat *const seat = seat_of(team, i);
     hs_ensemble *const e = seat->instance = team->places[i];
     lay_out_lanes(&seat->own, task->model, task->method, 1, &store);
-    seat->unwritten = 0;
+    seat->has_own = 0;
     seat->mode = &team->ready[i];
     *seat->mode = -1;
     share(e, team->places[0]);
@@ -482,10 +311,12 @@ void hs_run_team(hs_team *team) {
       if (*rooms[room] > KEPT_OF_PLACE) *rooms[room] = KEPT_OF_PLACE;
     if (begin_next(team, seat, &outcome)) go_ahead(team, seat, outcome, 0);
   }
+  const int bare = is_bare(team->places[0]);
   for (int count; !*stop && (count = fill_lanes(team, &row, &waiting)) > 0;) {
     team->program->step(&row.l);
-    team->steps++, team->stepped += count;
+    team->steps++, team->stepped += count, team->lost[row.l.mode] -= count;
+    const int32_t passed = bare ? row.l.passed : 0;
     for (int lane = 0; lane < row.lanes; lane++)
-      if (row.seat[lane]) behind_lane(team, &row, lane, &waiting);
+      if (row.seat[lane] && !(passed >> lane & 1)) behind_lane(team, &row, lane, &waiting);
   }
 }
