@@ -20,7 +20,7 @@ from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smoo
 import hsdsl
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.engine.integrators import FALLBACK
-from hsdsl.engine.runtime.structures import SCHEMES
+from hsdsl.engine.runtime.structures import COMPILED_SCHEMES
 from hsdsl.engine.simulate import output_buffers
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
@@ -64,7 +64,7 @@ def in_chunks() -> int:
     """In chunks so small that every run fills several."""
     output_buffers.LEAST_ROWS, output_buffers.MOST_ROWS = 12, 200
     count = 0
-    for name, scheme in product(SOME, SCHEMES):
+    for name, scheme in product(SOME, COMPILED_SCHEMES):
         for call in calls(name, scheme)[::3] if name not in LONG else ():
             if (scheme, call.get("method", FALLBACK)) in COMPILED:
                 count += by_c(model(name), **{key: value for key, value in call.items() if key not in COMPARED})
@@ -76,7 +76,7 @@ def in_chunks() -> int:
         for text, settings in ((random_model(seed), SETTINGS), (smooth_model(seed), SMOOTH_SETTINGS)):
             try:
                 drawn = Model(elaborate("random.yaml", text=text.encode()))
-                for setting, scheme in product(settings, SCHEMES):
+                for setting, scheme in product(settings, COMPILED_SCHEMES):
                     if (scheme, setting.get("method", FALLBACK)) in COMPILED:
                         count += by_c(drawn, max_transitions=25, scheme=scheme, **setting)
             except (ModelError, UsageError):

@@ -11,7 +11,7 @@ from textwrap import fill
 from gallery.records import Record, Records
 from gallery.scenes import Entry
 from gallery.settings import MOST, WITHIN
-from hsdsl.engine.simulate import SCHEMES
+from hsdsl.base.defaults import SCHEMES
 from hsdsl.interface.chart import PEERS
 
 OURS = ("hsdsl c", "hsdsl python")

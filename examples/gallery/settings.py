@@ -7,10 +7,10 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from gallery.scenes import UNDECIDED, Entry
+from hsdsl.base.defaults import SCHEMES
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.integrators import METHODS
 from hsdsl.engine.preparation.options import OWN_FORMULA
-from hsdsl.engine.simulate import SCHEMES
 from hsdsl.interface.chart import PEERS, Refused
 from hsdsl.interface.chart.outcome import WITHIN, Outcome, outcome
 from hsdsl.interface.chart.peers import prepare

@@ -141,8 +141,13 @@ def structural(problem: Problem) -> set[str]:
     program = problem.program
     used = used_by(program)
     direct = {i for name, needed in used.items() if name.startswith("input_") for i in needed}
-    direct |= parameters_in(*definitions(program.switching).values())
+    direct |= switch_parameters(program)
     return {program.parameters[i] for i in with_sources(program, used, derived(problem), direct)}
+
+
+def switch_parameters(program: Program) -> set[int]:
+    """The parameters that switches of time are computed from."""
+    return parameters_in(*definitions(program.switching).values())
 
 
 def used_by(program: Program) -> dict[str, set[int]]:

@@ -10,8 +10,8 @@ from typing import get_args
 
 import pytest
 
+from hsdsl.base.defaults import SCHEMES
 from hsdsl.engine.preparation.pipeline import ENGINES
-from hsdsl.engine.simulate import SCHEMES
 from hsdsl.interface.cli import options
 
 ROOT = Path(__file__).parents[2]

@@ -16,10 +16,10 @@ from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
 from hsdsl.engine.integrators import METHODS
-from hsdsl.engine.runtime.structures import SCHEMES
+from hsdsl.engine.runtime.structures import COMPILED_SCHEMES
 
 pytestmark = needs_compiler
-COMPILED = list(product(SCHEMES, METHODS))
+COMPILED = list(product(COMPILED_SCHEMES, METHODS))
 MODELS = {path.stem: path for path in sorted((Path(__file__).parents[2] / "models").glob("*.yaml"))}
 FLOATS = {name: setting for name, setting in SETTINGS.items() if "precision" not in setting}
 LONG = ("m4-chattering", "m10-sliding", "zeno-ball")  # thousands of transitions
@@ -45,7 +45,7 @@ def calls(name: str, scheme: str) -> list[dict[str, Any]]:
     return found
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("scheme", COMPILED_SCHEMES)
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in CASES])
 def test_every_case_in_every_setting(name: str, scheme: str) -> None:
     seen: list[Any] = []  # `auto` is a method that another setting names

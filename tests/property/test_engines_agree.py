@@ -11,7 +11,7 @@ from property.random_models import SETTINGS, SMOOTH_SETTINGS, random_model, smoo
 
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.engine.execution import Execution
-from hsdsl.engine.runtime.structures import SCHEMES
+from hsdsl.engine.runtime.structures import COMPILED_SCHEMES
 from hsdsl.interface.model import Model
 from hsdsl.language.elaborate import elaborate
 
@@ -33,11 +33,13 @@ def runs_of(text: str, every: tuple[dict, ...], schemes: list[str]) -> list[Exec
 
 
 def check(seeds: Iterable[int]) -> Counter[str]:
-    return Counter(run.stop.reason for seed in seeds for run in runs_of(random_model(seed), SETTINGS, list(SCHEMES)))
+    return Counter(
+        run.stop.reason for seed in seeds for run in runs_of(random_model(seed), SETTINGS, list(COMPILED_SCHEMES))
+    )
 
 
 def check_smooth(seeds: Iterable[int]) -> Counter[str]:
-    schemes = list(SCHEMES)
+    schemes = list(COMPILED_SCHEMES)
     texts = map(smooth_model, seeds)
     return Counter(run.stop.reason for text in texts for run in runs_of(text, SMOOTH_SETTINGS, schemes))
 

@@ -36,7 +36,7 @@ from hsdsl.engine.preparation.values import Values, arithmetic_of, with_paramete
 from hsdsl.engine.runtime import kernel
 from hsdsl.engine.runtime.compiler import NoCompiler
 from hsdsl.engine.runtime.kernel import CompiledModel
-from hsdsl.engine.runtime.structures import SCHEMES
+from hsdsl.engine.runtime.structures import COMPILED_SCHEMES
 from hsdsl.engine.simulate import Prepared, Problem, Settings, prepare
 from hsdsl.engine.simulate.input_segments import Timeline, UnorderedTimes, make_timeline, samples_of
 from hsdsl.engine.simulate.moving import Start, moved_time
@@ -354,7 +354,7 @@ def choose(
         return None
     if precision is not None:
         why = "it computes with float64 only, and a precision is given"
-    elif settings.scheme not in SCHEMES:
+    elif settings.scheme not in COMPILED_SCHEMES:
         why = f"scheme '{settings.scheme}' has no compiled loop"
     else:
         try:

@@ -51,7 +51,7 @@ class CompiledModel:
 
     def workspace(self, method: Any, scheme: str) -> int:
         """How many numbers a run needs for itself."""
-        number = structures.SCHEMES.index(scheme)
+        number = structures.COMPILED_SCHEMES.index(scheme)
         return runtime().hs_workspace(ctypes.byref(self.table), ctypes.byref(method), number)
 
     def mode(self, number: int) -> Any:

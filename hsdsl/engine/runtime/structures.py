@@ -77,7 +77,7 @@ Team, LaneProgram = STRUCTURES["hs_team"], STRUCTURES["hs_lane_program"]
 Operation, Formula, Formulas = (STRUCTURES[name] for name in ("hs_operation", "hs_formula", "hs_formulas"))
 Record, Screen, Correction, Moves = (STRUCTURES[f"hs_{name}"] for name in ("record", "screen", "correction", "moves"))
 ARC, TRANSITION, NOTE = (np.dtype(STRUCTURES[name]) for name in ("hs_arc", "hs_transition", "hs_note"))
-METHOD_KINDS, INTERPOLANTS, KINDS, SCHEMES, NOTICES, REASONS, FAILURES, OPERATORS, HYPOTHESES = (
+METHOD_KINDS, INTERPOLANTS, KINDS, COMPILED_SCHEMES, NOTICES, REASONS, FAILURES, OPERATORS, HYPOTHESES = (
     ENUMERATIONS[f"hs_{name}"]
     for name in (
         *("method_kind", "interpolant", "arc_kind", "scheme", "notice"),

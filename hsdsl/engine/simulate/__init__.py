@@ -1,4 +1,4 @@
-"""From a program to an execution. `located` is the default scheme; `SCHEMES` is what a model may name.
+"""From a program to an execution. `located` is the default scheme; `plan` has all.
 
 ======================  ==========================================================================================
 `settings`, `problem`   the settings of a run; an initial value problem with them
@@ -33,8 +33,8 @@ ask `surfaces` for, `transitions`, or `contact` and `zeno`.
 
 from __future__ import annotations
 
-from hsdsl.engine.simulate.plan import SCHEMES, Prepared, prepare
+from hsdsl.engine.simulate.plan import Prepared, prepare
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.settings import Settings
 
-__all__ = ["SCHEMES", "Prepared", "Problem", "Settings", "prepare"]
+__all__ = ["Prepared", "Problem", "Settings", "prepare"]

@@ -100,7 +100,7 @@ def task_settings(settings: Settings, states: tuple[str, ...]) -> Any:
         settings.relaxation,
         settings.until,
         min(settings.max_transitions, MOST_TRANSITIONS),
-        structures.SCHEMES.index(settings.scheme),
+        structures.COMPILED_SCHEMES.index(settings.scheme),
         settings.completion != "none",
         _doubles(scale),
         len(settings.first_steps),

@@ -21,7 +21,7 @@ from hsdsl.engine.simulate.control import StepFailure
 from hsdsl.engine.simulate.crossings import crossings_along, with_unseen
 from hsdsl.engine.simulate.located_steps import SeriesSteps, Span, TableSteps
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stops import FREE, LEFT, left_domain, reached, reached_in_strip, slides
+from hsdsl.engine.simulate.stops import FREE, LEAVES, left_domain, reached, reached_in_strip, slides
 from hsdsl.engine.simulate.surfaces import NONE, Arrival, Crossing, joined
 from hsdsl.engine.simulate.transitions import Event, choose, comes_back, enter, go_on, reset, sizes, standing_on
 from hsdsl.engine.simulate.zeno import at_limit, close_tail, contraction, flown, of_contacts, unresolved
@@ -115,7 +115,7 @@ def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> E
         standing = here.surfaces.standing(wall.time, wall.state, run.tie(wall.time))
         if not standing:
             write(here, span, wall)
-            return left_domain(here.mode, wall.edge, wall.time, LEFT)
+            return left_domain(here.mode, wall.edge, wall.time, LEAVES)
         guards = [Crossing(k, wall.theta, wall.time, wall.state, wall.depth) for k in standing]
     if not guards:
         return None

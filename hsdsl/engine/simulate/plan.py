@@ -46,7 +46,7 @@ def _paoli_schatzman(run: Run, here: ModeState | Stop) -> Stop:
     return paoli_schatzman(run, here)
 
 
-SCHEMES: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
+LOOPS: dict[str, Callable[[Run, ModeState | Stop], Stop]] = {
     "relaxed": _relaxed,
     "located": _located,
     "paoli-schatzman": _paoli_schatzman,
@@ -186,7 +186,7 @@ class Prepared(Problem):
         began = time.perf_counter()
         try:
             here = enter(run, self.mode, self.states, zero, self.x, start_sizes(run, self.mode, self.x))
-            stop = SCHEMES[self.settings.scheme](run, here)
+            stop = LOOPS[self.settings.scheme](run, here)
         except KeyboardInterrupt:
             if not run.recorder.arcs:
                 raise

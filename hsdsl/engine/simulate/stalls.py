@@ -35,7 +35,7 @@ from hsdsl.engine.simulate.control import StepFailure
 from hsdsl.engine.simulate.input_segments import Segment
 from hsdsl.engine.simulate.problem import Problem
 from hsdsl.engine.simulate.run import ModeState, Run
-from hsdsl.engine.simulate.stops import LEFT, Diagnostics, left_domain, show, slides
+from hsdsl.engine.simulate.stops import LEAVES, Diagnostics, left_domain, show, slides
 from hsdsl.engine.simulate.workspace import Workspace
 from hsdsl.mathematics.program import HELD, ModeProgram, Program
 
@@ -118,7 +118,7 @@ class Standstill:
         """Stop where no step is short enough, and say why; ``slope`` is the flow here."""
         t, x, h, name = self.t, self.x, self.h, self.mode.name
         if failure.kind == "wall" and failure.surface is not None:
-            return left_domain(self.mode, failure.surface, t, LEFT)
+            return left_domain(self.mode, failure.surface, t, LEAVES)
         if failure.kind == "slow":
             steps = f"in mode {name} {MOST_SHORT} steps were made within a millionth of the run, up to t = {show(t)}"
             return Stop(
@@ -286,7 +286,7 @@ def stop(problem: Problem, workspace: Workspace, reason: str, diagnostics: Diagn
     if reason == "limit":
         return stops.limit(problem.settings.max_transitions, t)
     if reason in ("entered outside", "left"):
-        return stops.left_domain(mode, found.surface, t, stops.LEFT if reason == "left" else stops.ENTERED)
+        return stops.left_domain(mode, found.surface, t, stops.LEAVES if reason == "left" else stops.ENTERED)
     x, slope, scales = (column[: found.dimension].tolist() for column in workspace.stopped)
     if reason == "accumulated":
         return diagnostics.takes_turns(mode.states, tuple(x), t)

@@ -18,7 +18,7 @@ from hsdsl.engine.execution import RunWarning, Stop
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 
-LEFT, ENTERED = "leaves it, and no transition is possible there", "was entered outside it"
+LEAVES, ENTERED = "leaves it, and no transition is possible there", "was entered outside it"
 
 
 def show(x: Any) -> str:

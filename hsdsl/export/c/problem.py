@@ -20,7 +20,7 @@ from hsdsl.base.parts import layout_of
 from hsdsl.engine.backends.c.routine import constant, literal
 from hsdsl.engine.backends.c.source import constant_bodies, derivatives, factors, initial_bodies, lines, width
 from hsdsl.engine.runtime import structures
-from hsdsl.engine.runtime.structures import METHOD_KINDS, SCHEMES, Row, array_at, method_table
+from hsdsl.engine.runtime.structures import COMPILED_SCHEMES, METHOD_KINDS, Row, array_at, method_table
 from hsdsl.engine.simulate import Problem, Settings
 from hsdsl.engine.simulate.control import make_control
 from hsdsl.engine.simulate.moving import LEAST_UNITS
@@ -147,7 +147,7 @@ def _settings(settings: Settings, program: Program, arithmetic: Arithmetic) -> s
     return (
         (array("static const hs_real", "scales", map(constant, scale)) if scale else "")
         + f"const hs_settings problem_settings = {{\n  {', '.join(map(constant, values))}, {literal(settings.until)}, "
-        + f"{min(settings.max_transitions, 2**62)}, {SCHEMES.index(settings.scheme)}, {contacts}, "
+        + f"{min(settings.max_transitions, 2**62)}, {COMPILED_SCHEMES.index(settings.scheme)}, {contacts}, "
         + f"{'scales' if scale else 0}, 0, 0}};\n"
     )
 

@@ -14,7 +14,18 @@ from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text
 from hsdsl.engine.integrators import ButcherTableau
 from hsdsl.engine.integrators.tableau import table_numbers
 from hsdsl.engine.simulate import Problem
-from hsdsl.export.source import Source, data_names, definitions, derived, followed, mode_definitions, parameters_in
+from hsdsl.export.source import (
+    Source,
+    data_names,
+    definitions,
+    derived,
+    followed,
+    mode_definitions,
+    parameters_in,
+    switch_parameters,
+    used_by,
+    with_sources,
+)
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
 
 
@@ -51,8 +62,7 @@ def _start(problem: Problem, data: dict[str, str]) -> str:
 
 
 def model_text(source: Source, table: ButcherTableau) -> str:
-    program = source.problem.program
-    fixed = fixed_parameters(program)
+    fixed = fixed_parameters(source.problem)
     parts = [
         "# " + "-" * 70 + "\n# The model\n# " + "-" * 70 + "\n",
         *_functions(source),
@@ -180,21 +190,20 @@ SWITCHES = "it decides when a function of time switches"
 SAMPLES = "it decides when an input has a sample"
 
 
-def fixed_parameters(program: Program) -> dict[str, str]:
+def fixed_parameters(problem: Problem) -> dict[str, str]:
     """Parameters that times of segments depend on, and why they cannot change; those that decide them, too."""
+    program, sampled = problem.program, set[int]()
     routines = definitions(program.constants)
-    found = {i: SWITCHES for i in parameters_in(*definitions(program.switching).values())}
     for i, given in enumerate(program.inputs):
         if given.times is None:
             last = routines[f"input_{i}"].body[-1]
             assert isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
             values = last.value.elts
             times = ast.Module([*routines[f"input_{i}"].body[:-1]], [])
-            named = parameters_in(times, *values[: len(values) // 2])
-            found |= {k: SAMPLES for k in named if k not in found}
-    for i in range(len(program.parameters) - 1, -1, -1):
-        if i in found:
-            found |= {k: found[i] for k in parameters_in(routines[f"parameter_{i}"]) if k not in found}
+            sampled |= parameters_in(times, *values[: len(values) // 2])
+    known = used_by(program), derived(problem)
+    found = dict.fromkeys(with_sources(program, *known, sampled), SAMPLES)
+    found |= dict.fromkeys(with_sources(program, *known, switch_parameters(program)), SWITCHES)
     return {program.parameters[i]: why for i, why in sorted(found.items())}
 
 

@@ -22,18 +22,18 @@ from math import nan
 
 from hsdsl.interface.chart.outcome import Judgement, judge, rho
 from hsdsl.interface.chart.peers import PEERS
-from hsdsl.interface.chart.plan import ENGINES, SCHEMES, TOLERANCES, own_runs, peer_runs
+from hsdsl.interface.chart.plan import ENGINES, OWN_SCHEMES, TOLERANCES, own_runs, peer_runs
 from hsdsl.interface.chart.rows import Row
 from hsdsl.interface.chart.scene import Attempt, Refused, Result, Scene
 from hsdsl.interface.chart.stopwatch import Deadline, race
 
-__all__ = ["ENGINES", "PEERS", "SCHEMES", "TOLERANCES", "Judgement", "Refused", "Row", "Scene", "work_precision"]
+__all__ = ["ENGINES", "OWN_SCHEMES", "PEERS", "TOLERANCES", "Judgement", "Refused", "Row", "Scene", "work_precision"]
 
 
 def work_precision(
     scene: Scene,
     *,
-    schemes: Sequence[str] = SCHEMES,
+    schemes: Sequence[str] = OWN_SCHEMES,
     methods: Sequence[str] = (),
     engines: Sequence[str] = ENGINES,
     tolerances: Sequence[float] = TOLERANCES,

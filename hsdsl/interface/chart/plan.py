@@ -6,14 +6,14 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
 
+from hsdsl.base.defaults import SCHEMES
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Execution
 from hsdsl.engine.integrators import METHODS
-from hsdsl.engine.simulate import SCHEMES as ALL_SCHEMES
 from hsdsl.interface.chart.peers import prepare
 from hsdsl.interface.chart.scene import Attempt, Refused, Result, Scene, Tool
 
-SCHEMES = tuple(name for name in ALL_SCHEMES if name != "paoli-schatzman")
+OWN_SCHEMES = tuple(name for name in SCHEMES if name != "paoli-schatzman")
 ENGINES = ("c", "python")
 TOLERANCES = tuple(10.0**-k for k in range(3, 13))
 SHARES = tuple(10.0 ** -(k / 2) for k in range(5, 10))  # steps as shares of a run

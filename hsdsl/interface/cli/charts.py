@@ -61,12 +61,12 @@ def chart(
     """Chart speed against accuracy: methods, schemes, engines and peers against the exact execution."""
     with answer.reporting():
         from hsdsl.engine.integrators import METHODS
-        from hsdsl.interface.chart import ENGINES, PEERS, SCHEMES, TOLERANCES, work_precision
+        from hsdsl.interface.chart import ENGINES, OWN_SCHEMES, PEERS, TOLERANCES, work_precision
 
         check_target(out, "--out", (".csv",))
         check_target(plot, "--plot")
         options: dict[str, Any] = {
-            "schemes": known_names(schemes, SCHEMES, "--schemes") or SCHEMES,
+            "schemes": known_names(schemes, OWN_SCHEMES, "--schemes") or OWN_SCHEMES,
             "methods": known_names(methods, tuple(METHODS), "--methods"),
             "engines": known_names(engines, ENGINES, "--engines") or ENGINES,
             "tolerances": _numbers(tolerances, "--tolerances") or TOLERANCES,

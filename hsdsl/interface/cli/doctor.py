@@ -21,12 +21,12 @@ OPTIONAL = {"pandas": "tables (hsdsl[table])", "pyarrow": "parquet files (hsdsl[
 def doctor(json: Json = False, forget: Forget = False) -> None:
     """Check this installation: its packages, its compiler and its cache."""
     from hsdsl.base import cache
+    from hsdsl.base.defaults import SCHEMES
     from hsdsl.base.plugins import TABLES
     from hsdsl.engine.integrators import METHODS
     from hsdsl.engine.runtime.compiler import NoCompiler, find_compiler
     from hsdsl.engine.runtime.kernel import runtime
     from hsdsl.engine.runtime.library import GIVEN_UP
-    from hsdsl.engine.simulate import SCHEMES
 
     if forget:
         cache.forget(GIVEN_UP)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from typer import Exit, Option
 
-import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
 from hsdsl.base.names import visible
@@ -72,11 +71,13 @@ def run(
     answer: Answer,
 ) -> None:
     """Simulate a model and summarise what happened."""
+    from hsdsl.interface.model.model import load
+
     with answer.reporting():
         _check_files(out, plot, animate, outputs)
         if jumps != "both" and (out is None or out.suffix.lower() == ".npz" or every is not None):
             raise UsageError("--jumps chooses rows of a table: give --out FILE.csv or .parquet, without --every")
-        loaded = hsdsl.load(model)
+        loaded = load(model)
         settings = experiment.settings(engine=engine, precision=precision, samples=samples)
         names = chosen_names(outputs, loaded.columns, [one.name for one in loaded.program.inputs])
         shown = {"columns": names, "phases": pairs_of(phase, loaded.columns)}

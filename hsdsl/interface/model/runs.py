@@ -142,7 +142,7 @@ class Runs:
         until : number or str, optional
             End of the run.
         scheme : str, optional
-            A name of `simulate.SCHEMES`.
+            ``located``, ``relaxed`` or ``paoli-schatzman``.
         method : str or ButcherTableau, optional
             A name of `integrators.METHODS`, or ``auto``; a table is then a method under its name.
         step, tolerance : number or str, optional

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsdsl.analysis.report.words import condensed, form
+from hsdsl.base.defaults import SCHEMES
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import did_you_mean, shown
 from hsdsl.base.processes import Lost, in_processes
 from hsdsl.engine.integrators import METHODS
-from hsdsl.engine.simulate import SCHEMES
 from hsdsl.interface.chart.peers import PEERS
 from hsdsl.interface.chart.rows import csv_text
 from hsdsl.interface.chart.scene import Tool
