@@ -241,9 +241,8 @@ def test_ensembles_tell_without_a_verdict_what_came_beyond_a_surface_with_an_if(
             rates = np.tile([0, 1 / 8, 2 / 3], many)  # the last comes back
             ensemble = model.ensemble(parameters={"rate": rates, "armed": 0}, initial={"x": 0 * rates}, **settings)
             assert ensemble.warnings.tolist() == expected * many, (kind, level)
-    if engine == "c":
-        parts = hsdsl.loads(PARTS).ensemble(parameters={"a.start": np.tile([0.75, 2], many)}, **settings)
-        assert parts.warnings.tolist() == ["HS708", ""] * many
+    parts = hsdsl.loads(PARTS).ensemble(parameters={"a.start": np.tile([0.75, 2], many)}, **settings)
+    assert parts.warnings.tolist() == ["HS708", ""] * many
 
 
 def test_an_entry_at_a_jump_of_an_input_does_not_hide_that_another_surface_is_passed_by_it():

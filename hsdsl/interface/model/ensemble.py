@@ -75,7 +75,8 @@ class PreparedEnsemble:
         if plan is None:
             with suppress(KeyboardInterrupt):  # those that are done are kept
                 for i, place in enumerate(self.places):
-                    execution = self.request.run(place)
+                    prepared = self.request.model.pipeline.prepare(self.request.single(place))
+                    execution = prepared.settled(None, {})[1]  # of parts the composed run, as in C
                     if execution.stop.reason == "interrupted":
                         break
                     self._record(kept, i, execution)
