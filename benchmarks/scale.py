@@ -113,8 +113,8 @@ class Chain:
             hit = np.array([len(times) > 0 for times in found.t_events])
             t, x, count = found.t[-1], self.bounced(found.y[:, -1], hit), count + int(hit.sum())
 
-    def by_cvode(self, until: float, banded: bool = False) -> int:
-        """Run by CVODE with its sparse solver, or with its banded one and the states mass by mass, likewise."""
+    def by_cvode(self, until: float, banded: bool = False) -> Callable[[], int]:
+        """The same by CVODE with its sparse solver, or its banded one and the states mass by mass, made once."""
         n = self.n
         order = np.arange(2 * n).reshape(2, n).T.ravel() if banded else np.arange(2 * n)
         place = np.argsort(order)  # of each state among those that CVODE has
@@ -135,14 +135,18 @@ class Chain:
         options = {"linsolver": "band", "lband": 3, "uband": 2} if banded else sparse
         options |= {"rtol": TOLERANCE, "atol": TOLERANCE, "max_num_steps": 1_000_000}
         solver = sun.cvode.CVODE(rates, eventsfn=events, num_events=n, **options)
-        t, x, count = 0.0, self.at, 0
-        while True:
-            found = solver.solve(np.array([t, until]), x[order])
-            if found.status != 2:
-                return count
-            hit = np.atleast_2d(found.i_events)[-1] != 0
-            t, x = float(np.ravel(found.t_events)[-1]), self.bounced(np.atleast_2d(found.y_events)[-1][place], hit)
-            count += int(hit.sum())
+
+        def run() -> int:
+            t, x, count = 0.0, self.at, 0
+            while True:
+                found = solver.solve(np.array([t, until]), x[order])
+                if found.status != 2:
+                    return count
+                hit = np.atleast_2d(found.i_events)[-1] != 0
+                t, x = float(np.ravel(found.t_events)[-1]), self.bounced(np.atleast_2d(found.y_events)[-1][place], hit)
+                count += int(hit.sum())
+
+        return run
 
 
 def fastest(*runs: Callable[[], Any]) -> list[float]:
@@ -162,7 +166,7 @@ def row(n: int) -> str:
     first, again, memory = started(chain(n))
     model, other = hsdsl.loads(chain(n, until=UNTIL)), Chain(n, 1 / 20)
     found = model.simulate(tolerance=TOLERANCE)
-    peers = [lambda: other.by_cvode(UNTIL), lambda: other.by_cvode(UNTIL, banded=True)]
+    peers = [other.by_cvode(UNTIL), other.by_cvode(UNTIL, banded=True)]
     peers += [lambda: other.by_scipy(UNTIL)] if n <= MOST_FOR_SCIPY else []
     own, *others = fastest(lambda: model.simulate(tolerance=TOLERANCE), *peers)
     for peer in peers:
@@ -208,7 +212,7 @@ def main() -> None:
     model, other = hsdsl.loads(chain(200, 1e4, until=UNTIL)), Chain(200, 1e4)
     options = {"method": "radau", "tolerance": TOLERANCE}
     found = model.simulate(**options)
-    own, cvode = fastest(lambda: model.simulate(**options), lambda: other.by_cvode(UNTIL))
+    own, cvode = fastest(lambda: model.simulate(**options), other.by_cvode(UNTIL))
     print(
         f"stiff chain of 200: radau {own * 1e3:.1f} ms ({len(found.times)} rows, {len(found.transitions)} impacts), "
         f"CVODE {cvode * 1e3:.1f} ms, {cvode / own:.1f} x",

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import sympy as sp
+from sympy.core.cache import cacheit
 
 
 class _Kinked(sp.Function):
@@ -22,6 +23,13 @@ class _Kinked(sp.Function):
 
     is_real = is_extended_real = is_finite = True
     fold: object
+
+    @cacheit
+    def __new__(cls, *arguments, **options):
+        """Make one without what SymPy makes of each function: a set of how many arguments it takes."""
+        arguments = tuple(map(sp.sympify, arguments))
+        known = cls.eval(*arguments) if options.get("evaluate", True) else None
+        return sp.Basic.__new__(cls, *arguments) if known is None else known
 
     @classmethod
     def eval(cls, *arguments):
@@ -211,14 +219,12 @@ def renamed(expr: Any, names: Mapping[Any, Any], done: dict[Any, Any]) -> Any:
 
 def replaced(expr: Any, mapping: Mapping[Any, Any], done: dict[Any, Any]) -> Any:
     """Replace symbols, visiting every shared part once; ``done`` is kept between calls with one mapping."""
-    if expr in mapping:
-        return mapping[expr]
-    if not expr.args:
-        return expr
-    if expr not in done:
-        args = tuple(replaced(a, mapping, done) for a in expr.args)
-        done[expr] = expr if args == expr.args else rebuilt(expr, args)
-    return done[expr]
+    if not (parts := expr.args):
+        return mapping.get(expr, expr)
+    if (found := done.get(expr)) is None:
+        args = tuple(replaced(a, mapping, done) for a in parts)
+        found = done[expr] = expr if args == parts else rebuilt(expr, args)
+    return found
 
 
 def rewritten(expr: Any, change: Callable[[Any], Any], done: dict[Any, Any]) -> Any:

@@ -110,13 +110,15 @@ def _rows(program: Program) -> list[Row]:
     long: dict[int, int] = {}  # lists, by the objects: every edge has the states of its target
 
     def plain(value: Any) -> Any:
+        if value is None or type(value) in (str, int, float, bool):
+            return value
         if isinstance(value, Fraction):
             return f"{value.numerator}/{value.denominator}"
         if isinstance(value, (tuple, list)):
             if len(value) >= LONG and id(value) not in long:  # pyright: ignore[reportUnknownArgumentType]
                 long[id(value)] = kept([LIST, *map(plain, value)])  # pyright: ignore[reportUnknownArgumentType]
             return long[id(value)] if id(value) in long else [*map(plain, value)]  # pyright: ignore[reportUnknownArgumentType]
-        if type(value) in (str, int, float, bool) or not is_dataclass(value):
+        if not is_dataclass(value):
             return value
         return kept([type(value).__name__, *(plain(getattr(value, field.name)) for field in fields(value))])
 

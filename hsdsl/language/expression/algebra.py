@@ -199,6 +199,7 @@ def lie_derivative(expr: sp.Expr, flow: Mapping[sp.Symbol, sp.Expr]) -> sp.Expr:
 _NUMBERED = re.compile(r"([a-z_]+)\d+")
 
 
+@lru_cache(maxsize=1 << 17)
 def letter_of(name: str) -> str | None:
     """What is before the number in a numbered name, None of another name."""
     return found[1] if (found := _NUMBERED.fullmatch(name)) else None
@@ -235,20 +236,14 @@ class Shape:
                 self.names.append(symbol.name)
         self.key = (*ends, None, *self._nodes)
 
-    def _visit(self, whole: sp.Basic) -> int:
-        numbers, nodes, waiting = self._numbers, self._nodes, [whole]
-        while waiting:
-            expr = waiting[-1]
-            if expr in numbers:
-                waiting.pop()
-            elif expr.args and (missing := [part for part in expr.args if part not in numbers]):
-                waiting += missing
-            else:
-                numbers[expr] = len(nodes)
-                if expr.is_Symbol:
-                    self.symbols[expr] = len(nodes)
-                nodes.append((expr.func, *map(numbers.__getitem__, expr.args)) if expr.args else expr)
-        return numbers[whole]
+    def _visit(self, expr: sp.Basic) -> int:
+        if (number := self._numbers.get(expr)) is None:
+            node = (expr.func, *map(self._visit, parts)) if (parts := expr.args) else expr
+            number = self._numbers[expr] = len(self._nodes)
+            self._nodes.append(node)
+            if expr.is_Symbol:
+                self.symbols[expr] = number
+        return number
 
     def order(self, places: Mapping[sp.Symbol, int]) -> tuple[int, ...]:
         """The symbols that are arguments, in the order of these, by their places among the parts."""

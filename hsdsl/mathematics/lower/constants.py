@@ -68,10 +68,11 @@ def initial_order(system: HybridSystem) -> tuple[int, ...]:
 def initial_values(system: HybridSystem, names: Names):
     """Each initial value over parameters and others, where they use each other."""
     states = {symbol(name): symbol(f"x{i}") for i, (name, _) in enumerate(system.initial.values)}
+    known = names.shared | states
     arguments = (*names.parameters, *states.values())
     places = {argument: i for i, argument in enumerate(arguments)}
     for i, (_, value) in zip(initial_order(system), system.initial.written, strict=True):
-        yield Definition(f"initial_{i}", arguments, (replaced(value, names.shared | states, {}),), places=places)
+        yield Definition(f"initial_{i}", arguments, (replaced(value, known, {}),), places=places)
 
 
 def ranges_of(system: HybridSystem):

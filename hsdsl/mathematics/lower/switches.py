@@ -49,9 +49,11 @@ class Switches:
         return rewritten(expr, self._changed, self._done)
 
     def _changed(self, expr: sp.Basic) -> sp.Basic:
-        branch, names = _BRANCHES.get(type(expr)), expr.free_symbols
+        if (branch := _BRANCHES.get(type(expr))) is None:
+            return expr
+        names = expr.free_symbols
         of_time = names & self.moving and names <= self.moving | self.known | set(self.symbols)
-        return branch(self, *expr.args) if branch and of_time else expr
+        return branch(self, *expr.args) if of_time else expr
 
     def number(self, kind: str, argument: sp.Expr, jumps: bool = False) -> sp.Expr:
         """The number of a switch: the floor or the sign of its argument."""
@@ -92,7 +94,7 @@ def with_switches(system: HybridSystem) -> tuple[HybridSystem, Switches]:
     for mode in system.modes:  # choices by parameters and states that do not flow are smooth
         still = (symbol(x) for x, f in zip(mode.states, mode.flow, strict=True) if f == 0)
         constants = frozenset((*system.parameter_symbols, *still))
-        modes.append(mode.mapped(lambda expr, c=constants: by_constants(expr, c)).mapped(switches.out_of))
+        modes.append(mode.mapped(lambda expr, c=constants: switches.out_of(by_constants(expr, c))))
     return replace(system, modes=tuple(modes)), switches
 
 

@@ -156,10 +156,12 @@ class Parts:
 
     def _check_unknowns(self, one: Instance, mode: str, document: PartModeDocument) -> None:
         """Report unknowns whose names mean something else."""
+        if document.solve is None:
+            return
         taken = dict.fromkeys(map(str, (*one.kind.let, *document.let)), "a `let` name")
         taken |= dict.fromkeys(one.states, "a state") | dict.fromkeys(map(str, one.kind.inputs), "an input")
         taken |= dict.fromkeys(map(str, one.kind.parameters), "a parameter")
-        for name in document.solve.unknowns if document.solve else ():
+        for name in document.solve.unknowns:
             if str(name) in taken:
                 message = f"'{name}' is an unknown of `solve` in the mode '{mode}', and also {taken[str(name)]}"
                 self.board.report_once(name, "HS301", message, "give one of them another name")
