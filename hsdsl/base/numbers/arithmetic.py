@@ -22,6 +22,15 @@ TIE = 1e-12  # times closer than TIE |t| are the same instant
 NOTHING = 2.0**-960  # below this numbers of float64 have no digits left
 
 
+def repeated(times: Callable[[Any, Any], Any], exponent: int, base: Any) -> Any:
+    """A product of equal factors, as in C."""
+    if exponent == 1:
+        return base
+    half = repeated(times, exponent // 2, base)
+    square = times(half, half)
+    return times(square, base) if exponent % 2 else square
+
+
 @dataclass(frozen=True, eq=False)
 class Arithmetic:
     """A number type: ``float64`` or ``mpmath``, by its ``name``."""

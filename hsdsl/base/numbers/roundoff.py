@@ -15,9 +15,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, partial, reduce
 from math import inf, isfinite
+from operator import mul
 from typing import Any
 
-from hsdsl.base.numbers.arithmetic import Arithmetic, Number
+from hsdsl.base.numbers.arithmetic import Arithmetic, Number, repeated
 
 ROUNDOFF_UNITS = 32  # below so many of the sizes of its terms a surface counts as zero
 LIBRARY = 16  # units of round-off that functions of the library may be wrong by
@@ -149,7 +150,7 @@ class Roundoff:
         """A power: of a whole exponent a product."""
         whole = exponent.value
         if exponent.error == 0 and exponent.off == 0 and 0 < whole < 1 << 20 and whole % 1 == 0:
-            return _repeated(base, int(whole))
+            return repeated(mul, int(whole), base)
         return self.function("pow", base, exponent)
 
     def stepped(self, name: str, a: Rounded) -> Rounded:
@@ -216,14 +217,6 @@ def _lost(a: float, b: float, product: float) -> float:
 def _lost_of(base: Arithmetic) -> Callable[[Number, Number, Number], Number]:
     context = base.zero.context
     return lambda a, b, product: +context.fsub(context.fmul(a, b, exact=True), product, exact=True)
-
-
-def _repeated(base: Rounded, exponent: int) -> Rounded:
-    if exponent == 1:
-        return base
-    half = _repeated(base, exponent // 2)
-    square = half * half
-    return square * base if exponent % 2 else square
 
 
 Slopes = Callable[[Mapping[str, Any], Number, Number, Number], tuple[Number, ...]]

@@ -184,6 +184,11 @@ def wall_of(mode: ModeProgram, k: int) -> str:
     return f"{mode.walls[k - len(mode.edges)]} of {mode.name}"
 
 
+def surface_of(mode: ModeProgram, k: int) -> str:
+    """Surface k for a person: the name of an edge, or a wall."""
+    return mode.edges[k].name if k < len(mode.edges) else f"the wall {wall_of(mode, k)}"
+
+
 def _message(group: Sequence[Remark]) -> str:
     """The text of a warning: most are counted and never read."""
     first, count = group[0], len(group)

@@ -77,14 +77,6 @@ class Errors:
         return _orders(self.run.transitions, self.finer.transitions, self._slack)
 
     @property
-    def midway(self) -> bool:
-        """Whether the runs are compared in the middle of steps too.
-
-        Steps that no tolerance bounds, and those of the relaxed scheme, may be right at their ends by symmetry.
-        """
-        return self.tolerance == 0 or self.run.scheme != "located"
-
-    @property
     def _slack(self) -> float:
         span = float(self.run.time_span[1])
         strips = float(self.run.settings["relaxation"]) if self.run.scheme == "relaxed" else 0.0
@@ -121,7 +113,7 @@ class Errors:
         apart = self._orders[0]
         rows = np.flatnonzero((self._jumps <= count) & ~np.isin(self._jumps, [*apart]))
         self._compare(found, rows, self._values[rows], self._times[rows] + shift[self._jumps[rows]])
-        if self.midway:
+        if self.tolerance == 0 or self.run.scheme != "located":  # steps may be right at their ends alone, by symmetry
             middles = self._times[rows[:-1]] + np.diff(self._times[rows]) / 2
             values = self._at(self.run, self._jumps[rows[1:]], middles)
             self._compare(found, rows[1:], values, middles + shift[self._jumps[rows[1:]]])

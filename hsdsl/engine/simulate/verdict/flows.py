@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.base.numbers.arithmetic import NOTHING, Arithmetic
+from hsdsl.base.numbers.arithmetic import NOTHING, Arithmetic, repeated
 from hsdsl.base.numbers.bernstein import Array, around_middle
 from hsdsl.base.numbers.enclosures import CONTINUOUS, ENCLOSED, Range, as_range, square
 from hsdsl.engine.simulate.moving import ERROR_UNITS
@@ -442,16 +442,7 @@ def _power(base: Expansion, exponent: Expansion) -> Expansion:
     whole = float(exponent.terms[0, 0])
     if exponent.terms.shape[1] > 1 or not (0 < whole < np.inf and whole % 1 == 0):
         return FUNCTIONS["exp"](exponent * FUNCTIONS["log"](base))
-    return at_most(_repeated(product, int(whole), base), partial(_repeated, Range.__mul__, int(whole)), base)
-
-
-def _repeated(times: Callable[[Any, Any], Any], exponent: int, base: Any) -> Any:
-    """A product of equal factors, as in C."""
-    if exponent == 1:
-        return base
-    half = _repeated(times, exponent // 2, base)
-    square = times(half, half)
-    return times(square, base) if exponent % 2 else square
+    return at_most(repeated(product, int(whole), base), partial(repeated, Range.__mul__, int(whole)), base)
 
 
 def _least(one: Expansion, other: Expansion) -> Expansion:

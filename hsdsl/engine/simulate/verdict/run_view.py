@@ -24,7 +24,7 @@ from hsdsl.engine.execution import Arc, Execution, Stop, Transition
 from hsdsl.engine.integrators.stepper import Polynomial, State
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.problem import Problem, Tails
-from hsdsl.engine.simulate.stops import Remark, show, wall_of
+from hsdsl.engine.simulate.stops import Remark, show, surface_of
 from hsdsl.engine.simulate.verdict.errors import SAFE, Errors
 from hsdsl.engine.simulate.verdict.screen import Screen, screened
 from hsdsl.engine.simulate.verdict.shadow import ErrorsByShadow, shadow_errors
@@ -509,8 +509,7 @@ class Place:
 
     def name(self, k: int) -> str:
         """Surface k for a person."""
-        edges = self.mode.edges
-        return edges[k].name if k < len(edges) else f"the wall {wall_of(self.mode, k)}"
+        return surface_of(self.mode, k)
 
     def where(self, k: int) -> str:
         """Surface k and when, for a person."""

@@ -22,7 +22,7 @@ from hsdsl.engine.runtime.kernel import runtime
 from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.compiled import CompiledPlan
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.stops import show, wall_of
+from hsdsl.engine.simulate.stops import show, surface_of
 from hsdsl.engine.simulate.verdict.errors import times
 from hsdsl.engine.simulate.verdict.shadow import INSIDE, POLE, ShadowErrors, correction, may_have_shadow, order_of
 from hsdsl.mathematics.program import ModeProgram
@@ -51,9 +51,7 @@ class Margins(NamedTuple):
         """The sentence on that turning point."""
         if self.mode < 0:
             return []
-        mode, k = modes[self.mode], self.surface
-        edges = mode.edges
-        name = edges[k].name if k < len(edges) else f"the wall {wall_of(mode, k)}"
+        name = surface_of(modes[self.mode], self.surface)
         return [f"the nearest miss is that of {name} at t = {show(self.missed)}, at {times(self.margin)} the error"]
 
 

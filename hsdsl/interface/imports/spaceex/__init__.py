@@ -14,8 +14,8 @@ from hsdsl.base.errors import Findings
 from hsdsl.base.names import did_you_mean, shown
 from hsdsl.interface.imports import end_of_run
 from hsdsl.interface.imports.spaceex.document import Component, Configuration, components, configuration
-from hsdsl.interface.imports.spaceex.modes import Judge, ModeDraft, TransitionDraft, lone_draft, mode_drafts
-from hsdsl.interface.imports.spaceex.network import Arrow, Key, Network, automaton, flattened
+from hsdsl.interface.imports.spaceex.modes import Judge, TransitionDraft, lone_draft, mode_drafts
+from hsdsl.interface.imports.spaceex.network import Key, Network, automaton, flattened
 from hsdsl.interface.imports.spaceex.start import (
     Start,
     admits,
@@ -57,7 +57,14 @@ def imported(
     places, arrows = automaton(network, first)
     drafts = mode_drafts(network, places, arrows, constants)
     refuse_outside(drafts[first], begin, configured, system.element)
-    transitions = _transitions(str(path), arrows, drafts, urgent)
+    findings = Findings(str(path))
+    judge = Judge(findings, urgent)
+    transitions: dict[Key, list[TransitionDraft]] = {key: [] for key in drafts}
+    for arrow in arrows:
+        transitions[arrow.source] += judge.transitions(arrow, drafts[arrow.source], drafts[arrow.target])
+    for key, leaving in transitions.items():
+        judge.choices(leaving, drafts[key])
+    findings.raise_if_any()
     horizon = configured.horizon and configured.horizon.text.strip()
     given = until or (None if horizon and horizon.startswith("-") else horizon)  # a negative one: without end
     end = end_of_run(given, "give --until, or time-horizon in the configuration")
@@ -84,20 +91,6 @@ def _first(
     if not fit:
         raise no_location(configured, system.element)
     return fit[0], len(fit) > 1
-
-
-def _transitions(
-    path: str, arrows: Sequence[Arrow], drafts: Mapping[Key, ModeDraft], urgent: bool
-) -> dict[Key, list[TransitionDraft]]:
-    findings = Findings(path)
-    judge = Judge(findings, urgent)
-    transitions: dict[Key, list[TransitionDraft]] = {key: [] for key in drafts}
-    for arrow in arrows:
-        transitions[arrow.source] += judge.transitions(arrow, drafts[arrow.source], drafts[arrow.target])
-    for key, leaving in transitions.items():
-        judge.choices(leaving, drafts[key])
-    findings.raise_if_any()
-    return transitions
 
 
 def _system(known: Mapping[str, Component], configured: Configuration) -> Component:
