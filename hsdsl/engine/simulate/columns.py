@@ -6,6 +6,7 @@ import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from struct import Struct
 from threading import Lock
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ ARC_NUMBERS, TRANSITION_NUMBERS, NOTE_NUMBERS = (
     record.itemsize // 8 for record in RECORDS.values()
 )  # as long as so many
 HEAD = ctypes.sizeof(structures.Record) // 8
+COUNTS = Struct("5q")  # the fields that a record begins with
 ORDER = (  # in which pack.c puts them
     "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
     "alternatives",
@@ -130,8 +132,7 @@ class Packed:
 
     @cached_property
     def _counts(self) -> Counts:
-        found = self._record
-        return Counts(found.rows, found.arcs, found.transitions, found.notes, found.others)
+        return Counts(*COUNTS.unpack_from(self._memory.data))
 
     @cached_property
     def _record(self) -> Any:

@@ -152,6 +152,14 @@ static hs_expansion expanded_least(hs_expansion a, hs_expansion b) {
   return b.value - a.value > apart ? a : a.value - b.value > apart ? b : anything;
 }
 
+/* The product with a number: as expanded_product() has it, without what is zero. */
+HS_INLINE hs_expansion expanded_share(hs_expansion number, hs_expansion a) {
+  const double by = number.value, size = fabs(by) + number.remainder, other = size_of(a);
+  const double off = number.remainder * other + a.remainder * (size - number.remainder);
+  return expansion(by * a.value, by * a.first, by * a.second, by * a.third, off + size * other * EXPANSION_ROUNDOFF,
+                   a.unresolved * size, fabs(by) * a.error);
+}
+
 static hs_expansion series_of_operation(const hs_operation *o, const hs_expansion *a, const hs_expansion *b) {
   const double c = a->value, r = deviation(*a);
   switch (o->kind) {
@@ -195,9 +203,13 @@ static hs_expansion expansion_of(const hs_operation *o, const hs_expansion *a, c
   return found.unresolved > 0.0 ? less_unresolved(o, a, b, found) : found;
 }
 
-static void expand_operations(const hs_formulas *f, int first, int last, int base, hs_expansion *v) {
+/* Carry out operations from one up to another behind time and n states; registers of results begin at `base`. */
+static void expand_operations(const hs_formulas *f, int first, int last, int n, int base, hs_expansion *v) {
+  const int numbers = base + f->fixed; /* registers behind the states and before this one hold one number each */
   for (int i = first; i < last; i++) {
     const hs_operation *const o = &f->operation[i];
-    v[base + i] = expansion_of(o, &v[o->a], &v[o->kind == HS_POWER ? o->a : o->b]);
+    if (o->kind == HS_MUL && o->a > n && o->a < numbers) v[base + i] = expanded_share(v[o->a], v[o->b]);
+    else if (o->kind == HS_MUL && o->b > n && o->b < numbers) v[base + i] = expanded_share(v[o->b], v[o->a]);
+    else v[base + i] = expansion_of(o, &v[o->a], &v[o->kind == HS_POWER ? o->a : o->b]);
   }
 }

@@ -11,8 +11,8 @@ static void expand_flow(hs_view *v, int64_t row, double start, double width) {
   const hs_part part = part_of(v, row, start, width);
   v->expanded = width == 1.0;
   v->around[0] = expansion(begin + (start + width / 2) * length, half, 0.0, 0.0, 0.0, 0.0, 0.0);
-  for (int i = 0; i < v->n; i++) v->around[1 + i] = expand_state(v, row, i, part, &v->slopes[i]);
-  expand_operations(v->f, v->f->flow.first, v->f->flow.last, first_register(v), v->around);
+  expand_states(v, row, part, -1);
+  expand_operations(v->f, v->f->flow.first, v->f->flow.last, v->n, first_register(v), v->around);
 }
 
 /* How a state is moved along a part by what the step does not show there. */

@@ -100,7 +100,7 @@ static void bind_formulas(hs_view *v) {
   }
   range_operations(v->f, 0, v->f->fixed, base, v->range);
   bind_rounded(v->f, v->n, v->s->model->data, v->p, v->rounded, 0);
-  expand_operations(v->f, 0, v->f->fixed, base, v->around);
+  expand_operations(v->f, 0, v->f->fixed, v->n, base, v->around);
 }
 
 static void bind(hs_view *v, int mode, int64_t segment) {
@@ -238,24 +238,52 @@ static hs_part part_of(const hs_view *v, int64_t row, double start, double width
   return part;
 }
 
-/* Expand the slope of a state, and the state itself, around the middle of a part. Sums are of powers of 1 + v: what is
-   left of v**4 and beyond is doubled with each. With u from -1 to 1 along the part, v is u times `by`. */
-static hs_expansion expand_state(const hs_view *v, int64_t row, int i, hs_part part, hs_expansion *slope) {
-  const hs_record *const run = &v->s->run;
-  const double *const c = recorded_piece(run, row) + i, x = recorded_row(run, row)[i], by = part.by, per = part.per;
-  double value = 0.0, first = 0.0, second = 0.0, third = 0.0, remainder = 0.0, at = 0.0;
-  double power = part.power, further = part.further;
-  for (int k = v->degree; k > 0; k--, power *= part.less) {
-    const double term = c[(k - 1) * run->width] * power;
-    remainder += (further *= 0.5) * fabs(third);
-    third += second, second += first, first += value, value += k * term;
-    at += term;
-  }
+/* A slope in the shares of a step, and what is left of it; and the state but for that at its start. */
+typedef struct {
+  double value, first, second, third, remainder, at;
+} hs_sums;
+
+/* Expand the slope of a state, and the state itself, around the middle of a part, of these sums. With u from -1 to 1
+   along the part, v is u times `by`. */
+static hs_expansion expansion_of_sums(const hs_view *v, int64_t row, int i, hs_part part, hs_sums of,
+                                      hs_expansion *slope) {
+  const double x = recorded_row(&v->s->run, row)[i], by = part.by, per = part.per, value = of.value, at = of.at;
+  double first = of.first, second = of.second, third = of.third, remainder = of.remainder;
   first *= by, second *= by * by, third *= by * by * by, remainder *= by * by * by * by;
   remainder += (fabs(value) + fabs(first) + fabs(second) + fabs(third)) * EXPANSION_ROUNDOFF;
   *slope = expansion(value * per, first * per, second * per, third * per, remainder * per, 0.0, 0.0);
   remainder = (fabs(third) / 4 + remainder / 5) * by + fabs(x + at) * EXPANSION_ROUNDOFF;
   return expansion(x + at, value * by, first * by / 2, second * by / 3, remainder, 0.0, v->mode_error[i]);
+}
+
+/* Expand states 0 to n - 1, or state `only` if that is not negative. Sums are of powers of 1 + v: what is left of v**4
+   and beyond is doubled with each. Two states are summed at once, the last one twice where it has no other. */
+static void expand_states(hs_view *v, int64_t row, hs_part part, int only) {
+  const hs_record *const run = &v->s->run;
+  const int w = run->width, end = only < 0 ? v->n : only + 1;
+  for (int i = only < 0 ? 0 : only; i < end; i += 2) {
+    const int count = i + 1 < end ? 2 : 1;
+    const double *c = recorded_piece(run, row) + (v->degree - 1) * w + i;
+    double value[2] = {0.0}, first[2] = {0.0}, second[2] = {0.0}, third[2] = {0.0}, left[2] = {0.0}, at[2] = {0.0};
+    double power = part.power, further = part.further;
+    for (int k = v->degree; k > 0; k--, power *= part.less, c -= w) {
+      const double of[2] = {c[0] * power, c[count - 1] * power}, times = k;
+      further *= 0.5;
+      HS_SIMD
+      for (int j = 0; j < 2; j++) {
+        left[j] += further * fabs(third[j]);
+        third[j] += second[j];
+        second[j] += first[j];
+        first[j] += value[j];
+        value[j] += times * of[j];
+        at[j] += of[j];
+      }
+    }
+    for (int j = 0; j < count; j++) {
+      const hs_sums sums = {value[j], first[j], second[j], third[j], left[j], at[j]};
+      v->around[1 + i + j] = expansion_of_sums(v, row, i + j, part, sums, &v->slopes[i + j]);
+    }
+  }
 }
 
 /* Expand the states that are cut. */
@@ -264,7 +292,7 @@ static void expand_cut(hs_view *v, int64_t row) {
   if (v->expanded) return;
   const hs_part whole = part_of(v, row, 0.0, 1.0);
   for (int i = 0; i < v->n; i++)
-    if (v->cut[i]) v->around[1 + i] = expand_state(v, row, i, whole, &v->slopes[i]);
+    if (v->cut[i]) expand_states(v, row, whole, i);
 }
 
 /* The box of the same, from expansions. */

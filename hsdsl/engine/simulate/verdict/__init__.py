@@ -35,7 +35,7 @@ from hsdsl.engine.execution import INCOMPLETE, LEFT, Execution, Verdict
 from hsdsl.engine.scheme.pace import SHORT
 from hsdsl.engine.simulate.compiled import CompiledRun
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.stops import Diagnostics, show
+from hsdsl.engine.simulate.stops import Diagnostics, has_remarks_at_rows, show
 from hsdsl.engine.simulate.verdict.commutation import choices, first_of_many, together, waiting_orders
 from hsdsl.engine.simulate.verdict.crossings import accumulations, crossings, lost_in_strips, sliding_spans, summary
 from hsdsl.engine.simulate.verdict.remarks import WARNINGS, noted, remarked, told
@@ -65,7 +65,9 @@ def assess_compiled(run: CompiledRun, execution: Execution) -> Verdict:
         return assess(view(screen_made=screen), run.diagnostics)
     shown = problem.program, run.made, screen.margins, screen.commuting
     screens.leave(screen)
-    return Verdict.deferred(_LATER, theorem="holds", _shown=shown, _told=told(view, (), problem.program))
+    return Verdict.deferred(
+        _LATER, theorem="holds", _shown=shown, _told=told(view, (), problem.program, screens.remarked)
+    )
 
 
 _LATER: dict[str, Callable[[Any], Any]] = {"reasons": lambda verdict: _margins_of(*verdict._shown), **WARNINGS}
@@ -80,7 +82,8 @@ def assess(run: RunView, diagnostics: Diagnostics) -> Verdict:
     verdict, judged = _judged(run, diagnostics)
     crowded = _crowded_steps(run.problem, run.execution)
     reasons = _once(verdict.reasons, crowded) if crowded else verdict.reasons
-    remarks = told(lambda: judged, remarked(judged, diagnostics), run.problem.program)
+    program = run.problem.program
+    remarks = told(lambda: judged, remarked(judged, diagnostics), program, has_remarks_at_rows(program))
     return Verdict.deferred(WARNINGS, theorem=verdict.theorem, reasons=reasons, _told=remarks)
 
 

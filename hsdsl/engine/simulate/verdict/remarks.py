@@ -26,7 +26,6 @@ from hsdsl.engine.simulate.stops import (
     Diagnostics,
     Remark,
     codes_of,
-    has_remarks_at_rows,
     loop_remarks,
     may_be_passed,
     may_come_beyond,
@@ -55,9 +54,9 @@ def _warned(verdict: Any) -> Any:
 WARNINGS: dict[str, Callable[[Any], Any]] = {"warnings": _warned}
 
 
-def told(run: Callable[[], RunView], remarks: Sequence[Remark], program: Program) -> Told:
+def told(run: Callable[[], RunView], remarks: Sequence[Remark], program: Program, remarked: bool) -> Told:
     """What warnings are made of; a search at the rows of a run takes longer than many a run, and waits for a reader."""
-    return remarks, (lambda: at_rows(run())) if has_remarks_at_rows(program) else None, program
+    return remarks, (lambda: at_rows(run())) if remarked else None, program
 
 
 def remarked(run: RunView, diagnostics: Diagnostics) -> list[Remark]:

@@ -22,7 +22,7 @@ from hsdsl.engine.runtime.kernel import runtime
 from hsdsl.engine.simulate.columns import Columns
 from hsdsl.engine.simulate.compiled import CompiledPlan
 from hsdsl.engine.simulate.problem import Problem
-from hsdsl.engine.simulate.stops import show, surface_of
+from hsdsl.engine.simulate.stops import has_remarks_at_rows, show, surface_of
 from hsdsl.engine.simulate.verdict.errors import times
 from hsdsl.engine.simulate.verdict.shadow import INSIDE, POLE, ShadowErrors, correction, may_have_shadow, order_of
 from hsdsl.mathematics.program import ModeProgram
@@ -140,6 +140,7 @@ class Screens:
         )
         modes = problem.program.modes
         self.keep_values = any(len(queue.values) > 1 for mode in modes for queue in mode.queues)  # that wait
+        self.remarked = has_remarks_at_rows(problem.program)
         self._left: list[Screen] = []
 
     def take(self) -> Screen:
