@@ -29,7 +29,7 @@ fi
 # Importers of functional mock-up units, each in an environment of its own: test_masters.py. ecospy needs TBB.
 importers=${HSDSL_IMPORTERS:-/opt/fmi-importers}
 for package in libcosimpy==0.0.6 ecospy==0.7.2 cofmupy==1.0.0 pathsim-fmi==0.1.1 casadi==3.8.2 \
-  fmu-manipulation-toolbox==2.0 copasi-basico==0.92; do
+  fmu-manipulation-toolbox==2.0 copasi-basico==0.92 jaxonomy==3.4.1; do
   environment=$importers/${package%%=*}
   [ -d "$environment" ] || python3 -m venv "$environment"
   "$environment/bin/pip" install --quiet "$package"

@@ -54,6 +54,8 @@ MASTERS = [
     ("cofmupy", "1.0.0", 3, 1, 0),
     ("pathsim-fmi", "0.1.1", 2, 1, 1),
     ("pathsim-fmi", "0.1.1", 3, 1, 1),
+    ("jaxonomy", "3.4.1", 2, -1, 0),
+    ("jaxonomy", "3.4.1", 3, -1, 0),
 ]
 
 
@@ -115,14 +117,15 @@ def test_masters_hold_the_force_during_each_step(
     end = UNTIL + ahead * STEP
     assert found["ball"] == pytest.approx(ball_at(end), abs=1e-9)
     steps = range(round(end / STEP))
-    values = [20 * math.cos(2.5 * (k + force_ahead) * STEP) for k in steps]
+    values = [20 * math.cos(2.5 * max(0, k + force_ahead) * STEP) for k in steps]
     held = f"{{times: {[k * STEP for k in steps]}, values: {values}, hold: zero}}"
     assert found["mass"] == pytest.approx(mass_at(end, held), abs=1e-7)
 
 
 @pytest.mark.tools
-def test_pathsim_locates_impacts_of_model_exchange(units: Path) -> None:
-    found = run("pathsim-fmi", "0.1.1", units, "exchange")
+@pytest.mark.parametrize(("importer", "version"), [("pathsim-fmi", "0.1.1"), ("jaxonomy", "3.4.1")])
+def test_importers_locate_impacts_of_model_exchange(importer: str, version: str, units: Path) -> None:
+    found = run(importer, version, units, "exchange")
     assert found["ball"] == pytest.approx(ball_at(UNTIL), abs=1e-7)
     assert found["mass"] == pytest.approx(mass_at(UNTIL, "20*cos(2.5*t)"), abs=1e-6)
 
