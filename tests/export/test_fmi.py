@@ -19,7 +19,6 @@ from shipped import MODELS, assert_golden
 import hsdsl
 from hsdsl.engine.execution.run import Execution
 from hsdsl.export import files_of, fmi, source_of
-from hsdsl.export.fmi import archive
 from hsdsl.export.fmi.variables import nominals, unit_of
 from hsdsl.interface.model import Model
 
@@ -94,7 +93,7 @@ def test_descriptions_have_no_findings(text: str, version: int, tmp_path: Path) 
     unit = unit_of(source_of(loaded(text), {}))
     description = getattr(fmi, f"description{version}")
     path = tmp_path / "unit.fmu"
-    path.write_bytes(archive.archived({"modelDescription.xml": description(unit).encode()}))
+    path.write_bytes(fmi.archived({"modelDescription.xml": description(unit).encode()}))
     assert validate_fmu(str(path)) == []
 
 
@@ -110,7 +109,7 @@ def test_all_functions_of_the_standard_are_exported(version: int, count: int, ma
 
 
 def unit_sources(version: int, folder: Path) -> None:
-    for name, content in archive.sources_of(unit_of(source_of(loaded(DRIVEN), {})), version).items():
+    for name, content in fmi.sources_of(unit_of(source_of(loaded(DRIVEN), {})), version).items():
         (folder / name).write_bytes(content)
 
 
@@ -118,7 +117,7 @@ def unit_sources(version: int, folder: Path) -> None:
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_sources_compile_without_warnings(compiler: str, version: int, tmp_path: Path) -> None:
     unit_sources(version, tmp_path)
-    names = [name for name in archive.compiled_names(version) if name != archive.LOOP]  # the tests of C compile that
+    names = [name for name in fmi.compiled_names(version) if name != fmi.LOOP]  # the tests of C compile that
     command = [*COMPILERS[compiler], *WARNINGS, "-c", *names]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0 and not done.stderr, done.stderr

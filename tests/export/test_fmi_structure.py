@@ -12,7 +12,7 @@ import pytest
 
 import hsdsl
 from hsdsl.export import Modes, files_of, fmi, source_of
-from hsdsl.export.fmi import archive
+from hsdsl.export.fmi.description import token_of
 from hsdsl.export.fmi.variables import unit_of
 from hsdsl.interface.cli.verbs import obey
 
@@ -54,7 +54,7 @@ def described(text: str, version: int, folder: Path, modes: Modes = "local") -> 
     unit = unit_of(source_of(hsdsl.loads(text), {}), modes)
     description = getattr(fmi, f"description{version}")
     path = folder / "unit.fmu"
-    path.write_bytes(archive.archived({"modelDescription.xml": description(unit).encode()}))
+    path.write_bytes(fmi.archived({"modelDescription.xml": description(unit).encode()}))
     assert validate_fmu(str(path)) == []
     return fmpy.read_model_description(str(path))
 
@@ -119,7 +119,7 @@ def test_the_mode_is_what_is_asked_for(modes: Modes, causality: str | None, vers
 def test_modes_tell_units_apart() -> None:
     sources = source_of(hsdsl.loads(TEXT), {})
     choices: tuple[Modes, ...] = ("local", "output", "none")
-    assert len({archive.token_of(unit_of(sources, modes), 3) for modes in choices}) == 3
+    assert len({token_of(unit_of(sources, modes), 3) for modes in choices}) == 3
 
 
 def test_the_mode_is_asked_for_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,6 +5,7 @@ Texts of elements cannot be markup, and units are written by their base units.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
@@ -13,7 +14,6 @@ from hsdsl import __version__
 from hsdsl.analysis.lint import units
 from hsdsl.analysis.lint.units import BASE, UnknownUnit, read
 from hsdsl.base.names import visible
-from hsdsl.export.fmi.archive import token_of
 from hsdsl.export.fmi.variables import Unit, Variable, dependencies, initial_dependencies
 
 _KINDS = {  # causality, variability, initial
@@ -26,6 +26,12 @@ _KINDS = {  # causality, variability, initial
     "mode": ("local", "discrete", "calculated"),
     "indicator": ("local", "continuous", "calculated"),
 }
+
+
+def token_of(unit: Unit, version: int) -> str:
+    """A UUID of the model, its settings, its variables and this version."""
+    digest = hashlib.sha256("\n".join((str(version), unit.modes, *unit.source.heading)).encode()).hexdigest()
+    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
 
 def root_of(unit: Unit, version: int, **further: str) -> Element:

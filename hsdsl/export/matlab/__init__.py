@@ -77,7 +77,7 @@ def _parameters(source: Source) -> str:
     given = "\nfunction value = given(chosen, name, value)\n  if isfield(chosen, name)\n"
     given += "    value = chosen.(name);\n  end\nend\n"
     rest = "".join(f"\n{text}" for text in functions)
-    return head + "".join(lines) + known + "end\n" + given + rest + _called(rest)
+    return head + "".join(lines) + known + "end\n" + given + rest + helpers(rest)
 
 
 def _initial(source: Source) -> str:
@@ -94,12 +94,7 @@ def _initial(source: Source) -> str:
         value = literal(number) if place is None else f"values({place + 1})"
         lines.append(f"  x0({i + 2}) = {value};  % {visible(name)}\n")
     text = "".join(lines) + "end\n" + (f"\n{inner}" if program.initial_states else "")
-    return text + _called(text)
-
-
-def _called(text: str) -> str:
-    calls = helpers(text)
-    return f"\n{calls}" if calls else ""
+    return text + helpers(text)
 
 
 def _given(definition: ast.FunctionDef, fields: Iterable[str], name: str) -> str:

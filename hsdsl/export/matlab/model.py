@@ -56,8 +56,7 @@ class ModelText:
             "end\n\n",
         ]
         functions = "\n".join([*self.functions, (PARTS / "last.m.in").read_text()])
-        calls = helpers(functions)
-        return "".join(parts) + functions + (f"\n{calls}" if calls else "")
+        return "".join(parts) + functions + helpers(functions)
 
     def facts(self, program: Program) -> Iterable[tuple[str, str]]:
         """Names and sizes."""
@@ -268,10 +267,10 @@ def reserved(source: str) -> frozenset[str]:
 
 
 def helpers(text: str) -> str:
-    """The functions that a text calls and MATLAB lacks."""
+    """The functions that a text calls and MATLAB lacks, each after an empty line."""
     lines: list[str] = []
     for name in sorted(set(_HELPER.findall(text)) & HELPERS.keys()):
         arguments, where, value = HELPERS[name]
-        lines.append(f"function value = hs_{name}({arguments})\n  if {where}\n    value = {value};\n")
+        lines.append(f"\nfunction value = hs_{name}({arguments})\n  if {where}\n    value = {value};\n")
         lines[-1] += f"  else\n    value = {'other' if name == 'choose' else 'NaN'};\n  end\nend\n"
-    return "\n".join(lines)
+    return "".join(lines)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 from hsdsl.analysis.lint.finding import Finding
@@ -54,14 +55,14 @@ def _fault(code: str, rule: Any) -> str | None:
 
 
 _OWN: dict[str, Rule | str] = {
-    "HS401": Rule("unused-parameter", shape.unused_name("parameter")),
-    "HS402": Rule("unused-input", shape.unused_name("input")),
+    "HS401": Rule("unused-parameter", partial(shape.unused_name, kind="parameter")),
+    "HS402": Rule("unused-input", partial(shape.unused_name, kind="input")),
     "HS403": Rule("unused-let", shape.unused_let),
     "HS404": Rule("unused-state", shape.unused_state),
     "HS405": Rule("shadowed-name", shape.shadowed_name, "note"),
     "HS406": Rule("unreachable-mode", shape.unreachable_mode),
     "HS409": Rule("misnamed-output", shape.misnamed_output),
-    "HS410": Rule("unused-function", shape.unused_name("function")),
+    "HS410": Rule("unused-function", partial(shape.unused_name, kind="function")),
     "HS421": Rule("identity-reset", shape.identity_reset),
     "HS422": Rule("missing-reset", shape.missing_reset),
     "HS425": Rule("dead-end", shape.dead_end),
@@ -94,9 +95,9 @@ _OWN: dict[str, Rule | str] = {
     "HS515": Rule("not-lipschitz", regularity.not_lipschitz),
     "HS517": Rule("degenerate-surface", regularity.degenerate_surface),
     "HS601": Rule("unknown-unit", units.unknown_unit),
-    "HS602": Rule("inconsistent-units", units.misfits("sum", units.CONVERT)),
-    "HS603": Rule("argument-units", units.misfits("argument", units.PLAIN)),
-    "HS604": Rule("flow-units", units.flow_units),
-    "HS605": Rule("value-units", units.value_units),
+    "HS602": Rule("inconsistent-units", partial(units.misfits, kind="sum", hint=units.CONVERT)),
+    "HS603": Rule("argument-units", partial(units.misfits, kind="argument", hint=units.PLAIN)),
+    "HS604": Rule("flow-units", partial(units.differing, roles=units.FLOWS)),
+    "HS605": Rule("value-units", partial(units.differing, roles=units.VALUES)),
 }
 RULES = Table[Rule]("rules", _OWN, _fault)

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import sympy as sp
@@ -136,15 +136,11 @@ _UNUSED = "remove it, or use it"
 _SEPARATE = "give one of them another name"
 
 
-def unused_name(kind: str) -> Callable[[Subject], Iterator[Finding]]:
-    """Make the rule that finds unused parameters, functions or inputs."""
-
-    def check(subject: Subject) -> Iterator[Finding]:
-        for name in getattr(subject.document, f"{kind}s"):
-            if Definition(kind, None, str(name)) in subject.unused:
-                yield Finding(name.place.span, f"nothing uses the {kind} '{name}'", _UNUSED)
-
-    return check
+def unused_name(subject: Subject, kind: str) -> Iterator[Finding]:
+    """Find unused parameters, functions or inputs."""
+    for name in getattr(subject.document, f"{kind}s"):
+        if Definition(kind, None, str(name)) in subject.unused:
+            yield Finding(name.place.span, f"nothing uses the {kind} '{name}'", _UNUSED)
 
 
 def unused_let(subject: Subject) -> Iterator[Finding]:

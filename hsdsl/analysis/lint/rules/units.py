@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 from hsdsl.analysis.lint.finding import Finding
 from hsdsl.analysis.lint.subject import Subject
@@ -11,7 +11,8 @@ from hsdsl.base.names import closest, shown
 
 CONVERT = "correct it, or give a factor that converts a name and a unit"
 PLAIN = "divide by something in the same unit, or give the factor a name and its unit"
-_VALUES = {
+FLOWS = {"flow": "the flow of '{}'"}
+VALUES = {
     "reset": "the new value of '{}'",
     "initial": "the initial value of '{}'",
     "scale": "the scale of '{}'",
@@ -35,30 +36,16 @@ def unknown_unit(subject: Subject) -> Iterator[Finding]:
         yield Finding(scalar.place.span, f"'{shown(name or scalar.value)}' is not a unit", hint)
 
 
-def misfits(kind: str, hint: str | None = None) -> Callable[[Subject], Iterator[Finding]]:
-    """Make the rule that finds one kind of misfit inside expressions."""
-
-    def check(subject: Subject) -> Iterator[Finding]:
-        for checked in subject.units.checked:
-            for own, node, message in checked.misfits:
-                if own == kind:
-                    yield Finding(checked.written.span(node), message, hint)
-
-    return check
+def misfits(subject: Subject, kind: str, hint: str) -> Iterator[Finding]:
+    """Find one kind of misfit inside expressions."""
+    for checked in subject.units.checked:
+        for own, node, message in checked.misfits:
+            if own == kind:
+                yield Finding(checked.written.span(node), message, hint)
 
 
-def flow_units(subject: Subject) -> Iterator[Finding]:
-    """Find flows in another unit than that of their state by time."""
-    return _differing(subject, {"flow": "the flow of '{}'"})
-
-
-def value_units(subject: Subject) -> Iterator[Finding]:
-    """Find values in another unit than that of their name."""
-    return _differing(subject, _VALUES)
-
-
-def _differing(subject: Subject, roles: dict[str, str]) -> Iterator[Finding]:
-    """Find expressions in another unit than they should be in."""
+def differing(subject: Subject, roles: dict[str, str]) -> Iterator[Finding]:
+    """Find expressions of some roles in another unit than they should be in, as flows in that of the state by time."""
     for checked in subject.units.checked:
         written, expected = checked.written, checked.expected
         if written.role not in roles or expected is None or not isinstance(checked.measure, Unit):
