@@ -21,7 +21,7 @@ from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64
 from hsdsl.engine.backends.python import PythonKernel
 from hsdsl.engine.execution import Arc, Array, Execution, Point, Transition
 from hsdsl.engine.kernel import ModeKernel, Routine
-from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
+from hsdsl.mathematics.program import ModeProgram, Program
 
 STORED = Path(__file__).with_name("stored")
 LARGEST_DEFECT = 1e-9  # of slopes, guards and resets, relative
@@ -171,24 +171,19 @@ class _Check:
     def jump(self, t: Transition) -> float:
         """Guard and reset of a transition, and that the flow leads out."""
         program, kernel = self.mode(t.source, tuple(t.before))
-        k, edge = self._edge(program, t)
+        k = next((k for k, edge in enumerate(program.edges) if edge.name == t.edge), None)
+        if k is None:
+            raise ValueError(f"no transition {t.edge}")
         before, after = tuple(t.before.values()), np.array(list((t.after or {}).values()))
         if kernel.rates[k](t.time, *before)[0] <= 0:
             return float("inf")
         reset = np.array(kernel.resets[k](t.time, *before))
         if len(reset) != len(after):
-            raise ValueError(f"{edge.name} leads to other states")
+            raise ValueError(f"{t.edge} leads to other states")
         size = 1 + float(np.max(np.abs(before)))
         return max(
             abs(kernel.surfaces(t.time, *before)[k]) / size, float(np.max(np.abs(reset - after), initial=0)) / size
         )
-
-    @staticmethod
-    def _edge(program: ModeProgram, t: Transition) -> tuple[int, EdgeProgram]:
-        for k, edge in enumerate(program.edges):
-            if edge.name == t.edge:
-                return k, edge
-        raise ValueError(f"no transition {t.edge}")
 
 
 def _steepness(jacobian: Routine, t: float, x: Array) -> Array:

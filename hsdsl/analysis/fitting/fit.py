@@ -6,7 +6,7 @@ import csv
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import isinf
+from math import inf, isinf
 from pathlib import Path
 from typing import Any, cast
 
@@ -275,14 +275,9 @@ def _numbers(name: str, column: str, cells: Sequence[Any]) -> Array:
         try:
             found.append(float("nan") if text in ("", None) else float(text))
         except (TypeError, ValueError):
-            raise _no_number(name, column, k, cell) from None
+            found.append(inf)  # no number either
         if isinf(found[-1]):
-            raise _no_number(name, column, k, cell)
+            place = f"column {column}, row {k + 2}"
+            reason = f"{name}: expected a finite number in {place}, got '{shown(str(cell))}'"
+            raise UsageError(reason, "leave the cell empty if nothing was measured")
     return np.array(found)
-
-
-def _no_number(name: str, column: str, k: int, cell: Any) -> UsageError:
-    hint = "leave the cell empty if nothing was measured"
-    return UsageError(
-        f"{name}: expected a finite number in column {column}, row {k + 2}, got '{shown(str(cell))}'", hint
-    )

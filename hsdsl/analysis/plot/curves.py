@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import accumulate, pairwise
+from itertools import accumulate, groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -211,14 +211,9 @@ def _bands(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, floa
 
 def merged(bands: list[tuple[str, float, float]]) -> list[tuple[str, float, float]]:
     """Make one band of those that follow each other in one mode."""
-    merged: list[tuple[str, float, float]] = []
-    for mode, begin, end in bands:
-        if begin == end:
-            continue
-        if merged and merged[-1][0] == mode:
-            begin = merged.pop()[1]
-        merged.append((mode, begin, end))
-    return merged
+    lasting = (band for band in bands if band[1] != band[2])
+    groups = (list(group) for _, group in groupby(lasting, key=lambda band: band[0]))
+    return [(group[0][0], group[0][1], group[-1][2]) for group in groups]
 
 
 def line(x: Array, y: Array, begins: Array, limits: tuple[float, float, float, float]) -> tuple[Array, Array]:

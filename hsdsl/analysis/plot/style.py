@@ -144,25 +144,17 @@ def empty(width: float, height: float) -> Figure:
 def styled() -> Generator[None]:
     """Draw with our settings in the block, and no other thread meanwhile."""
     with _drawing:
-        _import()
+        named = os.environ.pop("MPLBACKEND", None) if "matplotlib" not in sys.modules else None
         import matplotlib.style
+
+        if named is not None:  # perhaps a backend there is not: none is used here
+            os.environ["MPLBACKEND"] = named
+            with suppress(ValueError):
+                matplotlib.rcParams["backend"] = named
 
         with matplotlib.style.context(["default", STYLE]), warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Glyph .* missing")  # a script that the font lacks
             yield
-
-
-def _import() -> None:
-    """Import matplotlib, also where the environment names a backend there is not: none is used here."""
-    if "matplotlib" in sys.modules:
-        return
-    named = os.environ.pop("MPLBACKEND", None)
-    import matplotlib
-
-    if named is not None:
-        os.environ["MPLBACKEND"] = named
-        with suppress(ValueError):
-            matplotlib.rcParams["backend"] = named
 
 
 def looks(count: int) -> list[Look]:

@@ -74,17 +74,13 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
         right = column[0] in ("#", "time", "delay")
         cells.append([cell.rjust(wide) if right else cell.ljust(wide) for cell in column])
     for i, (row, note) in enumerate(zip(zip(*cells, strict=True), notes, strict=True)):
-        yield from _row("  ".join(row), note, columns)
+        line = "  ".join(row)
+        if (start := len(line) + 2) <= columns - 24:
+            yield from _wrapped(note, columns, line + "  ", " " * start)
+        else:  # too little room for a note after the line
+            yield from [line.rstrip(), *_wrapped(note, columns, " " * 6, " " * 6)]
         if i == cut and left_out:
             yield f"   ... {left_out} more ..."
-
-
-def _row(line: str, note: str, columns: int) -> list[str]:
-    """Put the note after the line, wrapped below itself; below the line where there is too little room for it."""
-    start = len(line) + 2
-    if columns - start >= 24:
-        return _wrapped(note, columns, line + "  ", " " * start)
-    return [line.rstrip(), *_wrapped(note, columns, " " * 6, " " * 6)]
 
 
 def _escaped(text: str) -> str:

@@ -99,7 +99,9 @@ class Scene:
         clear = (near > clearance) & (grid <= end - clearance)
         if not clear.any():
             raise UsageError(f"no sample is farther than {clearance:g} from a jump and the end", "lower --clearance")
-        (values, modes), countable = sampled(exact, grid, chosen), _countable(exact, jumps, end - clearance)
+        values, modes = sampled(exact, grid, chosen)
+        certain = int(np.count_nonzero(jumps <= end - clearance))
+        countable = (0, inf) if exact.verdict.theorem == "left" else (certain, len(jumps))
         name = Path(model.program.path).stem + (f"-{block}" if block else "")
         return Scene(name, model, initial, exact, chosen, grid, clear, values, modes(), countable)
 
@@ -129,12 +131,6 @@ def sampled(execution: Execution, grid: Array, states: Sequence[str]) -> tuple[A
         return names
 
     return values, modes
-
-
-def _countable(exact: Execution, jumps: Array, nearly_end: float) -> tuple[float, float]:
-    if exact.verdict.theorem == "left":
-        return 0, inf
-    return int(np.count_nonzero(jumps <= nearly_end)), len(jumps)
 
 
 def _known(model: Model, block: int) -> Execution | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from enum import StrEnum
 from pathlib import Path
@@ -41,20 +41,15 @@ def model_files(incomplete: str) -> list[str]:
 
 def override_names(ctx: Context, incomplete: str) -> list[str]:
     """Names for ``--set`` of the model on the command line, with ``=``."""
-    try:  # the option has no value yet, so the words before it are not assigned to arguments
-        return [f"{name}=" for word in ctx.args[:1] for name in _names(Path(word)) if name.startswith(incomplete)]
-    except (ModelError, UsageError):
-        return []
-
-
-def _names(path: Path) -> Iterator[str]:
     from hsdsl.engine.preparation.options import KEYS
 
-    program = hsdsl.load(path).program
+    try:  # the option has no value yet, so the words before it are not assigned to arguments
+        program = hsdsl.load(Path(ctx.args[0])).program
+    except (IndexError, ModelError, UsageError):
+        return []
     states = without_memory(program.modes[program.initial_mode].states)
-    yield from program.parameters
-    yield from ("initial.mode", *(f"initial.{state}" for state in states))
-    yield from (f"experiment.{name}" for name in KEYS)
+    names = [*program.parameters, "initial.mode", *(f"initial.{state}" for state in states)]
+    return [f"{name}=" for name in (*names, *(f"experiment.{key}" for key in KEYS)) if name.startswith(incomplete)]
 
 
 def rule_codes(incomplete: str) -> list[tuple[str, str]]:

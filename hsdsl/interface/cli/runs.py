@@ -66,14 +66,20 @@ def plot(
         from hsdsl.analysis.plot import plot
         from hsdsl.analysis.plot.curves import names_of as known_names
 
-        options: dict[str, Any] = {} if loaded is None else _look(loaded, executions)
-        if loaded is None and len(executions) == 1:
+        options: dict[str, Any] = {}
+        if loaded is not None:
+            from hsdsl.engine.preparation.options import parameters_of
+
+            looks = [loaded.look(parameters_of(run.overrides)) for run in executions]
+            same = all(look["guards"] == looks[0]["guards"] for look in looks)
+            options = looks[0] | ({} if same else {"guards": ()})  # runs with other parameters have other levels
+        elif len(executions) == 1:
             options = executions[0].view()
-        known = known_names(executions)
+        known, names = known_names(executions), [path.stem for path in runs]
         options |= {
             "columns": columns,
             "phases": pairs_of(phase, known),
-            "labels": labels or _labels(runs),
+            "labels": labels or (names if len(set(names)) == len(names) else [str(path) for path in runs]),
             "title": title,
         }
         plot(executions, out, **options)
@@ -81,21 +87,6 @@ def plot(
             print_json({"files": [str(out)], "runs": options["labels"]})
         elif not answer.quiet:
             say(f"wrote {out}")
-
-
-def _look(model: Any, runs: list[Any]) -> dict[str, Any]:
-    """Units, and the levels of guards where all runs have the same; those of runs with other parameters differ."""
-    from hsdsl.engine.preparation.options import parameters_of
-
-    looks = [model.look(parameters_of(run.overrides)) for run in runs]
-    same = all(look["guards"] == looks[0]["guards"] for look in looks)
-    return looks[0] | ({} if same else {"guards": ()})
-
-
-def _labels(runs: list[Path]) -> list[str]:
-    """The files' names, with their folders where names repeat."""
-    names = [path.stem for path in runs]
-    return names if len(set(names)) == len(names) else [str(path) for path in runs]
 
 
 SET_PARAMETERS = "Override a parameter. May be repeated."
