@@ -251,7 +251,7 @@ def _following(table: InstanceTable, given: Mapping[str, Column]) -> dict[str, C
 
 
 def waiting_apart(program: Program, initial: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Initial values of states, and those of executions that wait behind the first of their event."""
+    """Initial values of states, and those of executions that wait after the first of their event."""
     known = {mode.states[i] for mode in program.modes for queue in mode.queues for i in queue.values}
     waits = {name for name in initial if (found := _NUMBERED.fullmatch(name)) and found[1] in known}
     apart = {name: value for name, value in initial.items() if name not in waits}
@@ -261,7 +261,7 @@ def waiting_apart(program: Program, initial: Mapping[str, Any]) -> tuple[dict[st
 def initial_waits(
     values: Values, mode: ModeProgram, x: State, given: Mapping[str, Any]
 ) -> dict[str, tuple[Waits, ...]]:
-    """The executions that wait behind the first of each queue where a run starts, in the order in which they are made.
+    """The executions that wait after the first of each queue where a run starts, in the order in which they are made.
 
     Raises UsageError: not as many are given as the number that wait says.
     """

@@ -250,8 +250,8 @@ def in_touch(here: ModeState, held: ModeState) -> list[int]:
     return [k for k, edge in enumerate(here.mode.edges) if edge.contact in held.surfaces.touched]
 
 
-def behind_end(run: Run, here: ModeState, held: ModeState, k: int, t: Number, x: State) -> tuple[Number, State, bool]:
-    """A point behind the end of a part of an `if` in contact, and whether an `if` does not hold there.
+def past_end(run: Run, here: ModeState, held: ModeState, k: int, t: Number, x: State) -> tuple[Number, State, bool]:
+    """A point after the end of a part of an `if` in contact, and whether an `if` does not hold there.
 
     Surface k of the contact rises through zero at t; it is above round-off at the point, if all hold there.
     """

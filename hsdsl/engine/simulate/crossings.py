@@ -30,7 +30,7 @@ TURNINGS = 60  # halvings of a step
 def crossings_along(run: Run, here: ModeState, span: Span) -> list[Crossing]:
     """The first crossing of each surface of a step, in their order.
 
-    Surfaces that rise behind the first of all are left out. There they are inside, beyond round-off and by more than
+    Surfaces that rise after the first of all are left out. There they are inside, beyond round-off and by more than
     they rise while crossings are tied. Not those of an implicit method: to a point of its step it iterates from the
     one before.
     """
@@ -55,15 +55,15 @@ def crossings_along(run: Run, here: ModeState, span: Span) -> list[Crossing]:
         k = min(waiting, key=lambda k: waiting[k][0][0])
         keep(first_crossing(run, here, span, k, *waiting.pop(k)))
     first = min(found.values(), key=lambda c: c.time, default=None)
-    behind = {k for k, (rise, _) in waiting.items() if first and is_behind(run, here, first, k, rise)}
+    later = {k for k, (rise, _) in waiting.items() if first and rises_after(run, here, first, k, rise)}
     for k in waiting:
-        if k not in behind:
+        if k not in later:
             keep(first_crossing(run, here, span, k, *waiting[k]))
     return [found[k] for k in sorted(found)]
 
 
-def is_behind(run: Run, here: ModeState, first: Crossing, k: int, rise: Rise) -> bool:
-    """Whether surface k rises behind the first crossing of a step."""
+def rises_after(run: Run, here: ModeState, first: Crossing, k: int, rise: Rise) -> bool:
+    """Whether surface k rises after the first crossing of a step."""
     share, _, certain = rise
     if not certain or not share > first.theta:
         return False
@@ -108,7 +108,7 @@ def first_crossing(
 def with_unseen(run: Run, here: ModeState, span: Span, guards: list[Crossing]) -> list[Crossing]:
     """Crossings, with those before the first one that rise by less than a step's polynomials are off by.
 
-    A surface may be beyond its guard so and be crossed again behind the first one.
+    A surface may be beyond its guard so and be crossed again after the first one.
     """
     t, x, first, found = span.t, span.x, min(guards, key=lambda c: c.time), {c.edge: c for c in guards}
     start, end = here.kernel.surfaces(t, *x), here.kernel.surfaces(first.time, *first.state)

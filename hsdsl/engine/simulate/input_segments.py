@@ -3,7 +3,7 @@
 On a segment a sampled input is a line ``a + b (t - c)`` and a switch a number, so every stage of a step sees the values
 of the step's own open interval, and the stage at its right end takes the left limit. Two samples at one time are a jump
 between two lines. Where an input jumps at the end of
-the run, a last segment of no length has the values behind the jump.
+the run, a last segment of no length has the values after the jump.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from hsdsl.base.samples import in_order
 from hsdsl.engine.kernel import Kernel
 from hsdsl.mathematics.program import Program, SampledInput
 
-BEHIND = 4  # ties of time behind the end of a run, where inputs have the values behind a jump at the end
+BEHIND = 4  # ties of time after the end of a run, where inputs have the values after a jump at the end
 
 
 class UnorderedTimes(UsageError):
-    """Sample ``k`` of an input, counted from 0, is not behind the sample before it."""
+    """Sample ``k`` of an input, counted from 0, is not after the sample before it."""
 
     def __init__(self, message: str, name: str = "", k: int = 0, ramps: bool = False) -> None:
         times = "no time more than twice" if ramps else "each time once"
@@ -52,7 +52,7 @@ class Timeline:
         return self.segments[max(0, bisect_right(self.segments, t, key=lambda s: s.start) - 1)]
 
     def goes_on(self, segment: Segment) -> bool:
-        """Whether another segment is behind this one."""
+        """Whether another segment follows this one."""
         return self.at(segment.end) is not segment
 
 
@@ -108,7 +108,7 @@ def _switched(program: Program, kernel: Kernel, segments: list[Segment], until: 
         jumps = {segment.start: segment.jump for segment in segments}
         for piece in Changes(kernel, switch, place - first, tie).pieces(segments):
             no_value = piece.number != piece.number and before is not None and not piece.start < until
-            number = before if no_value else piece.number  # a model need not have a meaning behind its end
+            number = before if no_value else piece.number  # a model need not have a meaning after its end
             changed = before is not None and not same(number, before)
             data = (*piece.part.data[:place], number, *piece.part.data[place + 1 :])
             jump = jumps.get(piece.start, False) or (switch.jumps and changed)
@@ -153,7 +153,7 @@ def _jumps(times: tuple[Number, ...], values: tuple[Number, ...]) -> tuple[int, 
 def _line(
     given: SampledInput, times: tuple[Number, ...], values: tuple[Number, ...], k: int
 ) -> tuple[Number, Number, Number]:
-    """Return (a, b, c) of the segment behind sample k; constant before the first and after the last sample."""
+    """Return (a, b, c) of the segment after sample k; constant before the first and after the last sample."""
     still = values[0] * 0
     if k < 0:
         return values[0], still, times[0]

@@ -16,7 +16,7 @@ from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.stepper import State
 from hsdsl.engine.scheme.pace import count_step
-from hsdsl.engine.simulate.contact import behind_end, contact_at, held_exactly, in_touch, keeps
+from hsdsl.engine.simulate.contact import contact_at, held_exactly, in_touch, keeps, past_end
 from hsdsl.engine.simulate.control import StepFailure
 from hsdsl.engine.simulate.crossings import crossings_along, with_unseen
 from hsdsl.engine.simulate.located_steps import SeriesSteps, Span, TableSteps
@@ -71,7 +71,7 @@ def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeStat
             return replace(outcome, crossing=replace(crossing, state=x), alternatives=others, held=held_by)
         t, x, ends = crossing.time, crossing.state, True
         if not crossing.edge < len(edges):
-            t, x, ends = behind_end(run, here, held, crossing.edge, t, x)
+            t, x, ends = past_end(run, here, held, crossing.edge, t, x)
         if t > crossing.time:
             here.arc.append(t, x, (tuple(b - a for a, b in zip(crossing.state, x, strict=True)),))
         held.surfaces.leave(t, x)
@@ -126,7 +126,7 @@ def first_event(run: Run, here: ModeState, before: Span | None, span: Span) -> E
 
 
 def largest(here: ModeState, before: Span | None, span: Span, crossing: Crossing) -> State:
-    """The sizes of the numbers behind a crossing's state: the terms of its step and of the one before."""
+    """The sizes of the numbers of a crossing's state: the terms of its step and of the one before."""
     stays = stands(here, crossing)  # off that surface by as much as the state was that it came from
     found = tuple(map(joined, sizes(span.x, crossing.state, here, stays), span.sizes(crossing.theta)))
     if before is not None:
@@ -152,7 +152,7 @@ def write(here: ModeState, span: Span, crossing: Crossing) -> None:
 
 
 def make_transition(run: Run, here: ModeState, event: Event) -> ModeState | Stop:
-    """Make a transition, at its own instant or behind a strip, and look whether it belongs to a Zeno tail."""
+    """Make a transition, at its own instant or after a strip, and look whether it belongs to a Zeno tail."""
     crossing, until = run.moved_crossing(here, event.crossing), run.settings.until
     t, q, edge = crossing.time, crossing.state, here.mode.edges[crossing.edge]
     if stop := run.limit_reached(t):
@@ -226,7 +226,7 @@ def moves(run: Run, here: ModeState, crossing: Crossing) -> bool:
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
-    """Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires."""
+    """Go on after a sample of an input, or end: a jump at the end is made, and a guard reached there fires."""
     if run.timeline.goes_on(here.segment):
         return go_on(run, here)
     held = contact_at(run, here)

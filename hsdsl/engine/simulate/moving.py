@@ -49,7 +49,7 @@ class Start:
 
 
 def moved_reset(kernel: Kernel, mode: int, k: int, data: Sequence[Number], t: Number, q: State) -> State | None:
-    """The state behind a reset, moved by its round-off; None where that is not known."""
+    """The state after a reset, moved by its round-off; None where that is not known."""
     arithmetic = following(kernel.arithmetic, traced=True)
     try:
         resets = kernel.over(arithmetic).bind(mode, list(exactly(arithmetic, data))).resets

@@ -44,7 +44,7 @@ class Path:
         return self.contact[n] and not self.contact[n - 1]
 
     def velocity(self, n: int) -> Number:
-        """Velocity at step n > 0; behind the impact where one begins there."""
+        """Velocity at step n > 0; after the impact where one begins there."""
         if self.impact(n):
             return self.slope(n + 1) if self.contact[n + 1 : n + 2] == [True] else self.slope(n)
         return self.slope(n) if self.contact[n] else (self.z[n + 1] - self.z[n - 1]) / (2 * self.h)

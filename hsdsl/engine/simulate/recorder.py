@@ -165,7 +165,7 @@ class Recorder:
         return arc
 
     def strip(self, arc: OpenArc, rows: list[tuple[Number, Number]], q: State, outputs: Outputs | None) -> None:
-        """Write a strip behind ``arc``: the state waits at q while the depth grows; rows are (time, depth)."""
+        """Write a strip after ``arc``: the state waits at q while the depth grows; rows are (time, depth)."""
         strip = self.begin(arc.mode, arc.states, "strip", outputs, rows[0][0], q)
         for t, _ in rows[1:]:
             strip.append(t, q, ())

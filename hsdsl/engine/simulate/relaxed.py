@@ -378,7 +378,7 @@ def moves_on(here: ModeState, crossing: Crossing, entered: ModeState) -> bool:
 
 
 def at_boundary(run: Run, here: ModeState) -> ModeState | Stop:
-    """Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires."""
+    """Go on after a sample of an input, or end: a jump at the end is made, and a guard reached there fires."""
     if run.timeline.goes_on(here.segment):
         return go_on(run, here)
     t, x = here.t, here.x

@@ -248,7 +248,7 @@ class Diagnostics:
     def in_contact(self, edge: str, start: Number, end: Number, still: bool) -> None:
         """The state moved along a guard, or rested on it; for less than can be seen, that is neither.
 
-        Motion that goes on behind a transition of something else is one.
+        Motion that goes on after a transition of something else is one.
         """
         if show(start) == show(end):
             return

@@ -135,7 +135,7 @@ class Surfaces:
     end: Number | None = None
 
     def too_late(self, k: int, t: Number, since: Number) -> bool:
-        """Whether an edge that is crossed at a time is one that is made behind it, and the run ends there."""
+        """Whether an edge that is crossed at a time is one that is made after it, and the run ends there."""
         return self.edges[k].strict and self.end is not None and t + since >= self.end
 
     def releases(self, k: int) -> bool:

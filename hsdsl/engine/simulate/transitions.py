@@ -1,6 +1,6 @@
 """One transition: which crossing goes, its reset, the executions that wait, the mode that is entered, and cascades.
 
-The *spread* of a reset is the sum of the sizes of the terms that each state behind it is computed from: its
+The *spread* of a reset is the sum of the sizes of the terms that each state after it is computed from: its
 round-off is relative to that.
 
 A mode is entered at the start, after a reset, at a jump of an input. A state that enters beyond a surface without an
@@ -8,7 +8,7 @@ A mode is entered at the start, after a reset, at a jump of an input. A state th
 when no such transition is left. A *cascade* is transitions that follow each other without any flow between them: where
 it returns to a state, it would go on without end.
 
-Executions of events that wait behind the first of their event are no states, so that any number can wait. A mode's
+Executions of events that wait after the first of their event are no states, so that any number can wait. A mode's
 states have of each queue how many wait and the first that is made; a *tail* of a queue has the others, in the order in
 which they are made. What a reset does to these states says what happens to the tail: one more waits, which goes where
 its time says, the first was made, or all were dropped.
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Event:
-    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers behind that.
+    """A step that ended in a strip at t1: where it left the domain, and the sizes of the numbers there.
 
     The guards of edges ``held`` held the state until then.
     """

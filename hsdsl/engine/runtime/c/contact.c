@@ -326,9 +326,9 @@ static void after_contact(hs_run *run) {
   count_active(run);
 }
 
-/* Move t, where surface j of the contact rises through zero, to behind the end of a part of an `if` in contact, and the
+/* Move t, where surface j of the contact rises through zero, to after the end of a part of an `if` in contact, and the
    state run->x to run->z: whether an `if` does not hold there. Surface j is above round-off there, if all hold. */
-static int behind_end(hs_run *run, int j, hs_time *t) {
+static int past_end(hs_run *run, int j, hs_time *t) {
   const hs_mode_state *here = &run->here;
   const hs_mode *const held = here->table, *const own = &run->model->mode[here->mode];
   const hs_time from = *t;

@@ -170,8 +170,8 @@ static const hs_crossing *kept_crossing(hs_run *run, const hs_crossing *first, i
 }
 
 /* Mark in run->surfaces.beyond the surfaces that rise after the first crossing: there they are inside, beyond round-off
-   and by more than they rise while crossings are tied. The Python twin is `is_behind`, of one surface. */
-static int mark_behind(hs_run *run, const hs_crossing *first) {
+   and by more than they rise while crossings are tied. The Python twin is `rises_after`, of one surface. */
+static int mark_after(hs_run *run, const hs_crossing *first) {
   const hs_mode *mode = run->here.table;
   const hs_real since = tie(first->time);
   int known = 0; /* whether run->surfaces.values and run->surfaces.magnitudes are those at the crossing */
@@ -214,7 +214,7 @@ static int crossings_along(hs_run *run) {
     if (found == RAISED) return RAISED;
     first = kept_crossing(run, first, next, found);
   }
-  if (open && mark_behind(run, first)) return RAISED;
+  if (open && mark_after(run, first)) return RAISED;
   for (int k = 0; open && k < mode->surfaces; k++) {
     if (!run->event.waiting[k].open) continue;
     open--;
@@ -227,7 +227,7 @@ static int crossings_along(hs_run *run) {
 }
 
 /* Crossings, with those before the first one, of `count`, that rise by less than the step's polynomials are off by: how
-   many there are then, or RAISED. A surface may be beyond its guard so and be crossed again behind the first one. */
+   many there are then, or RAISED. A surface may be beyond its guard so and be crossed again after the first one. */
 static int with_unseen(hs_run *run, int count) {
   const hs_mode *mode = run->here.table;
   const hs_span *span = &run->span;

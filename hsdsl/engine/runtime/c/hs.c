@@ -321,7 +321,7 @@ void hs_go_on(hs_task *task, hs_pause *pause, hs_time until, int changed, int af
   open_run(&run, task);
   restore(&run, pause);
   run.pausing.at = until;
-  if (run.until < until + 2 * run.epsilon) run.until = until + 2 * run.epsilon; /* strips end behind it */
+  if (run.until < until + 2 * run.epsilon) run.until = until + 2 * run.epsilon; /* strips end after it */
   run.pausing.after_jump = after_jump;
   run.pausing.jumps_before = run.written.jump;
   const hs_timeline *timeline = task->timeline;

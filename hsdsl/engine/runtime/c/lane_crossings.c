@@ -186,7 +186,7 @@ static hs_mask settle_lanes(const hs_lane_mode *mode, const hs_lanes *l, int k, 
   return done;
 }
 
-/* The lanes in which surface k, beside the first one, is not crossed or is crossed with it: see mark_behind() and
+/* The lanes in which surface k, beside the first one, is not crossed or is crossed with it: see mark_after() and
    with_unseen(). In those `apart` the state there does not stand on it: see standing(). */
 static hs_mask agrees(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real share, hs_mask settled, hs_real theta,
                       hs_real time, const hs_real *q, hs_mask *apart) {

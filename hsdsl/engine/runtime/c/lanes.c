@@ -43,7 +43,7 @@ static void go_ahead(hs_team *team, hs_seat *seat, int outcome, int flows) {
       outcome = one_step(run, run->here.dimension, seat->limit);
       continue;
     }
-    if (flows) outcome = behind_flow(run, outcome);
+    if (flows) outcome = after_flow(run, outcome);
     outcome = located(run, outcome);
     flows = outcome == PARKED;
     if (flows) {
@@ -85,10 +85,10 @@ static int behind_crossing(const hs_row_of_lanes *row, int lane, hs_seat *seat) 
     step_of_lane(row, lane, run);
   else
     begin_span(run, l->h[lane], l->t1[lane]);
-  if (!landed) return curves_of_lane(row, lane, run), behind_step(run);
+  if (!landed) return curves_of_lane(row, lane, run), after_step(run);
   gather(l->sizes, run->span.largest, run->here.dimension, row->lanes, lane);
   run->span.sized = 1;
-  return behind_event(run, first_event(run));
+  return after_event(run, first_event(run));
 }
 
 /* The edge that is crossed first in a lane, and when. */
@@ -115,7 +115,7 @@ static int may_end(hs_run *run, hs_time t) {
   return !(flight * ratio / (1 - ratio) > hs_max(run->epsilon, 2 * tie(t)));
 }
 
-/* Go on behind a transition that was made in a lane. */
+/* Go on after a transition that was made in a lane. */
 static void behind_jump(hs_team *team, hs_row_of_lanes *row, int lane) {
   hs_seat *const seat = row->seat[lane];
   hs_run *const run = &seat->run;
@@ -205,7 +205,7 @@ static void pass_lane(const hs_row_of_lanes *row, int lane, int n) {
   }
 }
 
-/* Go on behind the step of a lane. */
+/* Go on after the step of a lane. */
 static void behind_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of_lanes *waiting) {
   const hs_lanes *const l = &row->l;
   hs_seat *const seat = row->seat[lane];
@@ -229,7 +229,7 @@ static void behind_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of
   if (failed)
     outcome = l->slow >> lane & 1 ? located_stuck(run, HS_SLOW) : one_step(run, n, seat->limit);
   else if (wrong)
-    expands(run), outcome = behind(run, halved_series(run, n, seat->limit, l->h[lane] / 2, 1));
+    expands(run), outcome = after_try(run, halved_series(run, n, seat->limit, l->h[lane] / 2, 1));
   else if (doubtful && run->here.t < l->t1[lane])
     step_of_lane(row, lane, run), outcome = pass(run);
   go_ahead(team, seat, outcome, 1);

@@ -14,7 +14,7 @@ static int stands(hs_run *run, const hs_crossing *crossing) {
   return stood;
 }
 
-/* The sizes of the numbers behind the chosen crossing's state, to run->sizes.landed: the terms of its step and of the one
+/* The sizes of the numbers of the chosen crossing's state, to run->sizes.landed: the terms of its step and of the one
    before. */
 static int largest(hs_run *run) {
   const hs_crossing *crossing = &run->event.chosen;
@@ -138,8 +138,8 @@ HS_INLINE int pass(hs_run *run) {
   return GOES_ON;
 }
 
-/* Go on behind a step on which this happens first: GOES_ON, or what happens. */
-HS_INLINE int behind_event(hs_run *run, int event) {
+/* Go on after a step on which this happens first: GOES_ON, or what happens. */
+HS_INLINE int after_event(hs_run *run, int event) {
   if (event == GOES_ON) return pass(run);
   if (event != WITHOUT_VALUE) return event;
   copy(run->task->stop.slope, run->z, run->here.dimension);
@@ -148,18 +148,18 @@ HS_INLINE int behind_event(hs_run *run, int event) {
   return HS_STEP_NOT_FINITE;
 }
 
-/* Go on behind a step that was made. */
-static int behind_step(hs_run *run) {
+/* Go on after a step that was made. */
+static int after_step(hs_run *run) {
   const int found = crossings_along(run);
-  return behind_event(run, found == RAISED ? WITHOUT_VALUE : found ? first_event(run) : GOES_ON);
+  return after_event(run, found == RAISED ? WITHOUT_VALUE : found ? first_event(run) : GOES_ON);
 }
 
-HS_INLINE int behind(hs_run *run, hs_step_failure failure) {
-  return failure == HS_CLEAR ? behind_step(run) : located_stuck(run, failure);
+HS_INLINE int after_try(hs_run *run, hs_step_failure failure) {
+  return failure == HS_CLEAR ? after_step(run) : located_stuck(run, failure);
 }
 
 /* Make one step: GOES_ON, or what ends the flow. */
-HS_INLINE int one_step(hs_run *run, const int n, hs_time limit) { return behind(run, next_span(run, n, limit)); }
+HS_INLINE int one_step(hs_run *run, const int n, hs_time limit) { return after_try(run, next_span(run, n, limit)); }
 
 /* Step until a surface is crossed, or to a time in the segment. */
 static int follow_on(hs_run *run, hs_time limit) {
@@ -216,7 +216,7 @@ static int along_guards(hs_run *run, hs_time limit) {
       copy(run->x, run->event.chosen.state, here->dimension);
       int ends = in_touch(run, end);
       if (!ends) {
-        ends = behind_end(run, end, &t);
+        ends = past_end(run, end, &t);
         if (t > run->event.chosen.time) {
           secant(run, &run->cubic);
           append(run, t, run->z, &run->cubic);
@@ -280,7 +280,7 @@ static int ends_tail(hs_run *run, int mode, int k) {
   return closed == GOES_ON ? unresolved(run, k) : closed;
 }
 
-/* Make a transition, at its own instant or behind a strip. The Python twin is `make_transition`. */
+/* Make a transition, at its own instant or after a strip. The Python twin is `make_transition`. */
 static int jump(hs_run *run) {
   const hs_crossing *crossing = &run->event.chosen;
   const hs_time t = crossing->time, until = run->until;
@@ -322,7 +322,7 @@ static int jump(hs_run *run) {
   return comes_back(run, flowed) ? slides(run, mode, k) : ends_tail(run, mode, k);
 }
 
-/* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. The
+/* Go on after a sample of an input, or end: a jump at the end is made, and a guard reached there fires. The
    Python twin is `at_boundary`. */
 static int located_at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
@@ -338,8 +338,8 @@ static int located_at_boundary(hs_run *run) {
   return count ? jump(run) : (int)stopped(run, HS_UNTIL, t);
 }
 
-/* Go on behind a flow that has ended. */
-static int behind_flow(hs_run *run, int outcome) {
+/* Go on after a flow that has ended. */
+static int after_flow(hs_run *run, int outcome) {
   if (outcome == LANDED)
     outcome = jump(run);
   else if (outcome == AT_BOUNDARY)
@@ -352,7 +352,7 @@ static int located(hs_run *run, int outcome) {
   while (outcome == GOES_ON) {
     if (interrupted(run)) return stopped(run, HS_INTERRUPTED, run->here.t);
     outcome = run->here.t < segment_end(run) ? located_flow(run) : AT_BOUNDARY;
-    outcome = behind_flow(run, outcome);
+    outcome = after_flow(run, outcome);
   }
   return outcome;
 }

@@ -393,7 +393,7 @@ static int through_strip(hs_run *run) {
   return moves_on(run, &before, unknown) ? slides(run, before.mode, k) : GOES_ON;
 }
 
-/* Go on behind a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */
+/* Go on after a sample of an input, or end: a jump at the end is made, and a guard reached there fires. */
 static int at_boundary(hs_run *run) {
   const hs_time t = run->here.t;
   if (t >= run->pausing.at) return PAUSED;

@@ -25,7 +25,7 @@ static hs_time segment_end(const hs_run *run) {
   return open ? run->pausing.at : earlier(timeline->end[segment], run->pausing.at);
 }
 
-/* Whether another segment is behind the one that the run is in. */
+/* Whether another segment follows the one that the run is in. */
 static int segment_follows(const hs_run *run) { return run->here.segment + 1 < run->task->timeline->segments; }
 
 static const hs_real *segment_data(const hs_run *run, int64_t segment) {

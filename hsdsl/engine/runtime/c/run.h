@@ -260,7 +260,7 @@ typedef struct {
 
 /* All that a paused run needs to go on: plain data. `data` has the numbers that routines were bound to; there are
    HS_PAUSE_NUMBERS and HS_PAUSE_INTEGERS of the others. `ended` says that it does not go on: see the
-   task's stop. Its time is behind the pause where it waits in a strip. */
+   task's stop. Its time is after the pause where it waits in a strip. */
 typedef struct {
   int ended, mode, dimension, active, emerging, noted_crowded, cascade_mode;
   int64_t cascade_length, cascade_room, placed, jump, row;

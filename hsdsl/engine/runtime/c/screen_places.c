@@ -281,7 +281,7 @@ static int jumps_close(const hs_view *v, const hs_transition *made) {
   return here + 1 < timeline->segments && timeline->jump[here + 1] && fabs(timeline->end[here] - made->time) <= late;
 }
 
-/* How high a surface rises behind a crossing at (t, x), at this rate, until it turns back at a kink of an input;
+/* How high a surface rises after a crossing at (t, x), at this rate, until it turns back at a kink of an input;
    infinite above `enough`. Moves v->z and v->slope, and where the mode is bound. */
 static double height_behind(hs_view *v, int k, double t, const double *x, double rate, double enough) {
   const hs_timeline *const timeline = v->s->timeline;

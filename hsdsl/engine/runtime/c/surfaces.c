@@ -206,7 +206,7 @@ static int turns_back(hs_run *run, int k, hs_time t, const hs_real *x, hs_real r
   return bend > 0 && rate * rate <= 2 * bend * room;
 }
 
-/* Whether an edge that is crossed at a time is one that is made behind it, and the run ends there. */
+/* Whether an edge that is crossed at a time is one that is made after it, and the run ends there. */
 static int too_late(const hs_run *run, int k, hs_time t, hs_real since) {
   return run->here.table->edge[k].strict && t + since >= run->until;
 }

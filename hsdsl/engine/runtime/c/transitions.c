@@ -1,6 +1,6 @@
 /* One transition: which crossing goes, its reset, executions of events that wait, the mode that is entered, and cascades
    of transitions without flow between them. See hsdsl/engine/simulate/transitions.py.
-   The spread of a reset is the sum of the sizes of the terms that each state behind it is computed from. */
+   The spread of a reset is the sum of the sizes of the terms that each state after it is computed from. */
 
 /* Whether edge `a` goes before edge `b` of those tied: the higher priority, then the file's order. */
 static int goes_before(const hs_mode *mode, int a, int b) {
@@ -66,7 +66,7 @@ static hs_real *wait_at(const hs_model *model, const hs_tail *tail, int64_t i) {
   return tail->waits + (tail->first + i) * model->queued;
 }
 
-/* Room for one more behind the last: 0, or not 0 where there is none. */
+/* Room for one more after the last: 0, or not 0 where there is none. */
 static int room_for_wait(const hs_model *model, hs_tail *tail, hs_task *task) {
   hs_tail larger = *tail;
   if (tail->first + tail->count < tail->room) return 0;
@@ -84,7 +84,7 @@ static int room_for_wait(const hs_model *model, hs_tail *tail, hs_task *task) {
 /* Before when others are made before one that waits until a time. */
 static hs_real not_tied(hs_real time) { return time - HS_TIE * fabs(time); }
 
-/* Let one wait, its values in states x, behind those of the first `high` that are made before it or tied with it. It is
+/* Let one wait, its values in states x, after those of the first `high` that are made before it or tied with it. It is
    not made before the one ahead of it, nor before `earliest`. */
 static void insert_wait(const hs_model *model, hs_tail *tail, const hs_queue *queue, const hs_real *x, int64_t high,
                         hs_real earliest) {
@@ -322,5 +322,5 @@ static int go_on(hs_run *run) {
   return continued(run, timeline->jump[segment_at(timeline, run->here.t)]);
 }
 
-/* Whether a run pauses that is to pause behind its next transition. */
+/* Whether a run pauses that is to pause after its next transition. */
 static int pauses(const hs_run *run) { return run->pausing.after_jump && run->written.jump > run->pausing.jumps_before; }

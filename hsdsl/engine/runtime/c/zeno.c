@@ -52,7 +52,7 @@ static int shrinking(const hs_run *run, int of_flow, hs_real *flight, hs_real *r
   return *ratio < 1;
 }
 
-/* The same with all time, looked at once behind each transition. */
+/* The same with all time, looked at once after each transition. */
 static int contraction(hs_run *run, hs_real *flight, hs_real *ratio) {
   hs_zeno *const last = &run->zeno;
   if (last->contracted != run->written.jump) last->contracts = shrinking(run, 0, &last->flight, &last->ratio);

@@ -3,9 +3,9 @@
 Where a surface rises at the rate a and bends by b, an error that moves it by d leaves it crossed while d is below
 a**2 / (2 abs(b)): that depth is the margin. Where it turns back at a kink of an input, its height there is one as well.
 
-The relaxed scheme goes on behind a Zeno point and creeps along a guard where the execution rests or slides. Either way
+The relaxed scheme goes on after a Zeno point and creeps along a guard where the execution rests or slides. Either way
 many transitions follow each other with hardly any flow between them. Where a transition waits in a strip, time goes on:
-another one that was reached together with it and whose `if` holds is behind its surface afterwards, and so is one that
+another one that was reached together with it and whose `if` holds is beyond its surface afterwards, and so is one that
 the reset makes due at once. Such a surface moves past the state and is never crossed by it.
 """
 
@@ -21,7 +21,7 @@ from hsdsl.engine.simulate.verdict.errors import SAFE, times
 from hsdsl.engine.simulate.verdict.run_view import Finding, Place, RunView
 from hsdsl.engine.simulate.verdict.screen import CROSSING_UNDECIDED
 
-BEYOND = 4  # errors behind a surface, so that no error takes a state back to it
+BEYOND = 4  # errors beyond a surface, so that no error takes a state back to it
 
 
 def crossings(run: RunView) -> tuple[list[Finding], list[str]]:
@@ -75,7 +75,7 @@ def _margin(run: RunView, place: Place, k: int, arc: Arc | None, made: Transitio
 
 
 def _height(run: RunView, place: Place, k: int, enough: Number) -> Number:
-    """How high a surface rises behind a crossing until it turns back at a kink of an input; infinite above enough."""
+    """How high a surface rises after a crossing until it turns back at a kink of an input; infinite above enough."""
     timeline, height, rate = run.problem.timeline, run.arithmetic.zero, place.rate(k)
     while timeline.goes_on(segment := timeline.at(place.t)):
         late = segment.end - place.t
@@ -173,7 +173,7 @@ def lost_in_strips(run: RunView) -> Iterator[str]:
 
 
 def _lost(run: RunView, made: Transition) -> list[str]:
-    """Edges whose surfaces moved past the state in the strip of a transition, with their `if` true behind it."""
+    """Edges whose surfaces moved past the state in the strip of a transition, with their `if` true after it."""
     if made.after is None:
         return []
     x = tuple(made.after.values())

@@ -311,7 +311,7 @@ class _Resets:
         return tuple(before.get(name, 0.0) for name in self._run.before(made)[0].mode.states)
 
     def _known_behind(self, made: Transition, place: Place, k: int, after: State) -> frozenset[str]:
-        """The states that are known behind a reset; of those of queues, in the execution that it makes wait."""
+        """The states that are known after a reset; of those of queues, in the execution that it makes wait."""
         run, edge = self._run, place.mode.edges[k]
         changed = {edge.target_states[i] for i in edge.changes} & self._still
         names = (self.known - changed) & frozenset(edge.target_states)

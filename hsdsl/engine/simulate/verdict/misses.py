@@ -416,7 +416,7 @@ def _at_a_kink(run: RunView, arc: Arc, before: Place, after: Place) -> Iterator[
 
 
 def _at_the_end(run: RunView) -> Iterator[Finding]:
-    """Surfaces reached just behind the end, or there but for the time in strips, and a transition just before it."""
+    """Surfaces reached just after the end, or there but for the time in strips, and a transition just before it."""
     if run.errors is None or run.reliable_until < inf or run.stop.reason != "until" or not run.flows:
         return
     arc, until = run.flows[-1], run.times[-1]

@@ -224,7 +224,7 @@ def indifferent(run: RunView, place: Place, k: int, sides: Sides, made: Transiti
     """Whether a transition of edge k is the same on both sides of a jump, so that both orders lead to one point.
 
     The jump changes neither a surface of the modes that it leaves and enters nor its reset, and the flow crosses its
-    surface before and behind it. What the jump itself sets off, at once on entry, is behind it.
+    surface before and after it. What the jump itself sets off, at once on entry, is after it.
     """
     if made is not None and made.entry and made.time == sides[1].start and len(run.cascade(made)) == 1:
         return True

@@ -237,7 +237,7 @@ class RunView:
         return arc.last
 
     def tails_before(self, made: Transition) -> Tails:
-        """What waits behind the first of each queue where a transition begins."""
+        """What waits after the first of each queue where a transition begins."""
         index, tails = self._tails
         if index > made.index:
             index, tails = 0, Tails(self.problem.waits)
@@ -269,7 +269,7 @@ class RunView:
         return self._nearby[1]
 
     def remembered_alike(self, chain: Sequence[Transition], names: Sequence[str], error: State) -> bool:
-        """Whether some states are memory of events that is the same behind transitions from all states nearby."""
+        """Whether some states are memory of events that is the same after transitions from all states nearby."""
         target = self.problem.program.modes[self.index(chain[-1].target)]
         waiting = {target.states[i] for queue in target.queues for i in queue.values}  # these have errors
         if without_memory(names) or any(map(remembered_state, names)) or waiting.intersection(names):

@@ -14,7 +14,7 @@
 #endif
 
 #ifndef PROBLEM_WAITING
-#define PROBLEM_WAITING 64 /* executions of an event that can wait behind the first */
+#define PROBLEM_WAITING 64 /* executions of an event that can wait after the first */
 #endif
 
 typedef struct hs_instance hs_instance;

@@ -37,7 +37,7 @@ void fmu_enter(fmu *unit, int mode, int edge, const double *after) {
   if (target->final) unit->now.ended = 1;
 }
 
-/* The state behind the reset of edge k. */
+/* The state after the reset of edge k. */
 static int reset_of(const hs_mode *mode, int k, const double *p, double t, const double *x, double *after) {
   return hs_changed(&mode->edge[k], &mode->edge[k].reset, p, t, x, x, after);
 }
@@ -102,7 +102,7 @@ static int first_of(const fmu *unit, const double *p, const double *x, const dou
   return chosen;
 }
 
-/* The state behind the reset of edge k but for the states that it counts with. */
+/* The state after the reset of edge k but for the states that it counts with. */
 static int reset_without_counts(const hs_mode *mode, int k, const double *p, double t, const double *x, double *after) {
   const hs_edge *edge = &mode->edge[k];
   if (reset_of(mode, k, p, t, x, after)) return 1;

@@ -8,7 +8,7 @@
 #include "hs_math.h"
 #include "events.h"
 
-/* Whether a step ends behind its first transition. */
+/* Whether a step ends after its first transition. */
 static int pauses(const fmu *unit) { return unit->event_mode_used && unit->early_return_allowed; }
 
 /* Keep what is shown until the caller handles the event, or while the state waits in a strip. */

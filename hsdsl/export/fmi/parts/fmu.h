@@ -93,7 +93,7 @@ void fmu_leave_events(fmu *unit);
 /* Handle what is due at the present time; `jumped` says whether states have changed, `next` is the next known event. */
 fmu_status fmu_update(fmu *unit, int *jumped, double *next);
 
-/* Go on from the present time by a size, or behind the first transition where the caller handles events;
+/* Go on from the present time by a size, or after the first transition where the caller handles events;
    `reached` is how far. */
 fmu_status fmu_step(fmu *unit, double point, double size, double *reached, int *event);
 

@@ -215,7 +215,7 @@ def let_go(model, config, p, lane, event):
     leaves = touched.any() & (event.mask | (lane.phase == BOUNDARY))
     t, x = jnp.where(event.mask, event.t, lane.t), jnp.where(event.mask, event.x, lane.x)
     own = event.k < model.of(model.is_edge, model.of(model.owner, lane.mode)).sum()
-    late, frees = behind_end(model, config, bound, still, event.k, frozen(t), frozen(x), ends & ~own)
+    late, frees = past_end(model, config, bound, still, event.k, frozen(t), frozen(x), ends & ~own)
     point = x + late * bound.flow(still.mode, frozen(t), frozen(x))
     facts, moved = bound.facts(still.mode, frozen(t) + late, frozen(point)), frozen(t) + late
     on = still.active & (jnp.abs(facts.values) <= noise_of(facts, moved, frozen(point), scaled(model, still)))
@@ -237,7 +237,7 @@ def let_go(model, config, p, lane, event):
     return after, event._replace(mask=goes, x=jnp.where(goes & leaves, q, event.x), held=touched)
 
 
-def behind_end(model, config, bound, lane, k, t, x, needed):
+def past_end(model, config, bound, lane, k, t, x, needed):
     """How far behind the end of a part of an `if` a point is, at which surface k is above round-off; whether one ends.
 
     The ends of other parts of it may not be reached yet.

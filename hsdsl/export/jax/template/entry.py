@@ -29,7 +29,7 @@ from .model import Bound, noise_of
 
 
 def boundary(model, config, p, lane, here, held):
-    """Go on behind a jump of an input, or end: a jump at the end is made, and a guard reached there fires.
+    """Go on after a jump of an input, or end: a jump at the end is made, and a guard reached there fires.
 
     ``held`` are the edges whose guards the state was held by, ``here`` the `Facts` there.
     """
