@@ -94,7 +94,7 @@ static int method_piece(hs_run *run, hs_time t, hs_real h, hs_polynomial *piece)
 }
 
 /* The estimate of the local error, to run->step.error; the flow at the step's end is run->end. */
-static void local_error(hs_run *run, hs_real h) {
+HS_APART static void local_error(hs_run *run, hs_real h) {
   switch (run->method->kind) {
     case HS_TAYLOR: taylor_error(run, run->here.dimension, h); break;
     case HS_RADAU: break; /* the step has made it there */
