@@ -140,6 +140,8 @@ class Chain:
             t, x, count = 0.0, self.at, 0
             while True:
                 found = solver.solve(np.array([t, until]), x[order])
+                if not found.success:
+                    raise RuntimeError(f"CVODE stopped at {found.t[-1]}: {found.message}")
                 if found.status != 2:
                     return count
                 hit = np.atleast_2d(found.i_events)[-1] != 0

@@ -250,6 +250,7 @@ def test_units_are_kept() -> None:
         ("INF", "infinity"),
         ("x*nowhere", "nothing in this file is called 'nowhere'"),
         ("twice(x)", "no function in this file is called 'twice'"),
+        ("quotient(x)", "<quotient> of 1 arguments"),
     ],
 )
 def test_what_has_no_words_is_refused_with_its_place(formula: str, feature: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -79,7 +80,10 @@ class Writer:
         if node.kind in _FUNCTIONS:
             return _FUNCTIONS[node.kind].format(self.number(_one(node)))
         if node.kind in _OF_NUMBERS:
-            return _OF_NUMBERS[node.kind](*map(self.number, node.arguments))
+            numbers, write = _OF_NUMBERS[node.kind]
+            if len(node.arguments) not in numbers:
+                raise NotExpressible(f"<{node.kind}> of {len(node.arguments)} arguments", node.element)
+            return write(*map(self.number, node.arguments))
         if node.kind not in _SPECIAL:
             raise NotExpressible(_UNKNOWN.get(node.kind, f"the formula <{node.kind}>"), node.element)
         return _SPECIAL[node.kind](self, node)
@@ -224,13 +228,13 @@ _UNKNOWN = {
     "infinity": "infinity or not-a-number as a value",
     "notanumber": "infinity or not-a-number as a value",
 }
-_OF_NUMBERS: dict[str, Callable[..., str]] = {  # of texts of arguments; a base or degree comes first
-    "minus": lambda *given: f"(-{given[0]})" if len(given) == 1 else f"({' - '.join(given)})",
-    "root": lambda *given: f"sqrt({given[-1]})" if given[:-1] in ((), ("2",)) else f"({given[-1]}**(1/{given[0]}))",
-    "log": lambda *given: f"(log({given[-1]})/log({given[0] if len(given) > 1 else 10}))",
-    "quotient": _quotient,
-    "rem": _remainder,
-    **{name: partial(_extreme, name) for name in ("min", "max")},
+_OF_NUMBERS: dict[str, tuple[range, Callable[..., str]]] = {  # how many arguments; a base or degree comes first
+    "minus": (range(1, 3), lambda *given: f"({' - '.join(given)})" if given[1:] else f"(-{given[0]})"),
+    "root": (range(1, 3), lambda *of: f"sqrt({of[-1]})" if of[:-1] in ((), ("2",)) else f"({of[-1]}**(1/{of[0]}))"),
+    "log": (range(1, 3), lambda *given: f"(log({given[-1]})/log({given[0] if given[1:] else 10}))"),
+    "quotient": (range(2, 3), _quotient),
+    "rem": (range(2, 3), _remainder),
+    **{name: (range(1, sys.maxsize), partial(_extreme, name)) for name in ("min", "max")},
 }
 _SPECIAL: dict[str, Callable[[Writer, Node], str]] = {
     "number": _constant,
