@@ -250,14 +250,16 @@ class Diagnostics:
 
         Motion that goes on after a transition of something else is one.
         """
-        if show(start) == show(end):
+        shown, at_end = show(start), show(end)
+        if shown == at_end:
             return
         how, place = "at rest on" if still else "motion along", len(self.departures)
         before = self._moved.pop(edge, None)
         if before is not None and not still and before[1] == start:
             place, start = before[0], before[2]
+            shown = show(start)
         self.remarks[place] = of_edge("held", edge, start, end)
-        self.departures[place : place + 1] = [f"{how} the guard of {edge} from t = {show(start)} to t = {show(end)}"]
+        self.departures[place : place + 1] = [f"{how} the guard of {edge} from t = {shown} to t = {at_end}"]
         if not still:
             self._moved[edge] = place, end, start
 
@@ -266,11 +268,11 @@ class Diagnostics:
         for other, (place, until, start) in self._moved.items():
             if until >= end - 2 * left:  # meanwhile motion along other guards goes on
                 self._moved[other] = place, end, start
-        counts = ", ".join(without_memory(edge.target_states[i] for i in edge.counts))
+        counts = ", ".join(without_memory(edge.target_states[i] for i in edge.counts)) if edge.counts else ""
         self.remarks[len(self.departures)] = of_edge("replaced", edge.name, end)
         self.departures.append(
             f"Zeno at t = {show(end)}: the transitions of {edge.name} after number {number} lie within {show(left)} of "
-            f"each other, and their limit replaces them{f'; {counts} has no limit, and keeps its value' * bool(counts)}"
+            f"each other, and their limit replaces them{counts and f'; {counts} has no limit, and keeps its value'}"
         )
 
     def accumulates(self, edge: str, end: Number, t: Number) -> Stop:
