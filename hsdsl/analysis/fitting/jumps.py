@@ -155,7 +155,7 @@ def _step_over_jump(objective: Objective, x: Array, limits: Array, sizes: Array)
 def along_jump(objective: Objective, x: Array, limits: Array, sizes: Array) -> Array:
     """Values with a lower sum of squares along the jump that values are beside, on their side of it; else the same.
 
-    Where a jump has a normal, Gauss-Newton steps across it are left out, and each step ends beside the jump again.
+    Gauss-Newton steps are made in the tangent plane of the jump, and each ends beside the jump again.
     """
     step = _step_over_jump(objective, x, limits, sizes) if len(x) > 1 else None
     order, seen = objective.order(x), objective.seen

@@ -1,7 +1,7 @@
 """Least squares over executions by SciPy's trust region method, with the derivatives of the executions.
 
 No derivative shows that a measurement agrees better with the other side of the transition next to it: such a transition
-is moved over it, and the fit goes on from there.
+is moved over it, and the fit goes on from there. A fit that ends beside a jump goes on along it (`along_jump`).
 """
 
 from __future__ import annotations

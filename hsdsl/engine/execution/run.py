@@ -340,7 +340,7 @@ class Execution(Deferred):
     compiled : CompiledRecord or None
         The output of the C loop, for a compiled run; it is available before the transitions.
     noted : callable or None
-        ``noted(execution) -> str``: the codes of the Python loop's own warnings, without a verdict.
+        ``noted(execution) -> str``: the codes of warnings that need no verdict.
     look : callable or None
         ``look() -> dict``: the parts of the model that a picture shows, as options of `hsdsl.analysis.plot.View`.
     """

@@ -22,7 +22,7 @@ ARC_NUMBERS, TRANSITION_NUMBERS, NOTE_NUMBERS = (
 )  # as long as so many
 HEAD = ctypes.sizeof(structures.Record) // 8
 COUNTS = Struct("5q")  # the fields that a record begins with
-ORDER = (  # in which pack.c puts them
+ORDER = (  # in which library.c packs them
     "times", "values", "outputs", "depth", "coefficients", "arc", "transition", "before", "after", "note",
     "alternatives",
 )  # fmt: skip
@@ -110,7 +110,7 @@ class Gathered:
 
 
 class Packed:
-    """Columns of a short run in one stretch of memory, as ``pack.c`` puts them behind their record; arrays are made on
+    """Columns of a short run in one stretch of memory, as ``hs_pack`` puts them after their record; arrays are made on
     first use.
 
     A dozen arrays take longer to make than many a run.

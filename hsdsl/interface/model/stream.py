@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 class Streamed:
     """A run with its rows in a file: the numbers of rows, steps and transitions, and the last row.
 
-    ``warnings`` has the warnings that need no verdict.
+    ``warnings`` has those of the loop itself; states beyond surfaces with an `if` (HS708) are not searched.
     """
 
     path: Path

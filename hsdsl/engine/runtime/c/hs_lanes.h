@@ -36,7 +36,7 @@ typedef struct {
   double *values, *weights, *gradient, *shares, *slopes;
   /* what is found on a step: where each surface is crossed that is still open, and the sizes of largest() at the first */
   double *theta, *time, *q, *sizes, *first;
-  /* a bit for each lane; where it passed, or none of the next ones is set, a run brings along what is behind the step */
+  /* a bit for each lane; where it passed, or none of the next ones is set, a run brings along what the step ended with */
   int32_t passed;   /* it goes on before its limit */
   int32_t failed;   /* the step is not known to be what the loop for one run would make */
   int32_t slow;     /* no step: there were too many */

@@ -10,7 +10,7 @@
 
 #include "hs.h"
 
-/* One row of a Butcher tableau without its zeros. Stage number `stages` is the flow at the step's end; those behind it
+/* One row of a Butcher tableau without its zeros. Stage number `stages` is the flow at the step's end; later ones
    are evaluated for the dense output alone. */
 typedef struct {
   int terms;
@@ -113,7 +113,7 @@ typedef enum {
 } hs_notice;
 
 #define HS_SLID (1 << 16) /* beside the bits of notices: the run slid between two modes */
-#define HS_ENTERED (1 << 17) /* and came beyond the surface of an edge with an `if` without flow */
+#define HS_ENTERED (1 << 17) /* and came beyond the surface of an edge with an `if` without flow, or an input onto it */
 
 /* A diagnostic: see hsdsl/engine/simulate/stops.py. `surface` is an edge, but for HS_UNSETTLED. */
 typedef struct {
@@ -138,7 +138,7 @@ typedef struct {
   hs_arc *arc;
   hs_transition *transition;
   hs_real *before, *after;  /* (transition, width) */
-  int32_t *alternatives;   /* (transition * (model->edges - 1)), edges, one transition's behind the other's */
+  int32_t *alternatives;   /* (transition * (model->edges - 1)), edges, one transition's after the other's */
   int64_t alternatives_used;
   hs_note *note;
 } hs_chunk;
@@ -322,7 +322,7 @@ typedef struct hs_ensemble {
   int64_t base, made, next;    /* of the instance under way: the chunk's first row, transitions, samples */
   int32_t layout;              /* of its last arc, the first one's being 0 */
   int32_t *layouts;            /* (arc_room) */
-  int64_t log_room, logged;    /* transitions of all instances, one instance's behind the other's; no room: none */
+  int64_t log_room, logged;    /* transitions of all instances, one instance's after the other's; no room: none */
   hs_transition *log;
   double *before, *after;      /* (log_room, width): states around a transition */
   int (*drain)(struct hs_ensemble *); /* takes the log where it is full, and makes it empty */

@@ -238,7 +238,7 @@ HS_INLINE void put_in(hs_mask lanes, double *column, hs_real number) {
 }
 
 /* Make the transition of edge k in some lanes, and enter its target: see largest(), reset(), place() and enter(). The
-   lanes in which this is all: the state behind it is beyond no surface, and none may hold it. */
+   lanes in which this is all: the state after it is beyond no surface, and none may hold it. */
 static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lanes) {
   const hs_mode *const own = &l->modes[l->mode];
   const hs_edge *const edge = &own->edge[k];

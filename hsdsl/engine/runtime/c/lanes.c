@@ -76,7 +76,7 @@ static int crossings_of_lane(const hs_row_of_lanes *row, int lane, hs_run *run) 
 }
 
 /* What a crossing comes to that was found in a lane, or is found here. */
-static int behind_crossing(const hs_row_of_lanes *row, int lane, hs_seat *seat) {
+static int after_crossing_in_lane(const hs_row_of_lanes *row, int lane, hs_seat *seat) {
   hs_run *const run = &seat->run;
   const hs_lanes *const l = &row->l;
   const int landed = l->landed >> lane & 1 && crossings_of_lane(row, lane, run);
@@ -116,7 +116,7 @@ static int may_end(hs_run *run, hs_time t) {
 }
 
 /* Go on after a transition that was made in a lane. */
-static void behind_jump(hs_team *team, hs_row_of_lanes *row, int lane) {
+static void after_jump_in_lane(hs_team *team, hs_row_of_lanes *row, int lane) {
   hs_seat *const seat = row->seat[lane];
   hs_run *const run = &seat->run;
   hs_crossing *const chosen = &run->event.chosen;
@@ -160,12 +160,12 @@ static void locate_together(hs_team *team, hs_row_of_lanes *waiting) {
     hs_seat *const seat = waiting->seat[lane];
     if (waiting->l.jumped >> lane & 1) {
       team->located++, team->jumped++;
-      behind_jump(team, waiting, lane);
+      after_jump_in_lane(team, waiting, lane);
       continue;
     }
     leave_lane(waiting, lane, seat, 0);
     team->located += waiting->l.landed >> lane & 1;
-    go_ahead(team, seat, behind_crossing(waiting, lane, seat), 1);
+    go_ahead(team, seat, after_crossing_in_lane(waiting, lane, seat), 1);
   }
 }
 
@@ -206,7 +206,7 @@ static void pass_lane(const hs_row_of_lanes *row, int lane, int n) {
 }
 
 /* Go on after the step of a lane. */
-static void behind_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of_lanes *waiting) {
+static void after_step_in_lane(hs_team *team, hs_row_of_lanes *row, int lane, hs_row_of_lanes *waiting) {
   const hs_lanes *const l = &row->l;
   hs_seat *const seat = row->seat[lane];
   hs_run *const run = &seat->run;
@@ -317,6 +317,6 @@ void hs_run_team(hs_team *team) {
     team->steps++, team->stepped += count, team->lost[row.l.mode] -= count;
     const int32_t passed = bare ? row.l.passed : 0;
     for (int lane = 0; lane < row.lanes; lane++)
-      if (row.seat[lane] && !(passed >> lane & 1)) behind_lane(team, &row, lane, &waiting);
+      if (row.seat[lane] && !(passed >> lane & 1)) after_step_in_lane(team, &row, lane, &waiting);
   }
 }

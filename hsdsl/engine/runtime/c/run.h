@@ -9,7 +9,7 @@
 
 #include "hs_math.h"
 #include "hs_simulate.h"
-#include "scheme.h"
+#include "scheme.h" /* printed from hsdsl/engine/scheme: hs_control, hs_pace, hs_cascade, hs_roots, hs_radau, ... */
 
 #if defined(HS_INLINE) /* given by who compiles: sanitizers take minutes over code that is inlined everywhere */
 #elif defined(__GNUC__)
@@ -72,7 +72,7 @@ typedef struct {
   hs_time t;
 } hs_mode_state;
 
-/* One step as tried, from (t, x) to (t1, z). */
+/* One step of the relaxed scheme as tried, from (t, x) to (t1, z). */
 typedef struct {
   hs_time t, t1;
   hs_real h;
@@ -81,7 +81,7 @@ typedef struct {
   hs_polynomial piece;
 } hs_trial;
 
-/* What a trial step found: crossings, a failure, or nothing. */
+/* What a trial step of the relaxed scheme found: crossings, a failure, or nothing. */
 typedef struct {
   hs_step_failure failure;
   int surface;
@@ -142,7 +142,7 @@ typedef struct {
 /* What the method has of a step. */
 typedef struct {
   hs_real **k; /* stages, then the flow at the end */
-  hs_real **other_k, *other_end, *error;
+  hs_real **other_k, *other_end, *error; /* of a shorter step: see aside() in located_steps.c; its estimate */
   hs_real *lines; /* of Taylor's method: coefficients, as hs_series writes them */
   hs_real ratio;  /* of the last error estimate */
   int expanded;   /* whether it has written `lines`, in this mode */
@@ -152,16 +152,17 @@ typedef struct {
 
 /* The mode's surfaces: one number or mark for each. */
 typedef struct {
-  hs_real *values, *starts, *ends, *middle, *ahead, *magnitudes, *noise;
+  hs_real *values, *starts, *ends, *middle;    /* now, and along the located step */
+  hs_real *ahead, *magnitudes, *noise;         /* at the end of a trial and on entry; round-off of a trial */
   hs_real *begun, *ended; /* magnitudes at the ends of the located step: `weighed` says at which */
   int weighed, has_starts, has_ends, has_middle; /* has_...: whether those of the step are known */
-  int *active, *beyond, *emerging;
+  int *active, *beyond, *emerging; /* emerging: entered beyond it, and the flow leads inside */
   hs_real *stood; /* how far off it a state is that stood on it, on entry */
 } hs_at_surfaces;
 
 /* Crossings of a step, and the one that goes. */
 typedef struct {
-  hs_crossing *crossings, chosen; /* one for each edge */
+  hs_crossing *crossings, chosen; /* one for each surface, those of edges first; the one that goes */
   hs_riser *waiting;              /* one for each surface */
   int *tied;                      /* one for each edge */
   int *alternatives, alternatives_count;
@@ -169,7 +170,7 @@ typedef struct {
   hs_real *after;    /* the state after the reset */
 } hs_event;
 
-/* Motion along guards: see contact.c. Marks are one for each edge. */
+/* Motion along guards: see contact.c; arrays of the located scheme alone. Marks are one for each edge. */
 typedef struct {
   hs_real *p;           /* what routines are bound to: model->data and then model->contacts numbers */
   const hs_real *own_p; /* what they are bound to else */
@@ -180,7 +181,7 @@ typedef struct {
   int still;                      /* whether it ended there */
 } hs_contacts;
 
-/* Zeno tails: see zeno.c. */
+/* Zeno tails: see zeno.c; arrays of the located scheme alone. */
 typedef struct {
   int *tail;          /* one for each surface: whether it is that of an edge of the tail */
   hs_real *turn;      /* 2 width: where a tail's edges take a state in turn */
@@ -196,18 +197,19 @@ typedef struct {
   int refused;   /* whether they were too fast for the last one */
 } hs_reach;
 
-/* What was written, counted from the start of the run. */
+/* What was written, and what is remembered of it. `row`, `jump` and `placed` are counted from the start of the run. */
 typedef struct {
   int64_t row, jump, placed; /* placed: arcs of flow that were begun */
   hs_made made[FREE];
-  int full, full_queue;          /* full_queue: a queue of the mode in which more wait than may, or -1 */
+  int full;                      /* whether the caller has no more room */
+  int full_queue;                /* a queue of the mode in which more wait than may, or -1 */
   int *unsettled, noted_crowded; /* unsettled: for each mode and surface */
 } hs_written;
 
 /* How often the caller is asked whether to go on. */
 typedef struct {
   int interrupted;
-  long steps_left, steps;
+  long steps_left, steps; /* until the clock is read next, and between two readings */
 #if !defined(HS_NO_CLOCK)
   clock_t at;
 #endif

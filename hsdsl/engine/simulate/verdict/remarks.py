@@ -2,8 +2,8 @@
 
 Surfaces passed while an `if` was false and walls that do not hold are remarked by `misses` where that takes place. For
 other runs, as those that are outside the theorem, they are searched at the rows of the run, and in eighths of steps on
-which a surface rises at first and falls at last. Modes entered beyond a surface whose edge has an `if` are searched at
-the first rows of visits, with every verdict.
+which a surface rises at first and falls at last. States that come beyond a surface whose edge has an `if` without flow,
+as a mode is entered or an input jumps, are searched at the first rows of arcs, with every verdict.
 """
 
 from __future__ import annotations
