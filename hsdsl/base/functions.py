@@ -28,12 +28,12 @@ class _Kinked(sp.Function):
     def __new__(cls, *arguments, **options):
         """Make one without what SymPy makes of each function: a set of how many arguments it takes."""
         arguments = tuple(map(sp.sympify, arguments))
-        known = cls.eval(*arguments) if options.get("evaluate", True) else None
+        known = cls.folded(*arguments) if options.get("evaluate", True) else None
         return sp.Basic.__new__(cls, *arguments) if known is None else known
 
     @classmethod
-    def eval(cls, *arguments):
-        """Fold fractions."""
+    def folded(cls, *arguments):
+        """The value of fractions."""
         return cls.fold(*arguments) if all(x.is_Rational for x in arguments) else None
 
     def fdiff(self, argindex=1):
@@ -95,7 +95,7 @@ class below(_Kinked):
     nargs = 4
 
     @classmethod
-    def eval(cls, number, bound, one, other):
+    def folded(cls, number, bound, one, other):
         """Choose where the number is known."""
         if one == other:
             return one

@@ -81,7 +81,7 @@ def test_an_interrupt_while_a_model_is_read_is_said(command, monkeypatch):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("hsdsl.interface.model.load", interrupted)
+    monkeypatch.setattr("hsdsl.interface.model.model.load", interrupted)
     answer = command("run", BALL)
     assert (answer.code, answer.out) == (130, "")
 

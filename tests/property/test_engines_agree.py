@@ -55,7 +55,7 @@ def test_smooth_random_models_run_alike_by_taylor_series() -> None:
 
 
 @pytest.mark.parametrize(
-    "block", [pytest.param(k, marks=pytest.mark.campaign if k > 1 else pytest.mark.slow) for k in range(6)]
+    "block", [pytest.param(k, marks=pytest.mark.campaign if k else pytest.mark.slow) for k in range(6)]
 )
 def test_many_random_models_run_alike(block: int) -> None:
     seeds = range(1000 + 10 * block, 1010 + 10 * block)

@@ -102,12 +102,19 @@ def test_noise(model: Any, samples: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    "sigma", [pytest.param(None, marks=pytest.mark.slow), pytest.param({"x": 0.05}, marks=pytest.mark.campaign)]
+    ("sigma", "tries", "least"),
+    [
+        pytest.param(None, 40, 34, marks=pytest.mark.slow),
+        pytest.param(None, 100, 89, marks=pytest.mark.campaign),
+        pytest.param({"x": 0.05}, 100, 89, marks=pytest.mark.campaign),
+    ],
 )
-def test_covariance_holds(model: Any, samples: dict[str, Any], sigma: dict[str, float] | None) -> None:
-    """Of 100 tries 95 are expected inside, and fewer than 89 with a probability below 1 %."""
+def test_covariance_holds(
+    model: Any, samples: dict[str, Any], sigma: dict[str, float] | None, tries: int, least: int
+) -> None:
+    """Of all tries 95 % are expected inside, and fewer than the least with a probability below 1 %."""
     noise = np.random.default_rng(2026)
-    assert sum(inside(model, samples, noise, sigma) for _ in range(100)) >= 89
+    assert sum(inside(model, samples, noise, sigma) for _ in range(tries)) >= least
 
 
 def test_bounds_of_the_file() -> None:

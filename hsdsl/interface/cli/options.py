@@ -237,19 +237,20 @@ def answering(json: bool, allow_path: AllowPath, limit: Limit) -> Generator[None
     """Report errors, and apply the limits while the command runs."""
     folders = allow_path or ()
     numbers: dict[str, Any] = {}
-    for pair in limit or ():
-        name, _, value = (part.strip() for part in pair.partition("="))
-        if name not in NUMBERS:
-            raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
-        try:
-            numbers[name] = type(getattr(DEFAULT, name))(float(value))
-        except (ValueError, OverflowError):
-            raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
-    for folder in folders:
-        if not folder.is_dir():
-            raise UsageError(f"--allow-path {folder}: there is no such folder")
-    with errors_reported(json), applied(Limits(**numbers, folders=tuple(folders))):
-        yield
+    with errors_reported(json):
+        for pair in limit or ():
+            name, _, value = (part.strip() for part in pair.partition("="))
+            if name not in NUMBERS:
+                raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
+            try:
+                numbers[name] = type(getattr(DEFAULT, name))(float(value))
+            except (ValueError, OverflowError):
+                raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
+        for folder in folders:
+            if not folder.is_dir():
+                raise UsageError(f"--allow-path {folder}: there is no such folder")
+        with applied(Limits(**numbers, folders=tuple(folders))):
+            yield
 
 
 def values_of(overrides: list[str] | None) -> dict[str, Any]:

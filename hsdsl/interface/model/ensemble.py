@@ -361,8 +361,8 @@ class EnsembleRequest:
 
             return most, times
         if isinstance(given, int):
-            shares = np.arange(given - 1)
-            return given, lambda: np.concatenate([until[:, None] * shares / (given - 1), until[:, None]], axis=1)
+            ends, most = until[:, None], given - 1
+            return given, lambda: np.concatenate([ends * np.arange(most) / most, ends], axis=1)
         return len(given), lambda: np.tile(given, (len(until), 1))
 
 

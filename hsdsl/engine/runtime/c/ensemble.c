@@ -62,7 +62,7 @@ static int shown_alike(hs_time a, hs_time b) {
   return !strcmp(one, other);
 }
 
-enum { CAME_BEYOND = 1, CAME_ONTO = 2, PARTS_OF_STEP = 8, WATCHED_UNITS = 4 * ROUNDOFF_UNITS };
+enum { CAME_BEYOND = 1, CAME_ONTO = 2, PARTS_OF_STEP = 8, BEYOND = 4 };
 
 /* The state at a share of the step from a row of the chunk, and what surfaces are there. */
 static int surfaces_at(hs_ensemble *e, const hs_mode *mode, int64_t row, double share, const double *p, double *values) {
@@ -95,7 +95,7 @@ static double side_of(hs_ensemble *e, const hs_mode *mode, int k, double t, cons
       const int s = row->place[i] - 1;
       total += fabs(slopes[i]) * (s < 0 ? fabs(t) : hs_max(fabs(x[s]), e->watch.sizes[mode->state[s]]));
     }
-  const double noise = hs_max(WATCHED_UNITS * HS_UNIT * total, fabs(rate) * 2 * HS_TIE * e->task.settings.until);
+  const double noise = hs_max(BEYOND * ROUNDOFF_UNITS * HS_UNIT * total, fabs(rate) * 2 * HS_TIE * e->task.settings.until);
   return values[k] > noise ? 1 : values[k] < -noise ? -1 : 0;
 }
 

@@ -41,7 +41,8 @@ BEYOND = 4  # times its round-off: a wall that does not hold
 END = 1.0
 HALVINGS, MANY = 14, 1024  # of steps beyond a surface; visits that are looked at together
 Told = tuple[Sequence[Remark], Callable[[], Iterator[Remark]] | None, Program]
-POINTS = (*(i / 8 for i in range(8)), END)  # of a step that turns back
+PARTS_OF_STEP = 8  # that turns back
+POINTS = (*(i / PARTS_OF_STEP for i in range(PARTS_OF_STEP)), END)
 
 
 @np.errstate(all="ignore")  # what overflows is no number, and is no remark
