@@ -22,7 +22,7 @@ IN_C_ALONE = {
     "BITS", "UNIT", "TIME_UNIT", "INTEGER_POWERS", "AT_START", "AT_END",  # of the number type, and of places
     "PAUSED", "LANDED", "AT_BOUNDARY", "WITHOUT_VALUE", "NO_VALUE", "NO_CONVERGENCE", "TESTS",  # answers of functions
     "CAME_BEYOND", "CAME_ONTO",  # marks
-    "LEAST_MOST_DEGREE", "BLOCK", "SHORT_BLOCK", "STEPS_BEFORE_SEARCH", "SMALL", "FEWEST_WAITS",  # of memory
+    "LEAST_MOST_DEGREE", "BLOCK", "STEPS_BEFORE_SEARCH", "SMALL", "FEWEST_WAITS",  # of memory
     "LEVELS", "END_LEVELS", "MOST_PARTS_TRIED", "COARSE_PARTS_TRIED", "CLOSE_SHARE",  # of the screen
     "MOST_LANES", "WIDTH", "FAR", "LOST", "MOST_LOST", "KEPT", "KEPT_OF_PLACE", "MOST_ASIDE",  # of lanes
     "MOST_NEWTON", "MOST_SETTLINGS",  # and how these find roots

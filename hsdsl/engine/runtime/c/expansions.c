@@ -203,9 +203,9 @@ static hs_expansion expansion_of(const hs_operation *o, const hs_expansion *a, c
   return found.unresolved > 0.0 ? less_unresolved(o, a, b, found) : found;
 }
 
-/* Carry out operations from one up to another behind time and n states; registers of results begin at `base`. */
+/* Carry out operations from one up to another after time and n states; registers of results begin at `base`. */
 static void expand_operations(const hs_formulas *f, int first, int last, int n, int base, hs_expansion *v) {
-  const int numbers = base + f->fixed; /* registers behind the states and before this one hold one number each */
+  const int numbers = base + f->fixed; /* registers after the states and before this one hold one number each */
   for (int i = first; i < last; i++) {
     const hs_operation *const o = &f->operation[i];
     if (o->kind == HS_MUL && o->a > n && o->a < numbers) v[base + i] = expanded_share(v[o->a], v[o->b]);

@@ -9,8 +9,7 @@
 #define HS_UNROLLED
 #endif
 
-enum { STEPS_BEFORE_SEARCH = 8, BLOCK = 16, SHORT_BLOCK = 4 };
-
+enum { STEPS_BEFORE_SEARCH = 8, BLOCK = 16 };
 /* A row's piece, and which of its arc's states the columns are. */
 typedef struct {
   int64_t row, arc;
@@ -45,14 +44,8 @@ HS_INLINE void evaluate_block(const hs_sampling *s, const hs_place *at, const do
 
 /* The same at all times from one up to another, which are in one piece. */
 HS_UNROLLED static void evaluate_piece(const hs_sampling *s, const hs_place *at, int64_t from, int64_t to) {
-  const int64_t start = from;
   for (; to - from >= BLOCK; from += BLOCK) evaluate_block(s, at, s->time + from, BLOCK, s->states + from);
-  for (; to - from >= SHORT_BLOCK; from += SHORT_BLOCK) evaluate_block(s, at, s->time + from, SHORT_BLOCK, s->states + from);
-  if (from == to) return;
-  if (to - start >= SHORT_BLOCK) /* some of these are evaluated again */
-    evaluate_block(s, at, s->time + to - SHORT_BLOCK, SHORT_BLOCK, s->states + to - SHORT_BLOCK);
-  else
-    evaluate_block(s, at, s->time + from, (int)(to - from), s->states + from);
+  evaluate_block(s, at, s->time + from, (int)(to - from), s->states + from);
 }
 
 /* The last row not after a time; it is likely to be soon behind `from`. */
