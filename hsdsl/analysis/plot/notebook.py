@@ -16,7 +16,7 @@ from hsdsl.analysis.plot.style import ALARM, INK, empty, styled, write_figure
 from hsdsl.analysis.report import words
 from hsdsl.analysis.report.summary import html
 from hsdsl.base.errors import WARNINGS
-from hsdsl.base.names import called, visible, visible_lines, without_memory
+from hsdsl.base.names import called, visible, without_memory
 from hsdsl.engine.execution import Array, Ensemble, Execution
 
 if TYPE_CHECKING:
@@ -46,9 +46,8 @@ def ensemble_html(ensemble: Ensemble) -> str:
     rows += [("transitions", _range(ensemble.transitions))] if count else []
     rows += [(f"final {name}", _range(ensemble.state[name])) for name in without_memory(ensemble.state)]
     rows += [("seconds", ", ".join(f"{name} {value:.3g}" for name, value in ensemble.seconds.items()))]
-    body = "".join(f"<tr><th>{escape(visible(name))}</th><td>{escape(visible(text))}</td></tr>" for name, text in rows)
     heading = f"{called(ensemble.title, ensemble.model)}: {ensemble.scheme} {ensemble.method}, engine {ensemble.engine}"
-    table = f'<div class="hsdsl"><p><strong>{escape(visible(heading))}</strong></p><table>{body}</table></div>'
+    table = f'<div class="hsdsl"><p><strong>{escape(visible(heading))}</strong></p>{words.html_facts(rows)}</div>'
     if not count or len(ensemble.varied) not in (1, 2):
         return table
     with styled():
@@ -58,7 +57,7 @@ def ensemble_html(ensemble: Ensemble) -> str:
 
 def lines_html(text: str) -> str:
     """Return lines of text; every text of the model is escaped."""
-    return f'<div class="hsdsl"><pre>{escape(visible_lines(text))}</pre></div>'
+    return f'<div class="hsdsl"><pre>{words.escaped(text)}</pre></div>'
 
 
 def measured_html(

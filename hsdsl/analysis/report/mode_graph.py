@@ -15,7 +15,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from hsdsl.base.names import shown, visible, without_memory
+from hsdsl.analysis.report.words import html_row, html_table
+from hsdsl.base.names import shown, without_memory
 from hsdsl.base.parts import event_text, inner_modes, written_edges
 from hsdsl.engine.execution import Execution
 from hsdsl.mathematics.program import EdgeProgram, ModeProgram, Program
@@ -140,10 +141,9 @@ def _table(program: Program, edges: Sequence[EdgeProgram], made: Sequence[int] |
         ends = f"{program.modes[edge.source].name} -> {program.modes[edge.target].name}"
         cells = [str(number), edge.name, ends, when, changed]
         cells += [] if made is None else [str(made[number - 1])]
-        rows.append("<tr>" + "".join(f"<td>{escape(visible(cell))}</td>" for cell in cells) + "</tr>")
+        rows.append(html_row(cells))
     names = ["#", "transition", "from -> to", "when", "reset", *([] if made is None else ["made"])]
-    header = "".join(f"<th>{name}</th>" for name in names)
-    return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    return html_table(names, rows)
 
 
 GAP, PASSAGE, PORT = 26.0, 18.0, 22.0  # between boxes above each other; height of a passing line; between line ends
@@ -256,7 +256,7 @@ def _with_waypoints(ranks: list[int], edges: Sequence[tuple[int, int]]) -> tuple
 
 
 def _order(columns: list[list[int]], paths: list[list[int]]) -> None:
-    """Order each column by the mean place of the neighbours in the column before, and then in the one behind it."""
+    """Order each column by the mean place of the neighbours in the column before, and then in the one after it."""
     neighbours: dict[int, set[int]] = {}
     for path in paths:
         for a, b in pairwise(path):

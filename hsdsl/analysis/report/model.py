@@ -15,7 +15,8 @@ from sympy.printing.mathml import MathMLPresentationPrinter
 
 from hsdsl.analysis.report import mode_graph
 from hsdsl.analysis.report.mode_graph import visited_part
-from hsdsl.base.names import called, counted, shown, visible, visible_lines, without_memory
+from hsdsl.analysis.report.words import escaped, html_row, html_table
+from hsdsl.base.names import called, counted, shown, visible, without_memory
 from hsdsl.base.numbers import decimals
 from hsdsl.base.parts import written_edges, written_modes
 from hsdsl.language.elaborate.definitions import named_functions
@@ -38,12 +39,12 @@ def model_html(system: HybridSystem, program: Program) -> str:
     written = written_modes(system.modes)
     kind, number = ("part", len(system.parts)) if system.parts else ("mode", len(written))
     count = f"{number} {kind}{'s' * (number != 1)}"
-    heading = f"<p><strong>{_said(called(system.title, system.path))}</strong><br>{count}, {_start(system, math)}</p>"
+    heading = f"<p><strong>{escaped(called(system.title, system.path))}</strong><br>{count}, {_start(system, math)}</p>"
     modes = [_mode(system, mode, math, len(written) <= MOST_OPEN) for mode in written[:MOST_MODES]]
     left = len(written) - MOST_MODES
     more = [f"<p>{left} more modes</p>"] if left > 0 else []
     rows = [(part.name, ", ".join(part.modes), part.modes[part.start]) for part in system.parts]
-    inputs = [f"{_said(given.name)} is an input of {counted(len(given.times), 'sample')}" for given in system.inputs]
+    inputs = [f"{escaped(given.name)} is an input of {counted(len(given.times), 'sample')}" for given in system.inputs]
     given = [(p.name, p.text, p.unit or "", p.about or "") for p in system.parameters]
     parts = [
         heading,
@@ -57,18 +58,14 @@ def model_html(system: HybridSystem, program: Program) -> str:
     return f'<div class="hsdsl"><style>{mode_graph.CSS}{CSS}</style>{"".join(parts)}</div>'
 
 
-def _said(text: str) -> str:
-    return escape(visible_lines(text))
-
-
 def _start(system: HybridSystem, math: Mathematics) -> str:
     initial, until = system.initial, math.value(system.experiment.until)
     numbers = {part.name for part in system.parts if part.is_numbered}
     seen = {*without_memory(dict(initial.values))} - numbers
     start = [(name, value) for name, value in initial.values if name in seen]
-    values = ", ".join(f"{_said(name)} = {math.value(value)}" for name, value in start[:MOST_ROWS])
+    values = ", ".join(f"{escaped(name)} = {math.value(value)}" for name, value in start[:MOST_ROWS])
     values += ", ..." if len(start) > MOST_ROWS else ""
-    where = "" if system.parts else f" in {_said(initial.mode)}"
+    where = "" if system.parts else f" in {escaped(initial.mode)}"
     return f"starts{where}{' at ' if values else ''}{values}, until {until}"
 
 
@@ -78,9 +75,7 @@ def _table(names: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     more = [(f"{len(rows) - MOST_ROWS} more", *[""] * (len(names) - 1))] * (len(rows) > MOST_ROWS)
     rows = [*rows[:MOST_ROWS], *more]
     used = [k for k in range(len(names)) if any(row[k] for row in rows)]
-    head = "".join(f"<th>{names[k]}</th>" for k in used)
-    body = "".join("<tr>" + "".join(f"<td>{_said(row[k])}</td>" for k in used) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    return html_table([names[k] for k in used], (html_row(row[k] for k in used) for row in rows))
 
 
 def _definitions(system: HybridSystem, mode: str | None, math: Mathematics) -> list[str]:
@@ -101,7 +96,7 @@ def _mode(system: HybridSystem, mode: Mode, math: Mathematics, unfolded: bool) -
     edges += [f"{len(written) - MOST_EQUATIONS} more transitions"] * (len(written) > MOST_EQUATIONS)
     items = [*flow[:MOST_EQUATIONS], *([f"{len(flow) - MOST_EQUATIONS} more"] * (len(flow) > MOST_EQUATIONS))]
     items += [*_definitions(system, mode.name, math), *walls, *edges]
-    name = f"{_said(shown(mode.name))}{' (final)' if mode.final else ''}"
+    name = f"{escaped(shown(mode.name))}{' (final)' if mode.final else ''}"
     opened = " open" if unfolded else ""
     summary = "equations of all parts" if system.parts else f"mode <strong>{name}</strong>"
     return f"<details{opened}><summary>{summary}</summary>{_list(items)}</details>"
@@ -113,11 +108,11 @@ def _edge(edge: Edge, math: Mathematics, named: bool) -> str:
     when = f"when {math.inequality(edge.surface.text)}{condition}"
     if edge.of_event:
         _, event, *options = edge.of_event
-        when = ", ".join([f"event {math.condition(event)}", *map(_said, options)])
+        when = ", ".join([f"event {math.condition(event)}", *map(escaped, options)])
     resets = zip(edge.target_states, edge.reset_texts, strict=True)
     seen = without_memory(edge.target_states)
     changed = ", ".join(math.reset(name, text) for name, text in resets if text != name and name in seen)
-    ends = f"<strong>{_said(edge.name)}</strong>{f' to {_said(edge.target)}' if named else ''}"
+    ends = f"<strong>{escaped(edge.name)}</strong>{f' to {escaped(edge.target)}' if named else ''}"
     return f"{ends} {when}{': ' if changed else ''}{changed}"
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator
-from html import escape
 
 from hsdsl.analysis.report import words
-from hsdsl.base.names import shown, visible_lines
+from hsdsl.base.names import shown
 from hsdsl.engine.execution import Execution
 
 WIDTH = 100
@@ -83,27 +82,20 @@ def _transitions(execution: Execution, limit: int, columns: int) -> Iterator[str
             yield f"   ... {left_out} more ..."
 
 
-def _escaped(text: str) -> str:
-    return escape(visible_lines(text))
-
-
 def html(execution: Execution, *, limit: int = 60) -> str:
     """Sum a run up in a ``div``, with at most ``limit`` transitions; every text of the model is escaped."""
     facts = [("with", words.overrides(execution)), *words.facts(execution)]
-    rows = "".join(f"<tr><th>{label}</th><td>{_escaped(text)}</td></tr>" for label, text in facts if text)
-    settings = _escaped(", ".join(words.settings(execution)))
-    return (
-        f'<div class="hsdsl"><p><strong>{_escaped(words.heading(execution))}</strong><br>{settings}</p>'
-        f"<table>{rows}</table>{_transition_table(execution, limit)}</div>"
+    table = "<p>No transitions.</p>"
+    if execution.transitions:
+        chosen, cut, left_out = words.table(execution, limit)
+        rows = [*map(words.html_row, chosen)]
+        if left_out:
+            rows.insert(cut, f'<tr><td colspan="6">&hellip; {left_out} more &hellip;</td></tr>')
+        table = words.html_table(words.COLUMNS, rows)
+    heading, settings = (
+        words.escaped(text) for text in (words.heading(execution), ", ".join(words.settings(execution)))
     )
-
-
-def _transition_table(execution: Execution, limit: int) -> str:
-    if not execution.transitions:
-        return "<p>No transitions.</p>"
-    chosen, cut, left_out = words.table(execution, limit)
-    rows = ["<tr>" + "".join(f"<td>{_escaped(cell)}</td>" for cell in row) + "</tr>" for row in chosen]
-    if left_out:
-        rows.insert(cut, f'<tr><td colspan="6">&hellip; {left_out} more &hellip;</td></tr>')
-    header = "".join(f"<th>{_escaped(name)}</th>" for name in words.COLUMNS)
-    return f"<table><thead><tr>{header}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    return (
+        f'<div class="hsdsl"><p><strong>{heading}</strong><br>{settings}</p>'
+        f"{words.html_facts((name, text) for name, text in facts if text)}{table}</div>"
+    )

@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
+from html import escape
 from pathlib import Path
 from typing import Any
 
 from hsdsl.base.defaults import kept_digits
-from hsdsl.base.names import called, seen, without_memory
+from hsdsl.base.names import called, seen, visible_lines, without_memory
 from hsdsl.base.numbers import decimals
 from hsdsl.base.parts import change, compact, of_all
 from hsdsl.engine.execution import Execution, Transition
@@ -36,6 +37,27 @@ def number(x: Any, digits: int = 6) -> str:
 def values(named: Mapping[str, Any], digits: int = DIGITS) -> str:
     """Write named values."""
     return ", ".join(f"{name} = {number(value, digits)}" for name, value in named.items())
+
+
+def escaped(text: str) -> str:
+    """A text of a model for HTML."""
+    return escape(visible_lines(text))
+
+
+def html_row(cells: Iterable[str], kind: str = "td") -> str:
+    """Cells as a row of a table in HTML."""
+    return f"<tr>{''.join(f'<{kind}>{escaped(cell)}</{kind}>' for cell in cells)}</tr>"
+
+
+def html_table(names: Iterable[str], rows: Iterable[str]) -> str:
+    """Rows of HTML as a table with a heading."""
+    return f"<table><thead>{html_row(names, 'th')}</thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def html_facts(facts: Iterable[tuple[str, str]]) -> str:
+    """Named facts as a table in HTML."""
+    rows = (f"<tr><th>{escaped(name)}</th><td>{escaped(text)}</td></tr>" for name, text in facts)
+    return f"<table>{''.join(rows)}</table>"
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
@@ -140,7 +162,7 @@ def stop(execution: Execution) -> str:
 def table(execution: Execution, limit: int) -> tuple[list[tuple[str, ...]], int, int]:
     """The first and the last transitions, ``limit`` in all, as rows by `COLUMNS`.
 
-    Returns the rows, and behind how many of them how many transitions are left out.
+    Returns the rows, and after how many of them how many transitions are left out.
     """
     transitions, digits = execution.transitions, meant_digits(execution)
     count = len(transitions)
@@ -160,7 +182,7 @@ def times(values: Sequence[Any], digits: int) -> list[str]:
     largest = max((abs(t) for t in finite), default=0.0)
     if largest >= 1e9 or 0.0 < largest < 1e-3:
         return [f"{float(t):.{digits}g}" for t in values]
-    zeros = max(0, -math.floor(math.log10(largest)) - 1) if largest else 0  # behind the point, before its digits
+    zeros = max(0, -math.floor(math.log10(largest)) - 1) if largest else 0  # after the point, before its digits
     places = max(0, digits - len(str(int(largest)))) + zeros
     return [f"{float(t):.{places}f}" for t in values]
 

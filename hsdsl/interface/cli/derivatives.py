@@ -14,7 +14,18 @@ from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.decimals import number_of
 from hsdsl.base.progress import counted_runs
 from hsdsl.interface.cli.console import draw, progress, say
-from hsdsl.interface.cli.options import AS_RUN, WRT, Answer, Located, Model, Until, check_target, option, overriding
+from hsdsl.interface.cli.options import (
+    AS_RUN,
+    WRT,
+    Answer,
+    Located,
+    Model,
+    Until,
+    check_target,
+    numbers_of,
+    option,
+    overriding,
+)
 
 if TYPE_CHECKING:
     from hsdsl.analysis.orbits.sampling import OrbitalStability
@@ -164,13 +175,5 @@ def _show_fit(show: Any, runs: int, values: Mapping[str, float], total: float) -
 
 def _by_column(name: str, pairs: list[str] | None) -> dict[str, float] | float | None:
     """Read NAME=NUMBER, or the number of the only column."""
-    found: dict[str, float] = {}
-    for pair in pairs or ():
-        if len(pairs or ()) == 1 and (alone := number_of(pair)) is not None:
-            return alone
-        column, equals, value = (part.strip() for part in pair.partition("="))
-        number = number_of(value)
-        if not equals or not column or number is None:
-            raise UsageError(f"{name}: expected NAME=NUMBER, got '{pair}'", f"for example {name} x=0.1")
-        found[column] = number
-    return found or None
+    alone = number_of(pairs[0]) if pairs and len(pairs) == 1 else None
+    return (numbers_of(name, pairs, "x=0.1") or None) if alone is None else alone

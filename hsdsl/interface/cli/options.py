@@ -89,6 +89,29 @@ def known_names(
     return tuple(names)
 
 
+def numbers_of(
+    name: str, pairs: Sequence[str] | None, example: str, kinds: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """The numbers of NAME=NUMBER, of a repeated name the last; with ``kinds`` only these names, with these types.
+
+    Raises UsageError: a text is not of that form.
+    """
+    found: dict[str, Any] = {}
+    for pair in pairs or ():
+        key, _, value = (part.strip() for part in pair.partition("="))
+        kind = kinds.get(key) if kinds else float if key else None
+        try:
+            if kind is not None:
+                found[key] = kind(float(value))
+                continue
+        except (ValueError, OverflowError):
+            if kinds:
+                raise UsageError(f"{name} {key}: expected a number, got '{value}'") from None
+        hint = did_you_mean(key, kinds) if kinds else f"for example {name} {example}"
+        raise UsageError(f"{name}: expected NAME=NUMBER, got '{pair}'", hint)
+    return found
+
+
 def pairs_of(texts: list[str] | None, known: Sequence[str]) -> list[tuple[str, str]] | None:
     """Read ``--phase``; None where it is left out.
 
@@ -236,16 +259,9 @@ class Answer(NamedTuple):
 def answering(json: bool, allow_path: AllowPath, limit: Limit) -> Generator[None]:
     """Report errors, and apply the limits while the command runs."""
     folders = allow_path or ()
-    numbers: dict[str, Any] = {}
+    kinds: dict[str, Any] = {name: type(getattr(DEFAULT, name)) for name in NUMBERS}
     with errors_reported(json):
-        for pair in limit or ():
-            name, _, value = (part.strip() for part in pair.partition("="))
-            if name not in NUMBERS:
-                raise UsageError(f"--limit: expected NAME=NUMBER, got '{pair}'", did_you_mean(name, NUMBERS))
-            try:
-                numbers[name] = type(getattr(DEFAULT, name))(float(value))
-            except (ValueError, OverflowError):
-                raise UsageError(f"--limit {name}: expected a number, got '{value}'") from None
+        numbers = numbers_of("--limit", limit, "", kinds)
         for folder in folders:
             if not folder.is_dir():
                 raise UsageError(f"--allow-path {folder}: there is no such folder")

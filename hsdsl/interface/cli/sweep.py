@@ -13,9 +13,17 @@ import hsdsl
 from hsdsl.base.errors import UsageError
 from hsdsl.base.interrupts import INTERRUPTED
 from hsdsl.base.names import visible
-from hsdsl.base.numbers.decimals import number_of
 from hsdsl.interface.cli.console import progress, say
-from hsdsl.interface.cli.options import Answer, Engine, Experiment, check_target, model_files, names_of, option
+from hsdsl.interface.cli.options import (
+    Answer,
+    Engine,
+    Experiment,
+    check_target,
+    model_files,
+    names_of,
+    numbers_of,
+    option,
+)
 
 if TYPE_CHECKING:
     from hsdsl.analysis.sweep import Sweep
@@ -75,7 +83,7 @@ def sweep(
         from hsdsl.analysis.sweep.dataset import check_ranked, load
         from hsdsl.analysis.sweep.picture import Picture
 
-        picture = Picture(of, 0.5 if tail is None else tail, over, _numbers_of(part))
+        picture = Picture(of, 0.5 if tail is None else tail, over, numbers_of("--slice", part, "c=0.8"))
         ranked = {"worst": worst, "best": best}
 
         def check(manifest: Manifest) -> None:
@@ -132,16 +140,6 @@ def _check(
         raise UsageError(f"--{next(iter(drawing))} applies to a picture, and there is none", "give --plot FILE")
     if "cluster" in running and "processes" in running:
         raise UsageError("--processes applies to this machine, and --cluster uses others", "leave one out")
-
-
-def _numbers_of(texts: list[str] | None) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for text in texts or ():
-        name, _, value = (part.strip() for part in text.partition("="))
-        if not name or (number := number_of(value)) is None:
-            raise UsageError(f"--slice: expected NAME=NUMBER, got '{text}'", "for example --slice c=0.8")
-        found[name] = number
-    return found
 
 
 def _listed(found: Sweep, rows: Mapping[str, list[dict[str, Any]]], ranked: Mapping[str, str | None]) -> Iterator[str]:
