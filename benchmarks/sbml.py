@@ -98,7 +98,7 @@ def expected(folder: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 
 
 def made_behind(model: Any, run: Any, times: np.ndarray) -> np.ndarray:
-    """At which times the flow reaches strict events alone: they are made behind it, as at the end of a run (M8)."""
+    """At which times the flow reaches strict events alone: they are made beyond it, as at the end of a run (M8)."""
     strict = {edge.name for mode in model.program.modes for edge in mode.edges if edge.strict}
     made = [(float(m.time), m.edge in strict and not m.entry) for m in run.transitions if " re-arms" not in m.edge]
     near = [[behind for time, behind in made if abs(time - t) <= TIE * abs(t)] for t in times]

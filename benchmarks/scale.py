@@ -85,7 +85,7 @@ class Chain:
         return bmat([[None, eye(n)], [near, near]]).tocsc()
 
     def bounced(self, x: np.ndarray, hit: np.ndarray) -> np.ndarray:
-        """The state behind the impacts of masses that hit together."""
+        """The state after the impacts of masses that hit together."""
         x = x.copy()
         x[self.n :][hit] *= -BOUNCE
         return x

@@ -71,7 +71,7 @@ static double first_rise(const double *c, int n) {
   return 2.0;
 }
 
-/* When f cos(u t) falls through a force, behind t. */
+/* When f cos(u t) falls through a force, after t. */
 static double release(double f, double u, double force, double t) {
   const double turn = 2 * acos(-1.0), phase = acos(force / f), end = (floor(u * t / turn) * turn + phase) / u;
   return end > t ? end : end + turn / u;

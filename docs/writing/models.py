@@ -53,7 +53,7 @@ GROUPS = {
             "auto",
         ),
         Entry("models/gallery/rolling-ball", "After infinitely many bounces the ball goes on rolling."),
-        Entry("models/gallery/cascade", "Newton's cradle: impacts one behind the other, at one instant."),
+        Entry("models/gallery/cascade", "Newton's cradle: impacts one after the other, at one instant."),
         Entry("models/gallery/stick-slip", "Dry friction: the mass sticks to the belt, until the spring is stronger."),
         Entry("models/gallery/draining-tank", "A tank runs empty, and its law has no value below zero."),
     ),

@@ -189,7 +189,7 @@ def _section(heading: str, content: str) -> str:
         elif line and (" : " in line or below.startswith(" ")):
             name, _, kind = line.partition(" : ")
             rows.append([name, kind, ""])
-        elif line or rest:  # a paragraph behind the entries
+        elif line or rest:  # a paragraph after the entries
             rest += f"{line}\n"
     head = {"Parameters": "parameter", "Attributes": "attribute"}.get(heading)
     if head is None:

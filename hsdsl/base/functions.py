@@ -228,7 +228,7 @@ def replaced(expr: Any, mapping: Mapping[Any, Any], done: dict[Any, Any]) -> Any
 
 
 def rewritten(expr: Any, change: Callable[[Any], Any], done: dict[Any, Any]) -> Any:
-    """Change every part of an expression behind its own parts, each once; ``done`` is kept as in :func:`replaced`."""
+    """Change every part of an expression after its own parts, each once; ``done`` is kept as in :func:`replaced`."""
     if not expr.args:
         return expr
     if expr not in done:

@@ -92,7 +92,7 @@ class Variation:
 
     own: int  # how many states x has; they are the first ones
     count: int  # of columns
-    columns: list[int]  # where each column begins, and where the last one ends: behind it states do not flow
+    columns: list[int]  # where each column begins, and where the last one ends: after it states do not flow
     rows: list[int]  # for each state of a column, from columns[0] on, which state of x it is the derivative of
     entries: int  # how many entries of J are those of f_x for x; they are the first ones
     links: int  # how many derivatives of columns by x there are,
@@ -146,7 +146,7 @@ def filled(places: Sequence[tuple[int, int]], n: int) -> int:
 
 
 def _above(places: Sequence[tuple[int, int]], n: int) -> list[set[int]]:
-    """The columns behind the diagonal of each row: what a row leaves goes on to the first row that it has."""
+    """The columns right of the diagonal of each row: what a row leaves goes on to the first row that it has."""
     above: list[set[int]] = [set() for _ in range(n)]
     for i, j in places:
         if i != j:

@@ -29,7 +29,7 @@ from hsdsl.language.system import HybridSystem, started
 from hsdsl.mathematics.lower import lower_constants
 from hsdsl.mathematics.program import ModeProgram, Program, Routines
 
-LONGEST = 40  # letters of a name: some languages read 63 of an identifier, and something is put behind it
+LONGEST = 40  # letters of a name: some languages read 63 of an identifier, and something is appended to it
 
 
 class ExportedModel(Protocol):

@@ -183,7 +183,7 @@ class Edge:
     ``derived`` of them are derivatives of others. One that ``stays`` does not enter its mode again.
     One that is part of an event has in ``of_event`` its name, how its condition is written, and its options. That of
     a ``part`` leaves the mode with this number of it. A ``strict`` one is made
-    behind its surface: not at the end of a run.
+    beyond its surface: not at the end of a run.
     """
 
     name: str
@@ -264,7 +264,7 @@ class Mode:
     """A mode: states in file order, their flow, walls, outgoing edges in file order, outputs and scene.
 
     ``outputs`` has one entry for each output of the system, None where the mode does not define it. ``scene`` likewise
-    has the numbers of the system's shapes, one shape behind the other.
+    has the numbers of the system's shapes, one shape after the other.
     ``slides`` names the two modes between which a mode of a completion slides. A final mode without flow has
     ``states == ()`` here: it has the states it is entered with. The last ``derived`` states are derivatives of the
     others, and the flow's Jacobian leaves out how they depend on these unless ``varied`` has them: for each column, the
@@ -349,7 +349,7 @@ class Initial:
     """Where a run starts: a mode and expressions of parameters for its states (file order).
 
     ``written`` is given where values use each other: the values over parameters and the symbols of the states whose
-    values they use, each behind those.
+    values they use, each after those.
     """
 
     mode: str
@@ -358,7 +358,7 @@ class Initial:
 
     @property
     def in_order(self) -> tuple[tuple[str, sp.Expr], ...]:
-        """The values, each behind those that it uses."""
+        """The values, each after those that it uses."""
         return self.written or self.values
 
 

@@ -123,7 +123,7 @@ class EdgeProgram:
     then; ``counts`` are states that the edge counts with, which keep their values there. Where its reset is
     ``branched``, that of `ModeProgram.held` is the branch for slow impacts. ``releases`` is the contact that an edge of
     `ModeProgram.held` ends. Of an edge that is part of an event ``of_event`` has its name, how its
-    condition is written, and its options. A ``strict`` one is made behind its surface.
+    condition is written, and its options. A ``strict`` one is made beyond its surface.
     """
 
     name: str
@@ -338,12 +338,12 @@ class Program:
 
     ``contacts`` are modes with motion along their guards. Routines of such a mode take a further number for each of
     its contacts, ``d_i``, at most ``contact_count`` of them. It is `LOOKED_AT` where the surface of the contact's edge
-    is the push on the guard, negative, `HELD` where the contact also constrains the flow, and else 0. Edges behind
+    is the push on the guard, negative, `HELD` where the contact also constrains the flow, and else 0. Edges after
     those of the mode are where an `if` may end a contact.
 
     A system of parts has one mode, whose last states are the numbers of the modes of ``parts`` (`hsdsl.base.parts`).
 
-    Where initial values use each other, ``initial_order`` has their states, each behind those that it uses. In this
+    Where initial values use each other, ``initial_order`` has their states, each after those that it uses. In this
     order ``initial_values`` has a routine of the parameters and ``initial_states`` for each.
 
     ``left_out`` names the states of the file that are not here, since nothing in the slice depends on them.

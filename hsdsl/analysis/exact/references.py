@@ -196,7 +196,7 @@ def _steepness(jacobian: Routine, t: float, x: Array) -> Array:
 
 
 def _at(run: Execution, k: int, share: float, width: int) -> tuple[float, Array, Any]:
-    """Time, state and derivative by the share, a share into the piece behind row k."""
+    """Time, state and derivative by the share, a share into the piece after row k."""
     t = float(run.times[k] + share * (run.times[k + 1] - run.times[k]))
     start = run.values[k, :width]
     if run.coefficients.shape[1] == 0:

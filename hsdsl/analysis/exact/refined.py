@@ -36,7 +36,7 @@ def precise(model: Any, digits: int = 10, **options: Any) -> Execution:
     model : Model
         Any model whose run gets to its end with finitely many transitions.
     digits : int
-        Right digits behind the point, 4 to 14.
+        Right digits after the point, 4 to 14.
     **options
         ``until``, ``parameters``, ``initial`` and ``max_transitions`` (1000 if not given), as for ``Model.simulate``.
 

@@ -344,7 +344,7 @@ class Objective:
         self.bumps, self.orders = met
 
     def residuals(self, x: Array) -> Array:
-        """The run with these values minus the measurements, weighted, one behind the other."""
+        """The run with these values minus the measurements, weighted, one after the other."""
         return self._at(x)[1]
 
     def slopes(self, x: Array) -> Array:

@@ -70,7 +70,7 @@ def without_entry(mapping: Node | None, name: str) -> tuple[Edit, ...]:
 
 
 def _end(value: Node, key: SourceRange) -> int:
-    """Behind the value; a value that is left out ends with the colon of its key."""
+    """After the value; a value that is left out ends with the colon of its key."""
     if value.place.end[0] > value.place.start[0]:
         return _trimmed(value.place.text.content, value.place.end[0])
     return key.text.content.index(":", key.end[0]) + 1
@@ -93,7 +93,7 @@ def _from_block(content: str, ranges: Sequence[tuple[int, int]], index: int) -> 
     line = content.rfind("\n", 0, start) + 1
     after = content.find("\n", end)
     rest = content[end : after if after >= 0 else len(content)]
-    if content[line:start].strip():  # the first key of a list item, behind its dash
+    if content[line:start].strip():  # the first key of a list item, after its dash
         follows = index + 1 < len(ranges) and not rest.strip()
         return (
             (Edit(start, ranges[index + 1][0]),) if follows and "#" not in content[end : ranges[index + 1][0]] else ()

@@ -57,7 +57,7 @@ class Shares(NamedTuple):
 class Curves:
     """The points of a run, in float64.
 
-    ``begins`` marks the first point of each arc, ``jumps`` are the indices of points behind transitions. ``bands`` are
+    ``begins`` marks the first point of each arc, ``jumps`` are the indices of points after transitions. ``bands`` are
     the times at which modes were occupied, without those too short to see; `SEVERAL` where they are too many, and then
     ``shares`` says how much of a time each mode takes.
     ``error`` is how much of its size a state may be off: one that changes by less is drawn as a constant. ``parts`` is

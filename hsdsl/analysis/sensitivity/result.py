@@ -283,7 +283,7 @@ class Sensitivity:
         )
 
     def _kept(self, made: Transition) -> Iterator[str]:
-        """The states that a transition leaves as they are: the flow behind it need not be large for theirs."""
+        """The states that a transition leaves as they are: the flow after it need not be large for theirs."""
         modes = self.setting.plain.program.modes
         edges = next((mode.edges for mode in modes if mode.name == made.source), ())
         edge = next((edge for edge in edges if edge.name == made.edge), None)

@@ -359,7 +359,7 @@ def _columns(manifest: Manifest, first: int, ensemble: Ensemble) -> Iterator[tup
 
 
 def _sample_columns(ensemble: Ensemble) -> dict[str, tuple[Array, Array]]:
-    """Samples up to the end of each run, one behind the other."""
+    """Samples up to the end of each run, one after the other."""
     times = ensemble.sample_times
     with np.errstate(invalid="ignore"):
         inside = times <= (ensemble.time * (1 + TIE))[:, None]

@@ -85,7 +85,7 @@ class Variation:
 
 
 def read(given: Sequence[str] | Mapping[str, Any], random: int | None, seed: int, number: NumberOf) -> Variation:
-    """Read what varies: texts, or values or the text behind the name by name.
+    """Read what varies: texts, or values or the text after the name by name.
 
     ``number`` makes a number of a number or an expression.
 

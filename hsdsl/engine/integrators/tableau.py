@@ -249,7 +249,7 @@ Row = tuple[tuple[int, float], ...]  # stages and their weights
 class TableNumbers(NamedTuple):
     """A method with ``stages`` stages to evaluate in a step.
 
-    Stage number ``stages`` is the flow at the step's end; those behind it are evaluated for the dense output alone.
+    Stage number ``stages`` is the flow at the step's end; those after it are evaluated for the dense output alone.
     ``nodes`` and ``a`` have a row for each of them; that of the flow at the end is empty. ``error`` has the weights
     less those of the embedded method, ``coarse`` less those of a second one, ``dense`` those of the powers of s.
     """

@@ -137,7 +137,7 @@ class Operations:
         self._known: dict[Operation, Node] = {}
 
     def formula(self, definition: ast.FunctionDef) -> tuple[int, int, list[Node]]:
-        """Collect one routine: its first operation, the one behind its last, and its results."""
+        """Collect one routine: its first operation, the one after its last, and its results."""
         self._known = {key: node for key, node in self._known.items() if node.source == "fixed"}
         names, first, results = dict(self.names), len(self.moving), list[Node]()
         for statement in definition.body:

@@ -87,7 +87,7 @@ def count_turns(pace: Pace, slope: Vector, end: Vector, n: int) -> bool:
 def jump_between(here: Here, k: int, t: Time, x: Vector, t1: Time, z: Vector) -> tuple[Number, Number, Number] | None:
     """Find the share of the way from (t, x) to (t1, z) at which component k of the flow jumps, and its values there.
 
-    They are those before and behind the jump. None where it does not jump, or has no value.
+    They are those before and after the jump. None where it does not jump, or has no value.
     """
     low: Number = 0
     high: Number = 1

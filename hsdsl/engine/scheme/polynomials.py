@@ -46,7 +46,7 @@ def slope_of(c: Vector, n: int, s: Number) -> Number:
 
 
 def split(b: Room, n: int, s: Number, left: Room) -> None:
-    """Cut an interval at the share s: left gets the coefficients before it, b those behind it (de Casteljau)."""
+    """Cut an interval at the share s: left gets the coefficients before it, b those after it (de Casteljau)."""
     rest = 1 - s
     left[0] = b[0]
     for j in range(1, n + 1):

@@ -251,7 +251,7 @@ class ThreadWorkspace:
         return 0
 
     def logged(self, count: int) -> Logged:
-        """Take away so many transitions of the instances that have been run; behind them are those of one cut short."""
+        """Take away so many transitions of the instances that have been run; after them are those of one cut short."""
         self._take()
         first, second, third = (np.concatenate(column)[:count] for column in zip(*self._full, strict=True))
         self._full.clear()

@@ -19,7 +19,7 @@ from hsdsl.base.samples import in_order
 from hsdsl.engine.kernel import Kernel
 from hsdsl.mathematics.program import Program, SampledInput
 
-BEHIND = 4  # ties of time after the end of a run, where inputs have the values after a jump at the end
+PAST_END = 4  # ties of time after the end of a run, where inputs have the values after a jump at the end
 
 
 class UnorderedTimes(UsageError):
@@ -77,7 +77,7 @@ def make_timeline(
     cuts = sorted({zero} | {t for times, _ in samples for t in times if zero < t < until})
     ends = [*cuts[1:], until]
     if until > 0:
-        cuts, ends = [*cuts, until], [*ends, until + BEHIND * TIE * until]
+        cuts, ends = [*cuts, until], [*ends, until + PAST_END * TIE * until]
     segments: list[Segment] = []
     held_before: tuple[Number, ...] = ()
     for start, end in zip(cuts, ends, strict=True):

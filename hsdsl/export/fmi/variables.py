@@ -121,7 +121,7 @@ def _states(source: Source) -> tuple[Variable, ...]:
 
 
 def continuous(source: Source) -> list[str]:
-    """The states of all modes that flow; behind them are the numbers of the modes of parts."""
+    """The states of all modes that flow; after them are the numbers of the modes of parts."""
     program = source.problem.program
     hidden = numbered(program.parts)
     return [name for name in program.all_states if name not in hidden]

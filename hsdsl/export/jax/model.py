@@ -136,7 +136,7 @@ def _mode(j: int, program: Program, owner: int, numbers: list[tuple[int, ...]], 
 
 
 def _contact(owner: ModeProgram, mode: ModeProgram, j: int, own: tuple[int, ...], count: int) -> str:
-    """The fields of a mode from ``edges`` to ``orders``; those behind a mode's own edges are of what they release."""
+    """The fields of a mode from ``edges`` to ``orders``; those after a mode's own edges are of what they release."""
     held = -1 if owner.held is None or not owner.held < count else owner.held
     places = [-1 if edge.contact is None or held < 0 else edge.contact for edge in owner.edges]
     ends = [-1 if edge.releases is None else edge.releases for edge in mode.edges]

@@ -189,7 +189,7 @@ def by_arcs(scene: Scene, model: PlainModel, integrate: Integrate) -> Callable[[
                 if passed_by > len(mode.edges):
                     problem = f"stays at t = {t:.6g}, at a guard whose conditions do not hold"
                     break
-                # A point right behind a surface that is passed, where the tool does not find it again
+                # A point just beyond a surface that is passed, where the tool does not find it again
                 nudge = min(tie, until - t)
                 x = [float(value) + nudge * rate for value, rate in zip(arc.x, flows[k](t, *arc.x), strict=True)]
                 t += nudge

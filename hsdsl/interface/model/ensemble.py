@@ -342,7 +342,7 @@ class EnsembleRequest:
     def times(self, until: Array, table: InstanceTable) -> tuple[int, Callable[[], Array]]:
         """The number of samples of an instance, and what makes their times, shape (instances, samples).
 
-        Behind the last sample of an instance that has fewer than others is not-a-number.
+        After the last sample of an instance that has fewer than others come not-a-numbers.
         """
         given = self.samples
         if given is None:

@@ -392,7 +392,7 @@ class Orbits:
 
 
 def _with_sizes(guess: Guess, run: Execution) -> Guess:
-    """A guess with what the run does from a lap before it to a lap behind."""
+    """A guess with what the run does from a lap before it to a lap after it."""
     start, end = guess.phase - guess.time, guess.phase + guess.time
     made = sum(start <= float(each.time) <= end for each in run.transitions)
     return replace(guess, sizes=run.sizes(None, start, end), most=made)

@@ -86,7 +86,7 @@ def _correct_indentation(root: Mapping, findings: Findings) -> None:
     _among_modes(modes, findings)
     if modes.entries:
         key, last = list(modes)[-1]
-        _behind(root, "modes", last, _MODE - _MODEL, f"in the mode '{shown(key)}'", findings)
+        _after(root, "modes", last, _MODE - _MODEL, f"in the mode '{shown(key)}'", findings)
     for _, mode in modes:
         if isinstance(mode, Mapping):
             _in_mode(mode, findings)
@@ -97,7 +97,7 @@ def _in_mode(mode: Mapping, findings: Findings) -> None:
     transitions = child(mode, "transitions")
     items = transitions.items if isinstance(transitions, Sequence) else ()
     if items:
-        _behind(mode, "transitions", items[-1], _TRANSITION - _MODE, "in the transition above", findings)
+        _after(mode, "transitions", items[-1], _TRANSITION - _MODE, "in the transition above", findings)
     for item in items:
         if isinstance(item, Mapping):
             _below_empty(item, _TRANSITION, findings)
@@ -139,7 +139,7 @@ def _among_modes(modes: Mapping, findings: Findings) -> None:
             _move(modes, moved, mode, message, f"in the mode '{shown(name)}'", findings)
 
 
-def _behind(parent: Mapping, section: str, last: Node, fields: frozenset[str], where: str, findings: Findings) -> None:
+def _after(parent: Mapping, section: str, last: Node, fields: frozenset[str], where: str, findings: Findings) -> None:
     """Take the keys right after a section that its last part can have for those of that part."""
     after = keys(parent)[list(parent.entries).index(section) + 1 :]
     strays = [key for key in after if key in fields]

@@ -36,7 +36,7 @@ _UNITS = frozenset(TABLES["units"]["names"].split())
 _QUANTITY = re.compile(r"\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*((?:[^\W\d]+\s*[*/·]\s*)*)([^\W\d]+)\s*")
 _PLAIN_NUMBER = re.compile("[0-9.]{1,20}(?:[eE][-+]?[0-9]{1,2})?")
 _POWERS = {"G": 9, "M": 6, "k": 3, "c": -2, "m": -3, "u": -6, "µ": -6, "n": -9, "p": -12}
-_PREFIXED = re.compile("(?!cd|Pa)([GMkcmuµnp])(Hz|Pa|mol|Ohm|ohm|[mNVAWJFHKLlC])")  # a prefix, and the unit behind it
+_PREFIXED = re.compile("(?!cd|Pa)([GMkcmuµnp])(Hz|Pa|mol|Ohm|ohm|[mNVAWJFHKLlC])")  # a prefix, and the unit after it
 _TIMED = {**dict.fromkeys(("after", "at", "wait"), ">="), "before": "<"}
 _COUNTED = ("elapsed", "temporalCount", "count", "timer")
 _REPEATED = ("every", "sample")
@@ -216,7 +216,7 @@ def _compared(left: str, word: str) -> str | None:
 
 
 def unknown_name(name: str, known: Collection[str], measured: bool) -> str | None:
-    """What to write for an unknown name; one that is ``measured`` is the factor behind a number."""
+    """What to write for an unknown name; one that is ``measured`` is the factor after a number."""
     unit = "leave the unit out: units belong under `units`" if len(name) > 1 and name.lower() in _UNITS else None
     if measured and unit and closest(name, known) is None:
         return unit

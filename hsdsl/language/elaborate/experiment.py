@@ -67,7 +67,7 @@ def _range(symbols: SymbolTable, given: RangeDocument) -> tuple[Any, Any] | None
 
 
 def _in_order(symbols: SymbolTable, given: dict[Key, Scalar]) -> list[str]:
-    """The states with an initial value, each behind those whose value it uses; values in a cycle are left out."""
+    """The states with an initial value, each after those whose value it uses; values in a cycle are left out."""
     trees = {str(key): symbols.tree(scalar) for key, scalar in given.items()}
     uses = {
         name: [] if tree is None else [n.name for n in walk(tree) if isinstance(n, Name) and n.name in trees]

@@ -94,7 +94,7 @@ class Scope:
     def faults(self, tree: Tree) -> list[ExpressionError]:
         """Every name of an expression that cannot be used, and every function that cannot be called so."""
         faults: list[ExpressionError] = []
-        passed, measured = 0, set[int]()  # where factors behind a number begin: the unit of a quantity stands there
+        passed, measured = 0, set[int]()  # where factors after a number begin: the unit of a quantity stands there
         for node in walk(tree):
             if isinstance(node, Product):
                 pairs = pairwise(factor for _, factor in node.factors)
@@ -125,7 +125,7 @@ class Scope:
         )
 
     def _name(self, name: str, measured: bool) -> Refusal | None:
-        """Why a name cannot be used; one that is ``measured`` is the factor behind a number."""
+        """Why a name cannot be used; one that is ``measured`` is the factor after a number."""
         if name in CONSTANTS:
             return None
         value = self.values.get(name, _MISSING)  # of parts it is worked out at each look

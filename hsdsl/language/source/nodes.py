@@ -140,7 +140,7 @@ _NUMBER = re.compile(
 
 @dataclass(frozen=True)
 class SourceRange:
-    """The range of a node in its text: 0-based index, line and column of its first character and behind its last."""
+    """The range of a node in its text: 0-based index, line and column of its first character and after its last."""
 
     text: Text = field(repr=False)
     start: tuple[int, int, int]

@@ -194,7 +194,7 @@ def _others(name: str, a: Mode, out: Edge, b: Mode, back: Edge) -> list[Edge]:
 def _kept_on(name: str, states: tuple[str, ...], r: sp.Expr, edge: Edge) -> Edge:
     """An edge of a mode, as one that leads back to the sliding where it leads back to its mode and keeps the surface.
 
-    So a ball that comes to rest beside a sliding does so in it. Where nothing presses behind the reset, sliding ends.
+    So a ball that comes to rest beside a sliding does so in it. Where nothing presses after the reset, sliding ends.
     """
     resets = dict(zip(edge.target_states, zip(edge.reset, edge.reset_texts, strict=True), strict=True))
     if edge.target != edge.source or edge.of_event or set(resets) != set(states):

@@ -1,7 +1,7 @@
 # pyright: basic, reportOperatorIssue=false
 """The text of a model with the modes of its completions: the file as it is, with further modes and transitions.
 
-These are inserted behind the last one of a mapping or list, in its style.
+These are inserted after the last one of a mapping or list, in its style.
 """
 
 from __future__ import annotations
@@ -197,14 +197,14 @@ class _Writer:
         return self._time
 
     def add_transition(self, edge: Edge) -> None:
-        """Add a transition behind those of its mode."""
+        """Add a transition after those of its mode."""
         node = child(child(child(self._root, "modes"), edge.source), "transitions")
         assert node is not None
         fields = _transition(edge)
         self.insertions.append(node, flow_style(fields), "\n".join(_transition_lines(fields, node.place.start[2])))
 
     def add_mode(self, mode: Mode) -> None:
-        """Add a mode behind the others."""
+        """Add a mode after the others."""
         node = child(self._root, "modes")
         assert node is not None
         end = "" if mode.edges else "  # hsdsl: ignore[HS425] no transition leads out of this motion"
@@ -304,7 +304,7 @@ class Insertions:
         return content
 
     def append(self, node: Node, inline: str, block: str) -> None:
-        """Add an entry behind the last one of a mapping or a list, in its style."""
+        """Add an entry after the last one of a mapping or a list, in its style."""
         start, end = node.place.start[0], node.place.end[0]
         content = self._text.content
         if content[start] in "[{":

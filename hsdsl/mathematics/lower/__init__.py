@@ -134,8 +134,8 @@ class Slopes(NamedTuple):
     """Derivatives of the flow and outputs of a mode by states and inputs: the routine ``slopes`` has those not 0.
 
     ``places`` has for each its row and column: rows are the flow of each state, then the outputs, columns the states,
-    then the sampled inputs. ``uses`` has for each row, and for each surface behind them, the columns that it depends
-    on; behind those of slopes are time and the parameters.
+    then the sampled inputs. ``uses`` has for each row, and for each surface after them, the columns that it depends
+    on; after those of slopes are time and the parameters.
     """
 
     routines: lowered.Routines

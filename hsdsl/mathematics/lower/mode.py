@@ -294,7 +294,7 @@ def ordering(places: Sequence[int], n: int) -> tuple[int, ...]:
 def _minimum_degree(places: Sequence[int], n: int) -> tuple[int, ...]:
     """The order that takes an unknown with the fewest neighbours next; all that it leaves are then neighbours.
 
-    Of several it takes the one behind the fewest others in turn, for all of which a processor must wait.
+    Of several it takes the one with the fewest others before it in turn, for all of which a processor must wait.
     See A. George and J. W. H. Liu, The evolution of the minimum degree ordering algorithm, SIAM Review 31, 1989
     (doi:10.1137/1031001).
     """

@@ -349,7 +349,7 @@ class Gradient:
 
 
 def in_order(statements: Iterable[Statement], results: sp.Basic) -> list[Statement]:
-    """The statements that the results need, each behind those it uses."""
+    """The statements that the results need, each after those it uses."""
     known = dict(statements)
     ordered: dict[sp.Symbol, sp.Basic] = {}
 
@@ -481,7 +481,7 @@ def written_out(results: tuple, statements: Sequence[Statement] = ()) -> tuple[l
 class _Written:
     """How the result of expressions of one shape is written: statements, each with the numbers of its operands.
 
-    Those are the places of symbols among the names of the shape, and behind them those of the statements before it.
+    Those are the places of symbols among the names of the shape, and after them those of the statements before it.
     The last statement is the result.
     """
 

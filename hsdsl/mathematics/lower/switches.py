@@ -70,7 +70,7 @@ class Switches:
         return (1 + first) * a * _HALF + (1 - first) * b * _HALF
 
     def angle(self, y: sp.Expr, x: sp.Expr) -> sp.Expr:
-        """The angle of (x, y): behind the origin that of the opposite point, and a half turn."""
+        """The angle of (x, y): where x < 0 that of the opposite point, and a half turn."""
         side, behind = self.number("sign", y, jumps=True), self.number("sign", x, jumps=True)
         return side * sp.pi * (_HALF - _HALF * behind) + atan2(behind * y, behind * x)
 

@@ -31,7 +31,7 @@ function countOf(times, t, with_it = false) {
   return low;
 }
 
-// The part of a run that is shown, with a point before and one behind, each array without copying it.
+// The part of a run that is shown, with a point before and one after, each array without copying it.
 function clipped(run, ...arrays) {
   const [start, end] = part();
   const [first, behind] = [Math.max(0, countOf(run.times, start) - 1), countOf(run.times, end, true) + 1];

@@ -1,4 +1,4 @@
-"""A program's routines for lanes of runs: the text of those for one run, behind `runtime/c/lane.h`, which makes of a
+"""A program's routines for lanes of runs: the text of those for one run, after `runtime/c/lane.h`, which makes of a
 number a vector of them. A mode whose routines choose by numbers, or whose flow has no Taylor series, has none.
 """
 

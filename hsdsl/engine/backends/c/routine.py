@@ -118,7 +118,7 @@ def _failing(assignments: list[Assignment]) -> list[bool]:
 
 
 def _each_apart(assignments: list[Assignment], locals_: int) -> list[Assignment]:
-    """Let each value be none where it, or what it needs, is none: ``v`` has behind the values whether they are lost."""
+    """Let each value be none where it, or what it needs, is none: ``v`` has after the values whether they are lost."""
     fails = _failing(assignments)
 
     def apart(i: int, one: Assignment) -> Assignment:
@@ -249,7 +249,7 @@ _OWN = "(lines + ({}) * length)"  # what l{} means
 
 @dataclass(frozen=True)
 class Assignment:
-    """``target = value;`` behind those that it ``needs``, by their numbers: all of them come before it."""
+    """``target = value;`` after those that it ``needs``, by their numbers: all of them come before it."""
 
     target: str
     value: str
@@ -280,7 +280,7 @@ def _statements(assignments: Sequence[Assignment]) -> Iterator[str]:
 
 
 def _levels(assignments: Sequence[Assignment]) -> list[list[Assignment]]:
-    """Assignments, behind each other only where one needs the other."""
+    """Assignments, one after the other only where one needs the other."""
     depth: list[int] = []
     levels: list[list[Assignment]] = []
     for one in assignments:

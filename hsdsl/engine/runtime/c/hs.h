@@ -105,7 +105,7 @@ typedef struct {
   const int *count;
   int branched;   /* whether its reset in the mode with motion along guards is a branch of this one, for slow impacts */
   int of_event;   /* whether it is part of an event */
-  int strict;     /* whether it is made behind its surface, not at the end of a run */
+  int strict;     /* whether it is made beyond its surface, not at the end of a run */
   int releases;   /* of a mode with motion along guards: the contact that it ends, or -1 */
 } hs_edge;
 
@@ -138,7 +138,7 @@ typedef struct {
   int affine;              /* whether every surface's gradient is the same everywhere */
   hs_routine *terms;       /* the sizes of the terms of a flow; 0 where last digits tell */
   const int *state;        /* for each state its number among those of all modes */
-  int held;                /* index of the mode with motion along its guards, behind the modes; -1 for none */
+  int held;                /* index of the mode with motion along its guards, after the modes; -1 for none */
   int measures;            /* states whose slopes at the end of an implicit step go into the states before the last */
   const int *measured;
   const hs_variation *variation; /* 0 where no states are derivatives of others */

@@ -153,7 +153,7 @@ typedef struct {
 
 #define FEWEST_WAITS 16 /* executions that a queue has room for at first */
 
-/* Executions that wait behind the first of a queue, in the order in which they are made. */
+/* Executions that wait after the first of a queue, in the order in which they are made. */
 typedef struct {
   int64_t room, first, count;
   hs_real *waits; /* (room, model->queued): time and values */
@@ -278,7 +278,7 @@ typedef struct {
 /* The number of the first time that is outside the run by more than the tie tolerance, or -1. */
 HS_EXPORT int64_t hs_sample(const hs_sampling *sampling);
 
-/* The same of a packed run and of what `shared` asks for: `memory` has the times, and room behind them for states,
+/* The same of a packed run and of what `shared` asks for: `memory` has the times, and room after them for states,
    results and scratch. */
 HS_EXPORT int64_t hs_sample_record(const hs_sampling *shared, const hs_record *record, const int32_t *layout,
                                    int64_t samples, double *memory);

@@ -1,4 +1,4 @@
-/* Numbers of several runs as one vector. What is included behind this file means such vectors by `hs_real`. Each lane
+/* Numbers of several runs as one vector. What is included after this file means such vectors by `hs_real`. Each lane
    has the bits that a number has: the same operations, and functions of the C library called lane by lane. */
 
 #ifndef HS_LANE_H

@@ -27,7 +27,7 @@ static void move_part(lane_part *to, const lane_part *from, int n, int lane) {
   for (int i = 0; i <= n; i++) to->b[i][lane] = from->b[i][lane];
 }
 
-/* The first part on which the polynomial rises once through zero, or the `last` one behind which it stays above: see
+/* The first part on which the polynomial rises once through zero, or the `last` one after which it stays above: see
    rises() and last_root(). The lanes that have one. */
 static hs_mask part_that_rises(lane_part *here, int n, hs_mask lanes, int last) {
   lane_part aside[MOST_ASIDE], left, right;

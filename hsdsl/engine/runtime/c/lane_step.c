@@ -12,7 +12,7 @@ static int degree_of_lanes(const hs_real *c, int n) {
 }
 
 /* Whether a surface with this polynomial, and the value `end`, is passed by for certain: see is_passed_by() and
-   reaches(). A Bernstein coefficient is the sum of all c[k] times weights of at most 1: n sums behind an inverse and a
+   reaches(). A Bernstein coefficient is the sum of all c[k] times weights of at most 1: n sums after an inverse and a
    product here, or a quotient in fill_bernstein(). So both are off by at most 2 n + 3 units of round-off of the sum of the
    sizes, and little of second order: what is lower by 2 n + 8 of them here is negative there. */
 static hs_mask passed_by(const double *inverse, const hs_real *c, int order, hs_mask standing, hs_real end,

@@ -21,7 +21,7 @@ static int most_states(const hs_task *task) {
   return most;
 }
 
-/* Copy so many things behind what is there, where there is memory. */
+/* Append so many things to what is there, where there is memory. */
 static void *put(hs_store *store, const void *from, int64_t count, size_t size) {
   void *const to = take(store, count, size);
   if (count && to) memcpy(to, from, (size_t)count * size);

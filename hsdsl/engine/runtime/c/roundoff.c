@@ -160,7 +160,7 @@ static void rounded_operations(const hs_formulas *f, int first, int last, int ba
   for (int i = first; i < last && !traced; i++) v[base + i] = rounded_of(&f->operation[i], v, 0);
 }
 
-/* Put data and constants into registers behind time and n states, and carry out what depends on them alone. */
+/* Put data and constants into registers after time and n states, and carry out what depends on them alone. */
 static void bind_rounded(const hs_formulas *f, int n, int data, const double *p, hs_rounded *v, int traced) {
   const int constants = 1 + n + data;
   for (int i = 0; i < data; i++) v[1 + n + i] = rounded(p[i], 0.0, 0.0);

@@ -20,7 +20,7 @@ typedef struct {
   int dimension;
 } hs_place;
 
-/* Evaluate the columns at `count` times of one piece, at most a block; to `out` and further columns behind it. */
+/* Evaluate the columns at `count` times of one piece, at most a block; to `out` and further columns after it. */
 HS_INLINE void evaluate_block(const hs_sampling *s, const hs_place *at, const double *time, int count, double *out) {
   const int w = s->width;
   const double length = at->end - at->begin;
@@ -48,7 +48,7 @@ HS_UNROLLED static void evaluate_piece(const hs_sampling *s, const hs_place *at,
   evaluate_block(s, at, s->time + from, (int)(to - from), s->states + from);
 }
 
-/* The last row not after a time; it is likely to be soon behind `from`. */
+/* The last row not after a time; it is likely to be soon after `from`. */
 HS_INLINE int64_t row_at(const hs_sampling *s, double t, int64_t from) {
   const double *times = s->times;
   int64_t low = from, high = s->rows;
@@ -139,7 +139,7 @@ static int outside(const hs_sampling *s, double *t) {
 }
 
 /* The number of the first time from `i` on that is not between a place's row and the next. */
-HS_UNROLLED static int64_t behind_piece(const hs_sampling *s, const hs_place *at, int64_t i) {
+HS_UNROLLED static int64_t after_piece(const hs_sampling *s, const hs_place *at, int64_t i) {
   while (i < s->samples && at->begin < s->time[i] && s->time[i] < at->end) i++;
   return i;
 }
@@ -161,7 +161,7 @@ int64_t hs_sample(const hs_sampling *s) {
       continue;
     }
     const int64_t start = i;
-    i = behind_piece(s, &at, i);
+    i = after_piece(s, &at, i);
     evaluate_piece(s, &at, start, i);
     for (int64_t k = start; s->outputs && k < i; k++) outputs_between(s, &at, k);
   }

@@ -110,7 +110,7 @@ def _findings(
 
 
 def _turns_true(run: RunView, place: Place, k: int, row: int) -> bool:
-    """Whether comparisons of one event are reached together, behind all of which its condition holds: it fires once."""
+    """Whether comparisons of one event are reached together, beyond all of which its condition holds: it fires once."""
     edges, error = place.mode.edges, run.safe_error(place, row)
     event, late, ahead = edges[k].of_event, run.safe_time_error(place, k, row), 0 * place.t
     if not event:

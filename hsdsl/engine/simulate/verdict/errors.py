@@ -73,7 +73,7 @@ class Errors:
 
     @cached_property
     def _orders(self) -> tuple[set[int], float | None]:
-        """Behind how many transitions the runs are not alike, for these have other orders; and when they part."""
+        """After how many transitions the runs are not alike, for these have other orders; and when they part."""
         return _orders(self.run.transitions, self.finer.transitions, self._slack)
 
     @property
@@ -289,7 +289,7 @@ class _Resets:
         if len(after) != len(target.states):
             self.known, self.kinked = frozenset[str](), {}
             return
-        known = self._known_behind(made, place, k, after)
+        known = self._known_after(made, place, k, after)
         off = zip(target.states, self._off(made, place, k, after), strict=True)
         kinked = {name: e for name, e in off if e and name not in known}
         if self._noted:
@@ -310,7 +310,7 @@ class _Resets:
         before = self._before[made.index]
         return tuple(before.get(name, 0.0) for name in self._run.before(made)[0].mode.states)
 
-    def _known_behind(self, made: Transition, place: Place, k: int, after: State) -> frozenset[str]:
+    def _known_after(self, made: Transition, place: Place, k: int, after: State) -> frozenset[str]:
         """The states that are known after a reset; of those of queues, in the execution that it makes wait."""
         run, edge = self._run, place.mode.edges[k]
         changed = {edge.target_states[i] for i in edge.changes} & self._still

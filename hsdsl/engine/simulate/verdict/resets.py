@@ -124,7 +124,7 @@ def _keeps(run: RunView, made: Transition, k: int, value: Number) -> bool:
         rows = zip(before.mode.states, before.mode.edges[edge].reset_texts, slopes, strict=True)
         if all(text == name for name, text, slope in rows if slope):
             return True  # it depends on no state that its own reset changes
-    here = run.behind(chain, before.x)
+    here = run.after(chain, before.x)
     for after in (near := run.landed_nearby(chain, run.error_before(chain[0]))):
         slopes = after.kernel.gradients[k](after.t, *after.x)[1:]
         change = sum((abs(g * (a - b)) for g, a, b in zip(slopes, after.x, here.x, strict=True)), run.arithmetic.zero)
@@ -256,11 +256,11 @@ def leaves_along(run: RunView, arc: Arc, k: int) -> bool:
         if abs(place.value(k)) > place.roundoff_bound(k) or not _falls(run, arc, k):
             return False
         (before, edge), error = run.before(made), run.error_before(made)
-        near = [run.behind([made], x) for x in before.moved_by(error)]
+        near = [run.after([made], x) for x in before.moved_by(error)]
         value, rate = ALONG * max(abs(at.value(k)) for at in near), ALONG * max(abs(at.rate(k)) for at in near)
         kept = _kept(run, made, k)
         for x in before.along_guard(edge, error):
-            at = run.behind([made], _onto(run, made, k, x) if kept else x)
+            at = run.after([made], _onto(run, made, k, x) if kept else x)
             if abs(at.value(k)) > value + at.roundoff_bound(k) or abs(at.rate(k)) > rate + at.rate_roundoff(k):
                 return False
         return True
@@ -293,7 +293,7 @@ def _kept(run: RunView, made: Transition, k: int) -> bool:
     earlier = run.transitions[arc.jump - 1]
     entered, by = run.before(earlier)
     for x in entered.along_guard(by, run.error_before(earlier)):
-        there = _in_target(run, made, earlier.time, run.behind([earlier], x).x)
+        there = _in_target(run, made, earlier.time, run.after([earlier], x).x)
         if there is None or abs(there.value(k)) > there.roundoff_bound(k):
             return False
     return True

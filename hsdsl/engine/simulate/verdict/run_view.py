@@ -252,7 +252,7 @@ class RunView:
         x, target = place.x if x is None else x, self.problem.program.modes[place.mode.edges[k].target]
         return tails.advance(place.mode, x, target, place.kernel.resets[k](place.t, *x))
 
-    def behind(self, chain: Sequence[Transition], x: State) -> Place:
+    def after(self, chain: Sequence[Transition], x: State) -> Place:
         """Where a state lands that makes some transitions."""
         tails = self.tails_before(chain[0]).copy()
         for made in chain:
@@ -265,7 +265,7 @@ class RunView:
         if self._nearby[0] != asked:
             before, edge = self.before(chain[0])
             near = before.moved_by(error) if chain[0].entry else before.along_guard(edge, error)
-            self._nearby = asked, [self.behind(chain, x) for x in near] if len(chain) <= FOLLOWED else []
+            self._nearby = asked, [self.after(chain, x) for x in near] if len(chain) <= FOLLOWED else []
         return self._nearby[1]
 
     def remembered_alike(self, chain: Sequence[Transition], names: Sequence[str], error: State) -> bool:

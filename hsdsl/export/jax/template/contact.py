@@ -238,7 +238,7 @@ def let_go(model, config, p, lane, event):
 
 
 def past_end(model, config, bound, lane, k, t, x, needed):
-    """How far behind the end of a part of an `if` a point is, at which surface k is above round-off; whether one ends.
+    """How far beyond the end of a part of an `if` a point is, at which surface k is above round-off; whether one ends.
 
     The ends of other parts of it may not be reached yet.
     """

@@ -136,7 +136,7 @@ def start(model, config, mode, x0):
 
 
 def scales_here(model, lane):
-    """The scales of the states of the mode that a run is in; 0 behind them."""
+    """The scales of the states of the mode that a run is in; 0 after them."""
     place = model.of(model.place, lane.mode)
     return jnp.where(place >= 0, lane.scales[place], 0.0)
 

@@ -82,7 +82,7 @@ class Model:
                 self.conditional[j, k] = edge.conditional and k < plain
                 self.loops[j, k] = edge.target == mode.owner and edge.states == mode.states
             self.of_owner[j, :plain] = self.of_held[mode.owner, :plain] = range(plain)
-            for k in range(mode.walls):  # behind what ends an `if`
+            for k in range(mode.walls):  # beyond what ends an `if`
                 self.of_owner[j, own + k], self.of_held[mode.owner, plain + k] = plain + k, own + k
         self.holds = bool((self.contact >= 0).any())
         self.target = np.array([edge.target for edge in edges] or [0])
@@ -95,7 +95,7 @@ class Model:
             self.counts[k, list(edge.counts)] = self.changes[k, list(edge.changes)] = True
             for waiting, *values in edge.queues:
                 self.waiting[k, values], self.at[k, values] = waiting, values[0]
-        # whose outputs a run has behind an edge: a final mode without a flow keeps the states before, and these
+        # whose outputs a run has after an edge: a final mode without a flow keeps the states before, and these
         keepers = [e.source if e.states and not modes[e.target].states else e.target for e in edges]
         self.keeper = np.array(keepers or [0])
 
@@ -140,7 +140,7 @@ class Bound:
         return self.routines.flow(mode, self.p, t, x)
 
     def surfaces(self, mode, t, x):
-        """Values of the surfaces, M numbers, -1 behind those of the mode."""
+        """Values of the surfaces, M numbers, -1 after those of the mode."""
         return self.routines.surfaces(mode, self.p, t, x)
 
     def facts(self, mode, t, x):

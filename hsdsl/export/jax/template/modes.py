@@ -42,7 +42,7 @@ class Mode:
 
 
 class Facts(NamedTuple):
-    """Surfaces at a point: values, -1 behind those of the mode; rates along the flow and ``spans``, the sizes of their
+    """Surfaces at a point: values, -1 after those of the mode; rates along the flow and ``spans``, the sizes of their
     terms; gradients in (t, x), M rows of 1 + W numbers; magnitudes of terms; whether the `if` of each edge holds, true
     of walls.
     """

@@ -56,7 +56,7 @@ class Run(NamedTuple):
     """What a run gives.
 
     Of the first transitions ``times`` says when their guards were reached, ``resumed`` when flow went on, ``edges`` the
-    numbers of their edges (-1 behind the last), ``before`` and ``after`` the states, ``entries`` which fired on entry.
+    numbers of their edges (-1 after the last), ``before`` and ``after`` the states, ``entries`` which fired on entry.
     ``count`` is how many there were. ``stop`` is a number of `STOPS`; the run ended at ``t`` in ``mode`` at ``x``,
     where the outputs are ``outputs``. ``sampled`` has the states at the given times, in ``sampled_mode``. ``rounds``
     counts passes of the loop.

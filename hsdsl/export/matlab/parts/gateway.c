@@ -34,7 +34,7 @@ static double *further(numbers *all, size_t count) {
   return all->number + all->count - count;
 }
 
-/* States, zero behind those of the mode. */
+/* States, zero after those of the mode. */
 static void put(double *to, const hs_real *x, int count) {
   for (int s = 0; s < PROBLEM_WIDTH; s++) to[s] = s < count ? x[s] : 0.0;
 }

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#define BEHIND 4 /* ties of time behind the end, where inputs have the values behind a jump at it */
+#define PAST_END 4 /* ties of time after the end, where inputs have the values after a jump at it */
 
 static int refused_input;
 
@@ -49,7 +49,7 @@ static page_refusal samples_of(const page_input *input, const double *p, double 
 }
 
 /* Write (a, b, c) of the segment from t on: constant before the first and after the last sample. Return how many samples
-   are not behind t. */
+   are not after t. */
 static int line_at(const page_input *input, const double *times, const double *values, double t, double *abc) {
   int low = 0, high = input->count;
   while (low < high) {
@@ -67,7 +67,7 @@ static int line_at(const page_input *input, const double *times, const double *v
   return low;
 }
 
-/* Whether one of these samples is behind a jump between two ramps. */
+/* Whether one of these samples is after a jump between two ramps. */
 static int jumps_within(const double *times, const double *values, int from, int to) {
   for (int k = from > 1 ? from : 1; k < to; k++)
     if (times[k] == times[k - 1] && values[k] != values[k - 1]) return 1;
@@ -136,7 +136,7 @@ static page_refusal cut_at_switch(int i, double until, const page_segments *from
       const double b = c < cuts->count ? cuts->start[c] : end;
       if (c < cuts->count && !(b - a > tie && end - b > tie)) continue;
       double number = number_between(s, data, a, b);
-      if (number != number && k && first >= until) number = before; /* a model need not have a meaning behind its end */
+      if (number != number && k && first >= until) number = before; /* a model need not have a meaning after its end */
       if (to->count > own && same(number, before)) {
         to->end[to->count - 1] = b;
       } else {
@@ -152,7 +152,7 @@ static page_refusal cut_at_switch(int i, double until, const page_segments *from
   return PAGE_RAN;
 }
 
-/* Cut time from 0 to `until` at every sample of every input, and a little behind it. */
+/* Cut time from 0 to `until` at every sample of every input, and a little beyond it. */
 static page_refusal cut_at_samples(const double *p, double until, page_segments *made, page_segments *cuts) {
   static double *own[PAGE_INPUT_COUNT + 1];
   const double *times[PAGE_INPUT_COUNT + 1], *values[PAGE_INPUT_COUNT + 1];
@@ -170,7 +170,7 @@ static page_refusal cut_at_samples(const double *p, double until, page_segments 
   for (int64_t c = 0; c < cuts->count; c++) {
     const double start = cuts->start[c], tie = HS_TIE * until;
     if (c && start == cuts->start[c - 1]) continue;
-    double *row = add_segment(made, start, until > 0 ? until + BEHIND * HS_TIE * until : until, 0, 0);
+    double *row = add_segment(made, start, until > 0 ? until + PAST_END * HS_TIE * until : until, 0, 0);
     if (!row) return PAGE_NO_MEMORY;
     for (int i = 0; i < PROBLEM_PARAMETERS; i++) row[i] = p[i];
     for (int i = PROBLEM_PARAMETERS; i < PROBLEM_DATA; i++) row[i] = 0.0;

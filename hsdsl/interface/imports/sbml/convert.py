@@ -243,7 +243,7 @@ class Converter(Facts):
         return {*TAKEN, *map(self.own, filter(self.is_parameter, self.quantities)), *map(self.spelled, self.functions)}
 
     def ordered(self, names: list[str]) -> list[str]:
-        """Parameters behind those that they use."""
+        """Parameters after those that they use."""
         order: list[str] = []
 
         def visit(name: str) -> None:
@@ -335,7 +335,7 @@ class Converter(Facts):
         return bool(used & (others | {name for name, _ in event.changes if again}))
 
     def sorted_lets(self, let: dict[str, str]) -> dict[str, str]:
-        """Definitions behind those that they use."""
+        """Definitions after those that they use."""
         order: dict[str, str] = {}
 
         def visit(name: str, above: tuple[str, ...] = ()) -> None:

@@ -469,7 +469,7 @@ _SENTENCE = "an initial value is an expression of parameters and of other initia
 
 @dataclass
 class Starts:
-    """The initial values of all instances; ``written`` has each behind those whose states it uses."""
+    """The initial values of all instances; ``written`` has each after those whose states it uses."""
 
     board: Board
     written: dict[str, Any] = field(default_factory=dict)

@@ -15,7 +15,7 @@ pub use ffi::{follow, initial, parameters, MEMORY};
 pub use names::{has_state, mode_name, Edge, Mode, ModeName, Part};
 pub use samples::{Sample, Samples};
 
-/// Values of states; those behind the states of a mode have no meaning.
+/// Values of states; those after the states of a mode have no meaning.
 pub type State = [f64; W];
 
 /// `tolerance` is 0 for a fixed step; `step` of an adaptive method is the first one.
@@ -98,7 +98,7 @@ pub struct Row<'a> {
     /// How many transitions were made before.
     pub jump: u64,
     pub mode: usize,
-    /// Whether the state waits, with `depth` behind a guard.
+    /// Whether the state waits, at `depth` beyond a guard.
     pub strip: bool,
     pub depth: f64,
     pub state: &'a [f64],
