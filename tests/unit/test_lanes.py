@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import math
 from typing import Any
 
 import numpy as np
@@ -135,7 +137,7 @@ def test_transitions_are_made_in_lanes(together: Together, name: str, call: dict
 
 
 def test_four_lanes(together: Together, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(library, "vectors", lambda: ("-mavx2",))
+    monkeypatch.setattr(library, "vectors", lambda: ("-mavx2", "-mfma"))
     model = hsdsl.load(MODELS / "oscillator-with-stop-1.yaml")
     together.compare(model, initial=varied(model), until=25)
     assert together.teams[0].team.stepped <= 4 * together.teams[0].team.steps
@@ -148,6 +150,46 @@ def test_flows(together: Together, flow: str) -> None:
     model = hsdsl.loads(TEXT.replace("FLOW", flow))
     together.compare(model, initial={"x": np.linspace(-0.9, 0.9, COUNT), "y": np.linspace(-2, 2, COUNT)}, samples=9)
     assert together.stepped > 100
+
+
+def aligned(count: int) -> np.ndarray:
+    """Memory for numbers, where vectors may begin."""
+    memory = np.empty(count + 8)
+    return memory[-(memory.ctypes.data // 8) % 8 :][:count]
+
+
+TURNS = """
+#include "lane.h"
+
+HS_EXPORT int turn(const hs_wide *x, hs_wide *sines, hs_wide *cosines, int count) {
+  hs_wide of = wide_all(0.0);
+  int bad = 0, quick = 0;
+  for (int i = 0; i < count; i++) {
+    sines[i] = wide_sin(x[i], &bad), cosines[i] = wide_cos(x[i], &bad);
+    quick += __builtin_popcount(bits_of(quick_sin(x[i], &of))) + __builtin_popcount(bits_of(quick_cos(x[i], &of)));
+  }
+  return bad ? -1 : quick;
+}
+"""
+
+
+@pytest.mark.parametrize("flags", [("-mavx2", "-mfma"), ("-mavx512f", "-mavx512dq", "-mavx512vl")])
+def test_sines_and_cosines_have_the_bits_of_the_library(flags: tuple[str, ...]) -> None:
+    if len(flags) > len(vectors() or ()):
+        pytest.skip("this processor has shorter vectors")
+    turn = library.load(f"turns {flags}", "turn", lambda: [TURNS], flags).turn
+    rng, count = np.random.default_rng(6), 80_000
+    near = np.pi / 2 * rng.integers(-50, 50, count) + rng.normal(0, 1, count) * 2.0 ** rng.integers(-40, -1, count)
+    wide = rng.uniform(-1, 1, count) * 2.0 ** rng.integers(-30, 60, count)
+    special = [0.0, -0.0, math.nan, 2.0**20, 5e-324, 1e300, math.pi / 2, -math.pi]
+    x, sines, cosines = (aligned(3 * count + 8) for _ in range(3))
+    x[:] = np.concatenate((rng.uniform(-4, 4, count), near, wide, special))
+    quick = turn(
+        *(ctypes.c_void_p(part.ctypes.data) for part in (x, sines, cosines)), len(x) // (8 if len(flags) > 2 else 4)
+    )
+    assert np.array([*map(math.sin, x)]).tobytes() == sines.tobytes()
+    assert np.array([*map(math.cos, x)]).tobytes() == cosines.tobytes()
+    assert quick > len(x)  # of two for each
 
 
 def test_lanes_without_a_value_are_left_to_single_runs(together: Together) -> None:

@@ -252,7 +252,7 @@ def compiled(program: Program) -> ctypes.CDLL:
 
 
 LANES = "hs_the_lanes"
-VECTORS = (("avx512f", "avx512dq", "avx512vl"), ("avx2",))  # what a processor must have, and flags
+VECTORS = (("avx512f", "avx512dq", "avx512vl"), ("avx2", "fma"))  # what a processor must have, and flags
 
 
 def compiled_lanes(program: Program, compiles: bool) -> ctypes.CDLL | None:

@@ -75,6 +75,10 @@ HS_INLINE hs_wide wide_smaller(hs_wide least, hs_wide h) {
   return hs_choose(h != h, least, hs_choose(least != least, h, wide_min(h, least)));
 }
 
+HS_INLINE hs_wide wide_low_log2(hs_wide x) {
+  return __builtin_convertvector((hs_mask)x, hs_wide) * 0x1p-52 - 1023;
+}
+
 /* root() in some lanes. */
 HS_INLINE hs_wide root_in(hs_mask lanes, hs_wide x, int m) {
   double numbers[HS_WIDTH];
@@ -100,6 +104,8 @@ HS_INLINE hs_wide wide_div(hs_wide a, hs_wide b, int *bad) {
 
 HS_INLINE hs_wide wide_abs(hs_wide x, int *bad) { return (void)bad, wide_fabs(x); }
 
+#include "lane_math.h"
+
 /* The last few arguments of a function, and what it gave: a step begins where the one before ended. */
 #define KEPT 4
 #define ALL_LANES ((1u << HS_WIDTH) - 1)
@@ -108,7 +114,7 @@ typedef struct {
   int count, next;
 } hs_known;
 
-#define OF_ONE(name)                                                        \
+#define OF_ONE(name, quick)                                                 \
   static hs_wide wide_##name(hs_wide x, int *bad) {                         \
     static __thread hs_known known;                                         \
     hs_wide found = x;                                                      \
@@ -120,6 +126,7 @@ typedef struct {
       left &= ~bits_of(same);                                               \
     }                                                                       \
     if (!left) return found;                                                \
+    left &= ~bits_of(quick(x, &found));                                     \
     double of[HS_WIDTH], to[HS_WIDTH];                                      \
     memcpy(of, &x, sizeof x), memcpy(to, &found, sizeof found);             \
     for (; left; left &= left - 1) {                                        \
@@ -145,9 +152,10 @@ typedef struct {
     for (int i = 0; i < HS_WIDTH; i++) found[i] = hs_##name(x[i], y[i], bad);   \
     return found;                                                               \
   }
-OF_ONE(sin) OF_ONE(cos) OF_ONE(tan) OF_ONE(asin) OF_ONE(acos) OF_ONE(atan)
-OF_ONE(sinh) OF_ONE(cosh) OF_ONE(tanh) OF_ONE(asinh) OF_ONE(acosh) OF_ONE(atanh)
-OF_ONE(exp) OF_ONE(log) EACH(floor) EACH(sign) EACH(heaviside)
+OF_ONE(sin, quick_sin) OF_ONE(cos, quick_cos) OF_ONE(tan, quick_none) OF_ONE(asin, quick_none)
+OF_ONE(acos, quick_none) OF_ONE(atan, quick_none) OF_ONE(sinh, quick_none) OF_ONE(cosh, quick_none)
+OF_ONE(tanh, quick_none) OF_ONE(asinh, quick_none) OF_ONE(acosh, quick_none) OF_ONE(atanh, quick_none)
+OF_ONE(exp, quick_none) OF_ONE(log, quick_none) EACH(floor) EACH(sign) EACH(heaviside)
 OF_TWO(pow) OF_TWO(atan2)
 
 HS_INLINE hs_wide wide_sqrt(hs_wide x, int *bad) {
@@ -167,6 +175,7 @@ HS_INLINE hs_wide wide_sqrt(hs_wide x, int *bad) {
 #define HS_ALL(number) wide_all(number)
 #define fabs wide_fabs
 #define smaller wide_smaller
+#define low_log2 wide_low_log2
 #define hs_min wide_min
 #define hs_max wide_max
 #define hs_div wide_div

@@ -15,6 +15,15 @@ static double power_of_two(int k) {
   memcpy(&power, &bits, sizeof power);
   return power;
 }
+
+/* The logarithm of a normal number to the base 2, or up to 0.09 less. */
+HS_INLINE double low_log2(double x) {
+  int64_t bits;
+  memcpy(&bits, &x, sizeof bits);
+  return (double)bits * 0x1p-52 - 1023;
+}
+#else
+#define low_log2(x) NAN
 #endif
 
 /* exponent / m, rounded down, of exponents of numbers; this division need not wait for the exponent. */

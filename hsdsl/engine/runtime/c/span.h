@@ -31,21 +31,31 @@ HS_INLINE hs_time end_of_step(hs_time t, hs_real *h, hs_time limit) {
   return end;
 }
 
-/* The step at which the first terms of n states that are left out stay below the tolerance, of their scales;
-   not-a-number where all vanish. */
-HS_INLINE hs_real step_of_terms(const hs_real *lines, const hs_real *scales, int n, int order, hs_number tolerance) {
-  hs_real least = HS_ALL(NAN), before = HS_ALL(0.0);
-  for (int m = order; m <= order + 1; m++) {
-    hs_real largest = HS_ALL(0.0);
-    for (int s = 0; s < n; s++) {
-      const hs_real size = tolerance * scales[s];
-      const hs_mask counts = size > HS_NOTHING;
-      largest = hs_choose(counts, hs_max(largest, fabs(lines[(s + 1) * (order + 2) + m]) / size), largest);
-    }
-    const hs_mask shorter = (largest > 0) & ((least != least) | (largest * least > before));
-    if (hs_any(shorter)) least = hs_choose(shorter, smaller(least, root_in(shorter, largest, m)), least);
-    before = largest;
+/* The largest coefficient m of n states, relative to the tolerance of their scales. */
+HS_INLINE hs_real largest_term(const hs_real *lines, const hs_real *scales, int n, int order, hs_number tolerance,
+                               int m) {
+  hs_real largest = HS_ALL(0.0);
+  for (int s = 0; s < n; s++) {
+    const hs_real size = tolerance * scales[s];
+    const hs_mask counts = size > HS_NOTHING;
+    largest = hs_choose(counts, hs_max(largest, fabs(lines[(s + 1) * (order + 2) + m]) / size), largest);
   }
+  return largest;
+}
+
+/* The step at which the first terms of n states that are left out stay below the tolerance, of their scales;
+   not-a-number where all vanish. A root takes long: where logarithms, which are too low by less than an eighth, say that
+   the second one is smaller, it alone is computed. */
+HS_INLINE hs_real step_of_terms(const hs_real *lines, const hs_real *scales, int n, int order, hs_number tolerance) {
+  const hs_real last = largest_term(lines, scales, n, order, tolerance, order);
+  const hs_real next = largest_term(lines, scales, n, order, tolerance, order + 1);
+  const hs_mask digits = (last > HS_NOTHING) & (next > HS_NOTHING);
+  const hs_mask second = digits & (low_log2(next) * order > (low_log2(last) + 0.125) * (order + 1));
+  hs_real least = HS_ALL(NAN);
+  hs_mask shorter = (last > 0) & ~second;
+  if (hs_any(shorter)) least = hs_choose(shorter, root_in(shorter, last, order), least);
+  shorter = (next > 0) & ((least != least) | (next * least > last));
+  if (hs_any(shorter)) least = hs_choose(shorter, smaller(least, root_in(shorter, next, order + 1)), least);
   return least;
 }
 
