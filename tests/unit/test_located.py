@@ -9,6 +9,7 @@ import pytest
 from engines import assert_engines_agree, needs_compiler
 
 import hsdsl
+from hsdsl.engine.simulate.located_steps import SeriesSteps
 
 METHODS = ["taylor", "dopri5"]
 
@@ -135,3 +136,25 @@ experiment: {{until: 1}}
     assert [t.edge for t in made.transitions] == ["go", "clock"]
     assert made.stop.reason == "until"
     assert_engines_agree(hsdsl.loads("hsdsl: 1\n" + text), method="dopri5")
+
+
+def masses(count: int) -> str:
+    """As many masses as given that hit their stops at one instant, each twice in the run."""
+    names = [f"{i}" for i in range(count)]
+    flow = ", ".join(f"x{i}: v{i}, v{i}: 1" for i in names)
+    stops = "".join(f"      - {{when: x{i} >= 1/2, to: move, reset: {{v{i}: -v{i}/2}}}}\n" for i in names)
+    start = ", ".join(f"x{i}: 0, v{i}: 0" for i in names)
+    return f"modes:\n  move:\n    flow: {{{flow}}}\n    transitions:\n{stops}initial: {{mode: move, {start}}}\n"
+
+
+def test_transitions_of_one_instant_share_a_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[float] = []
+    step = SeriesSteps.next
+    monkeypatch.setattr(SeriesSteps, "next", lambda self, *a: made.append(a[0]) or step(self, *a))  # pyright: ignore
+    counts: list[int] = []
+    for count in (1, 5):
+        made.clear()
+        found = run(masses(count) + "experiment: {until: 2.1}\n", method="taylor", engine="python")
+        counts.append(len(made))
+        assert [t.time for t in found.transitions] == pytest.approx([1.0] * count + [2.0] * count, abs=1e-14)
+    assert counts[0] == counts[1]

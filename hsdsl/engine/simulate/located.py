@@ -46,12 +46,29 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
     if isinstance(held, Stop):
         return held
     if held is here:
-        return follow(run, here, here.segment.end)
+        return leads_out(run, here) or follow(run, here, here.segment.end)
     outcome = along_guards(run, here, held)
     still = here.arc.values[-1] == here.x
     for k in in_touch(here, held):
         run.diagnostics.in_contact(here.mode.edges[k].name, here.t, here.arc.times[-1], still)
     return outcome
+
+
+def leads_out(run: Run, here: ModeState) -> Event | None:
+    """The transition where the flow leads out at once, through a guard that the state stands on, to round-off.
+
+    It has stood there since the mode was entered. A step would find it at its start; a series takes long, and knows
+    nothing of steps before.
+    """
+    method, surfaces, t, x, zero = run.settings.method, here.surfaces, here.t, here.x, run.arithmetic.zero
+    if method is None or not method.is_series or not surfaces.active:
+        return None
+    others = set(range(len(here.mode.edges))) - surfaces.active
+    for k in surfaces.standing(t, x, run.tie(t), known=others):
+        if abs(here.kernel.surfaces(t, *x)[k]) <= surfaces.roundoff_bound(k, t, x):
+            chosen, alternatives = choose(here, [Crossing(k, zero, t, x, zero)], run)
+            return Event(chosen, alternatives, t, sizes(x, x, here, stands(here, chosen)))
+    return None
 
 
 def along_guards(run: Run, here: ModeState, held: ModeState) -> Event | ModeState | Stop:

@@ -47,8 +47,6 @@ static int reached(hs_run *run, int k, hs_real slope, hs_crossing *crossing) {
   const int n = *degree_of(&run->curves, 0, k);
   hs_real rate, noise, share = 1.0;
   if (hs_call(&run->here.table->rates[k], run->here.p, span->t1, run->z, &rate)) return RAISED;
-  crossing->time = span->t1;
-  copy(crossing->state, run->z, run->here.dimension);
   if (rate > 0) {
     if (!(slope < 0)) return 0;
     share = turning(c, n);
@@ -57,6 +55,8 @@ static int reached(hs_run *run, int k, hs_real slope, hs_crossing *crossing) {
   } else {
     if (bound_at(run, k, AT_START, &noise)) return RAISED;
     if (!(fabs(run->surfaces.ends[k]) <= noise)) return 0;
+    crossing->time = span->t1;
+    copy(crossing->state, run->z, run->here.dimension);
   }
   const int ends = ends_at(run, k, crossing);
   if (ends != 1) return ends;

@@ -238,7 +238,8 @@ HS_INLINE void put_in(hs_mask lanes, double *column, hs_real number) {
 }
 
 /* Make the transition of edge k in some lanes, and enter its target: see largest(), reset(), place() and enter(). The
-   lanes in which this is all: the state after it is beyond no surface, and none may hold it. */
+   lanes in which this is all: the state after it is beyond no surface, none may hold it, and the flow leads out through
+   no guard: see leads_out(). */
 static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lanes) {
   const hs_mode *const own = &l->modes[l->mode];
   const hs_edge *const edge = &own->edge[k];
@@ -268,6 +269,9 @@ static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lan
     if (bound_with(next, l, j, t, after, weights[j], spread, lanes | ~lanes, &noise)) return lanes & ~lanes;
     lanes &= (values[j] <= noise) & (values[j] > -FAR);
     on[j] = values[j] >= -noise;
+    if (!hs_any(lanes & on[j]) || j >= to->edges) continue;
+    if (next->rates[j].shape(next->rates[j].of, p, t, after, &noise)) return lanes & ~lanes;
+    lanes &= ~(on[j] & (noise > 0));
   }
   lanes &= ~may_hold(l, edge->target, t, after, sizes, on, lanes);
   for (int s = 0; s < m; s++) {

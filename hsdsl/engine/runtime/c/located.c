@@ -242,6 +242,32 @@ static int along_guards(hs_run *run, hs_time limit) {
   }
 }
 
+/* Say whether the flow leads out at once, through a guard that the state stands on, to round-off, as it was entered: then
+   it is crossed (LANDED), as a step would find at its start. Else GOES_ON. */
+static int leads_out(hs_run *run) {
+  const hs_mode_state *here = &run->here;
+  hs_crossing *const first = &run->event.crossings[0];
+  const hs_time t = here->t;
+  int known = 0; /* whether run->surfaces.values and run->surfaces.magnitudes are those here */
+  for (int k = 0; k < here->table->edges; k++) {
+    if (!run->surfaces.active[k]) continue;
+    if (!known && (here->table->values(here->p, t, run->x, run->surfaces.values) ||
+                   magnitudes_at(run, t, run->x, run->surfaces.magnitudes)))
+      break;
+    known = 1;
+    const hs_real noise = bound_from(run, run->surfaces.magnitudes, k, t, run->x, 0);
+    if (!(fabs(run->surfaces.values[k]) <= noise) || !stands_on(run, k, t, run->x, tie(t))) continue;
+    first->edge = k;
+    first->theta = first->depth = 0.0;
+    first->time = t;
+    copy(first->state, run->x, here->dimension);
+    choose(run, 1);
+    sizes(run, run->x, run->event.chosen.state, stands(run, &run->event.chosen) == 1);
+    return LANDED;
+  }
+  return GOES_ON;
+}
+
 /* Flow until a surface is crossed or to the segment's end; along guards that hold the state until one lets go. The
    Python twin is `flow`. */
 static int located_flow(hs_run *run) {
@@ -249,7 +275,10 @@ static int located_flow(hs_run *run) {
   const hs_mode *const own = run->here.table;
   const int n = run->here.dimension, held = contact_at(run);
   if (held != GOES_ON) return held;
-  if (run->here.table == own) return run->lanes.parks ? PARKED : follow(run, limit);
+  if (run->here.table == own) {
+    if (run->here.active && run->method->kind == HS_TAYLOR && leads_out(run) == LANDED) return LANDED;
+    return run->lanes.parks ? PARKED : follow(run, limit);
+  }
   copy(run->contact.began, run->x, n);
   for (int k = 0; k < own->edges; k++) run->contact.held[k] = in_touch(run, k);
   const int outcome = along_guards(run, limit);

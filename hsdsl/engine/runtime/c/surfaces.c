@@ -183,11 +183,10 @@ static int condition(hs_run *run, int k, hs_time t, const hs_real *x) {
   return answer;
 }
 
-/* Whether the flow points out of surface k, beyond the round-off of its rate. */
+/* Whether the flow points out of surface k, beyond the round-off of its rate, which is positive. */
 static int points_out(hs_run *run, int k, hs_time t, const hs_real *x, hs_real rate) {
   const hs_sparse *const row = &run->here.table->gradients[k];
   hs_real size = 0.0;
-  if (!(rate > 0)) return 0;
   if (hs_call(&row->values, run->here.p, t, x, run->gradient)) return 0;
   if (run->here.table->flow(run->here.p, t, x, run->near)) return 0;
   for (int i = 0; i < row->count; i++)
@@ -211,25 +210,30 @@ static int too_late(const hs_run *run, int k, hs_time t, hs_real since) {
   return run->here.table->edge[k].strict && t + since >= run->until;
 }
 
-/* Mark in run->event.tied, beside the edges that are marked, those on whose guards the state stands, with the flow
-   pointing out and `if` true, which are not only touched. On the guard means to round-off, or within the time `since`:
-   sums of steps are no more exact than that. */
+/* Whether the state stands on the guard of edge k, with the flow pointing out and `if` true, and does not only touch it.
+   On the guard means to round-off, or within the time `since`: sums of steps are no more exact than that.
+   run->surfaces.values and run->surfaces.magnitudes are those at x. */
+static int stands_on(hs_run *run, int k, hs_time t, const hs_real *x, hs_real since) {
+  const hs_real r = run->surfaces.values[k];
+  hs_real rate;
+  if (releases(run, k) || too_late(run, k, t, since)) return 0;
+  if (hs_call(&run->here.table->rates[k], run->here.p, t, x, &rate) || !(rate > 0)) return 0;
+  const hs_real noise = bound_from(run, run->surfaces.magnitudes, k, t, x, 0);
+  if (!(fabs(r) <= hs_max(noise, rate * since)) || !points_out(run, k, t, x, rate)) return 0;
+  return !turns_back(run, k, t, x, rate, since, noise - r) && condition(run, k, t, x) == 1;
+}
+
+/* Mark in run->event.tied, beside the edges that are marked, those on whose guards the state stands so. */
 static void standing(hs_run *run, hs_time t, const hs_real *x, hs_real since) {
   const hs_mode *const mode = run->here.table;
   int known = 0; /* whether run->surfaces.values and run->surfaces.magnitudes are those at x */
   for (int k = 0; k < mode->edges; k++) {
-    hs_real rate;
     if (run->event.tied[k]) continue;
     if (!known && (mode->values(run->here.p, t, x, run->surfaces.values) ||
                    magnitudes_at(run, t, x, run->surfaces.magnitudes)))
       return;
     known = 1;
-    if (releases(run, k) || too_late(run, k, t, since) || hs_call(&mode->rates[k], run->here.p, t, x, &rate)) continue;
-    const hs_real noise = bound_from(run, run->surfaces.magnitudes, k, t, x, 0);
-    const int near = fabs(run->surfaces.values[k]) <= hs_max(noise, rate * since);
-    if (!near || !points_out(run, k, t, x, rate)) continue;
-    if (turns_back(run, k, t, x, rate, since, noise - run->surfaces.values[k])) continue;
-    run->event.tied[k] = condition(run, k, t, x) == 1;
+    run->event.tied[k] = stands_on(run, k, t, x, since);
   }
 }
 
