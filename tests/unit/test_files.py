@@ -49,7 +49,7 @@ def replaced(path: Path, text: str) -> None:
 
 
 # The name of a step of loading, and where it is looked up.
-STEPS = ["hsdsl.mathematics.program_cache.find", "hsdsl.language.elaborate.decode", "hsdsl.language.elaborate.compose",
+STEPS = ["hsdsl.mathematics.program_cache.find", "hsdsl.language.elaborate.compose", "hsdsl.language.elaborate.read",
          "hsdsl.mathematics.program_cache.keep",
          "hsdsl.language.elaborate.define_inputs", "hsdsl.mathematics.lower.lower",
          "hsdsl.base.cache.keep", "hsdsl.base.cache.find"]  # fmt: skip

@@ -6,20 +6,22 @@ import pytest
 
 from hsdsl.base.errors import Findings, ModelError, UsageError
 from hsdsl.base.limits import DEFAULT
+from hsdsl.language.diagnosis.yaml_text import Faults
 from hsdsl.language.files import read_bytes
-from hsdsl.language.source import Mapping, Scalar, Sequence, compose, decode
+from hsdsl.language.source import Composer, Mapping, Scalar, Sequence, decode
 
 
 def root(text):
     findings = Findings("m.yaml")
-    node = compose(decode("m.yaml", text.encode()), findings)
+    text = decode("m.yaml", text if isinstance(text, bytes) else text.encode())
+    node = Composer(text, Faults(findings)).document()
     findings.raise_if_any()
     return node
 
 
 def codes(text):
     with pytest.raises(ModelError) as raised:
-        root(text) if isinstance(text, str) else compose(decode("m.yaml", text), Findings("m.yaml"))
+        root(text)
     return [d.code for d in raised.value.diagnostics]
 
 

@@ -4,8 +4,8 @@ Reading goes on without the faults that are found, so that one answer has them a
 
 =============== ===============================================================================
 ``tables.toml`` words of other tools, and what to write here
+``documents``   `reread`: keys and values that the schema refuses; each is taken out, and the rest is read
 ``yaml_text``   what YAML takes for something else; what it cuts apart is joined
-``documents``   keys and values that the schema refuses; each is taken out, and the rest is read
 ``values``      the hint for a value that is of another kind than its key asks for
 ``corrections`` what only the whole document shows: indentation, idioms of other tools, misspelt states
 ``expressions`` signs, words and names of other languages in expressions

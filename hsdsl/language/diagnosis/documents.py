@@ -1,6 +1,6 @@
 """Faults of a document in the language's words: what each key was probably meant to be, and what is missing.
 
-`recovered` takes each fault out of the nodes when it is reported, and reads on: a misspelt key is taken for the one
+`reread` takes each fault out of the nodes when it is reported, and reads on: a misspelt key is taken for the one
 meant, a wrong value for one that nothing more is reported of.
 """
 
@@ -12,13 +12,17 @@ from collections.abc import Collection, Iterable
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from hsdsl.base.errors import Diagnostic, Findings, Span
+from hsdsl.base.errors import Diagnostic, Findings, ModelError, Span
 from hsdsl.base.names import closest, shown
 from hsdsl.language.diagnosis import OTHER_NAMES, TABLES
-from hsdsl.language.diagnosis.corrections import correct
+from hsdsl.language.diagnosis.corrections import correct, rename_states
 from hsdsl.language.diagnosis.values import assigned, undifferentiated
+from hsdsl.language.diagnosis.yaml_text import Faults
+from hsdsl.language.files import ModelFiles
+from hsdsl.language.schema import kind_of, read
 from hsdsl.language.schema.documents import KINDS, SHAPES, ModelDocument, keys_of, plain
 from hsdsl.language.schema.fields import described
+from hsdsl.language.source.compose import Unread, compose
 from hsdsl.language.source.nodes import (
     Key,
     Mapping,
@@ -27,6 +31,7 @@ from hsdsl.language.source.nodes import (
     Scalar,
     Sequence,
     SourceRange,
+    Text,
     absent,
     child,
     descend,
@@ -53,11 +58,29 @@ _OF_AN_INPUT = ("times", "values", "file")  # an input that lacks one is dropped
 _INDISPENSABLE = ("modes", "initial", "experiment")
 
 
-def recovered(root: Node, findings: Findings, kind: type[ModelDocument]) -> ModelDocument:
-    """The document of nodes that have faults, which go to ``findings``.
+def reread(
+    files: ModelFiles, findings: Findings, failure: Unread | ModelError
+) -> tuple[Text, Node, dict[str, bytes], ModelDocument]:
+    """Read a model again where a stage has failed: faults go to ``findings``, the rest is read as it was meant.
 
-    Raises ModelError: when too little is left to be called a model.
+    Raises ModelError: when too little is left to be called a model; the failure, where the document has no fault.
     """
+    text, root, data = compose(files, Faults(findings))
+    try:
+        document = read(root)
+    except Unread:
+        return text, root, data, _recovered(root, findings)
+    elaborated = isinstance(failure, ModelError)
+    if (elaborated or findings.diagnostics) and rename_states(root, findings):
+        document = read(root)
+    elif elaborated:
+        raise failure
+    return text, root, data, document
+
+
+def _recovered(root: Node, findings: Findings) -> ModelDocument:
+    """The document of nodes that have faults."""
+    kind = kind_of(root)
     correct(root, findings)
     faulty: set[NodePath] = set()  # values that are reported, and left out since
     for _ in range(_MOST_READINGS):

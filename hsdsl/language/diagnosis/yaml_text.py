@@ -1,7 +1,7 @@
 """What YAML takes for something else, explained to a person who writes mathematics.
 
-`explain` answers where the parser stops. What it cuts apart in braces and brackets is put together again, so that the
-rest of the model is still read: in ``{v: min(v, 0)}`` the comma ends the value, and ``0)`` becomes a key.
+`Faults` takes the faults of a second reading. What YAML cuts apart in braces and brackets is put together again, so
+that the rest of the model is still read: in ``{v: min(v, 0)}`` the comma ends the value, and ``0)`` becomes a key.
 """
 
 from __future__ import annotations
@@ -53,7 +53,70 @@ _KEY_AND_WORD = re.compile(r"([^\W\d]\w*) +(-?[\w.]+)")
 _MOST_PIECES = 100  # of one expression
 
 
-def explain(text: Text, error: Any) -> Diagnostic:
+class Faults:
+    """What takes the faults of a second reading, which goes on where it can."""
+
+    def __init__(self, findings: Findings) -> None:
+        self.findings, self.report = findings, findings.add
+
+    def stop(self, diagnostic: Diagnostic) -> None:
+        """Report all faults."""
+        self.findings.add(diagnostic)
+        self.findings.raise_if_any()
+
+    def unparsed(self, text: Text, error: Any) -> None:
+        """Explain what stops the parser, a `yaml.MarkedYAMLError`."""
+        self.stop(_explained(text, error))
+
+    def no_anchor(self, name: str, place: SourceRange) -> None:
+        """Explain an alias of nothing: it is a factor."""
+        message = f"`*{name}` is an alias in YAML, and there is no anchor `&{name}` before it"
+        _, line, column = place.start
+        self.stop(place.diagnostic("HS007", message, _quote(place.text.lines[line], column)))
+
+    def strange_key(self, key: Scalar) -> None:
+        """Refuse a key that begins with a blank that is no space, or has a brace: ``initial {mode: A}``."""
+        text, line = key.place.text, key.place.span.line
+        blank = _strange_blank(text, line) if key.value[:1].isspace() else None
+        if fault := blank or (_colon_missing(text, line) if "{" in key.value else None):
+            self.stop(fault)
+
+    def rejoined_items(self, items: list[Node]) -> list[Node]:
+        """The items of a list in brackets, with parts that a comma inside parentheses cut apart joined."""
+        joined: list[Node] = []
+        at = 0
+        while at < len(items):
+            run = _run(items[at : at + _MOST_PIECES])
+            joined.append(_one(run, self.findings))
+            at += len(run)
+        return joined
+
+    def rejoined_entries(self, entries: list[tuple[Node, Node]]) -> list[tuple[Node, Node]]:
+        """The entries of a mapping in braces, with parts that a comma inside parentheses cut apart joined.
+
+        Before that ``name:value`` and ``name value``, keys to YAML, become entries again.
+        """
+        entries = [_spaced(key, value, self.findings) for key, value in entries]
+        joined: list[tuple[Node, Node]] = []
+        at = 0
+        while at < len(entries):
+            key, value = entries[at]
+            pieces: list[Node] = [value]
+            for name, rest in entries[at + 1 : at + _MOST_PIECES]:
+                if not is_bare(rest):
+                    break
+                pieces.append(name)
+            if is_bare(value):  # a call in place of a name, such as `reinit(v, -c*v)`
+                run = _run([key, *pieces[1:]])
+                joined.append((_joined(run), value))
+            else:
+                run = pieces[:2] if _decimal(pieces) else _run(pieces)
+                joined.append((key, _one(run, self.findings)))
+            at += len(run)
+        return joined
+
+
+def _explained(text: Text, error: Any) -> Diagnostic:
     """The diagnostic for a fault that stops the YAML parser, a `yaml.MarkedYAMLError`."""
     problem, context = error.problem or "", error.context or ""
     marks: list[Any] = [mark for mark in (error.problem_mark, error.context_mark) if mark]
@@ -77,13 +140,6 @@ def explain(text: Text, error: Any) -> Diagnostic:
     if "could not find expected ':'" in problem:
         return text.fault("HS004", _NEITHER, *opened, _with_colon(text.lines[opened[0] - 1]), _WHOLE_LINE)
     return _in_brackets(text, here, opened) if "flow" in context else _in_block(text, problem, *here)
-
-
-def strange_key(text: Text, key: Scalar) -> Diagnostic | None:
-    """The diagnostic for a key that begins with a blank that is no space, or has a brace: ``initial {mode: A}``."""
-    line = key.place.span.line
-    blank = _strange_blank(text, line) if key.value[:1].isspace() else None
-    return blank or (_colon_missing(text, line) if "{" in key.value else None)
 
 
 def _strange_blank(text: Text, line: int) -> Diagnostic | None:
@@ -218,11 +274,11 @@ def _misread(text: Text, line: int, column: int) -> Diagnostic:
         message, hint = _NOT_VALID
         return text.fault("HS004", message, line, column, hint)
     message = f"a value that begins with `{first}` is {_MEANS[first]} in YAML"
-    hint = "quote the whole expression, or none of it" if first in "'\"" else quote(content, start)
+    hint = "quote the whole expression, or none of it" if first in "'\"" else _quote(content, start)
     return text.fault("HS007", message, line, start + 1, hint, _WHOLE_LINE)
 
 
-def quote(content: str, start: int) -> str:
+def _quote(content: str, start: int) -> str:
     """The hint to quote what begins somewhere in a line, with the form where its end is known."""
     value = content[start:].strip()
     if set(content[:start]) & set("{[") or set(value) & set('"\\#'):
@@ -240,42 +296,6 @@ def _line(text: Text, line: int) -> str:
 
 def _character(text: Text, line: int, column: int) -> str:
     return _line(text, line)[column - 1 : column]
-
-
-def rejoined_items(items: list[Node], findings: Findings) -> list[Node]:
-    """The items of a list in brackets, with parts that a comma inside parentheses cut apart joined."""
-    joined: list[Node] = []
-    at = 0
-    while at < len(items):
-        run = _run(items[at : at + _MOST_PIECES])
-        joined.append(_one(run, findings))
-        at += len(run)
-    return joined
-
-
-def rejoined_entries(given: list[tuple[Node, Node]], findings: Findings) -> list[tuple[Node, Node]]:
-    """The entries of a mapping in braces, with parts that a comma inside parentheses cut apart joined.
-
-    Before that ``name:value`` and ``name value``, keys to YAML, become entries again.
-    """
-    entries = [_spaced(key, value, findings) for key, value in given]
-    joined: list[tuple[Node, Node]] = []
-    at = 0
-    while at < len(entries):
-        key, value = entries[at]
-        pieces: list[Node] = [value]
-        for name, rest in entries[at + 1 : at + _MOST_PIECES]:
-            if not is_bare(rest):
-                break
-            pieces.append(name)
-        if is_bare(value):  # a call in place of a name, such as `reinit(v, -c*v)`
-            run = _run([key, *pieces[1:]])
-            joined.append((_joined(run), value))
-        else:
-            run = pieces[:2] if _decimal(pieces) else _run(pieces)
-            joined.append((key, _one(run, findings)))
-        at += len(run)
-    return joined
 
 
 def _decimal(pieces: list[Node]) -> bool:

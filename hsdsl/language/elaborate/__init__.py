@@ -1,7 +1,7 @@
 # pyright: basic
 """Text to mathematics: names resolved, everything substituted, every error reported.
 
-`elaborate_files` is the way of a right model: decode, compose, read, elaborate. A document goes through these, in this
+`elaborate_files` is the way of a right model: compose, read, elaborate. A document goes through these, in this
 order; `symbols` has what its names mean, and reads its expressions.
 
 ================= ===========================================================================
@@ -39,7 +39,6 @@ from hsdsl.language.elaborate.experiment import elaborate_experiment, elaborate_
 from hsdsl.language.elaborate.inputs import define_inputs, switch_name
 from hsdsl.language.elaborate.modes import elaborate_modes, elaborate_outputs, elaborate_scene, scene_of
 from hsdsl.language.elaborate.parts import Parts
-from hsdsl.language.elaborate.parts.instances import read_automata
 from hsdsl.language.elaborate.symbols import SymbolTable, resolved_expression
 from hsdsl.language.expression.parse import ExpressionError
 from hsdsl.language.expression.scope import Meaning, Refusal, Scope, Value, symbol
@@ -47,7 +46,7 @@ from hsdsl.language.expression.timebox import PARTS, OutOfTime, deep_stack, time
 from hsdsl.language.files import ModelFiles
 from hsdsl.language.schema import read
 from hsdsl.language.schema.documents import AutomatonDocument, ModelDocument, SystemDocument
-from hsdsl.language.source import Node, Text, compose, decode
+from hsdsl.language.source import Node, Text, Unread, compose
 from hsdsl.language.system import HybridSystem, switch_parameter
 
 __all__ = ["Elaboration", "drivable", "elaborate", "elaborate_files", "parameter_expression"]
@@ -100,22 +99,16 @@ def elaborate_files(files: ModelFiles, *, drivable: bool = False) -> Elaboration
     """
     findings = Findings(files.path)
     with limits.applied(files.limits):
-        text = decode(files.path, files.text)
-        root = compose(text, findings)
-        data = read_automata(root, files, findings)
-        known = dict(findings.diagnostics)
-        document = read(root, findings)
-        well_formed = findings.diagnostics == known
         try:
-            return _elaborated(SymbolTable(document, findings, files, data=data, drivable=drivable), root, text)
-        except ModelError:
-            from hsdsl.language.diagnosis.corrections import rename_states
+            text, root, data = compose(files)
+            return _elaborated(SymbolTable(read(root), findings, files, data=data, drivable=drivable), root, text)
+        except (Unread, ModelError) as error:
+            failure = error
+        from hsdsl.language.diagnosis.documents import reread  # what was meant, where a stage has failed
 
-            findings = Findings(files.path, known)
-            if not (well_formed and rename_states(root, findings)):
-                raise
-            document = read(root, findings)  # the same with other names of states
-            return _elaborated(SymbolTable(document, findings, files, data=data, drivable=drivable), root, text)
+        findings = Findings(files.path)
+        text, root, data, document = reread(files, findings, failure)
+        return _elaborated(SymbolTable(document, findings, files, data=data, drivable=drivable), root, text)
 
 
 def _elaborated(symbols: SymbolTable, root: Node, text: Text) -> Elaboration:

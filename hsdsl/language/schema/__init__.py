@@ -8,20 +8,22 @@ from __future__ import annotations
 
 from pydantic import ValidationError
 
-from hsdsl.base.errors import Findings
 from hsdsl.language.schema.documents import ModelDocument, SystemDocument, plain
+from hsdsl.language.source.compose import Unread
 from hsdsl.language.source.nodes import Node, keys
 
 
-def read(root: Node, findings: Findings) -> ModelDocument:
-    """The document of a YAML file; of one with faults, which go to ``findings``, what can still be read.
+def kind_of(root: Node) -> type[ModelDocument]:
+    """The kind of document that a YAML file is."""
+    return SystemDocument if {"system", "automata"} & set(map(str, keys(root))) else ModelDocument
 
-    Raises ModelError: when too little is left to be called a model.
+
+def read(root: Node) -> ModelDocument:
+    """The document of a YAML file.
+
+    Raises Unread: at a key or a value that may not stand where it does.
     """
-    kind = SystemDocument if {"system", "automata"} & set(map(str, keys(root))) else ModelDocument
     try:
-        return kind.model_validate(plain(root))
+        return kind_of(root).model_validate(plain(root))
     except ValidationError:
-        from hsdsl.language.diagnosis.documents import recovered
-
-        return recovered(root, findings, kind)
+        raise Unread from None

@@ -1,6 +1,6 @@
 """YAML files as nodes with a line and a column: the core rules of YAML 1.2, capped before anything recurses."""
 
-from hsdsl.language.source.compose import compose
+from hsdsl.language.source.compose import Composer, Unread, compose
 from hsdsl.language.source.nodes import (
     ABSENT,
     Key,
@@ -21,6 +21,6 @@ from hsdsl.language.source.nodes import (
 )
 
 __all__ = [
-    "ABSENT", "Key", "Mapping", "Node", "NodePath", "Scalar", "Sequence", "SourceRange", "Text", "absent", "child",
-    "children", "compose", "decode", "descend", "is_empty", "keys",
+    "ABSENT", "Composer", "Key", "Mapping", "Node", "NodePath", "Scalar", "Sequence", "SourceRange", "Text", "Unread",
+    "absent", "child", "children", "compose", "decode", "descend", "is_empty", "keys",
 ]  # fmt: skip

@@ -11,8 +11,9 @@ from typing import Any
 import yaml
 
 from hsdsl.base import limits
-from hsdsl.base.errors import Diagnostic, Findings, ModelError, Span
+from hsdsl.base.errors import Span
 from hsdsl.base.names import INVISIBLE, is_identifier, normalised, shown
+from hsdsl.language.files import DataRefused, ModelFiles
 from hsdsl.language.source.nodes import (
     DEEPEST,
     TOO_DEEP,
@@ -24,30 +25,45 @@ from hsdsl.language.source.nodes import (
     SourceRange,
     Text,
     absent,
+    child,
+    decode,
     is_bare,
 )
 
 _Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_ABOUT = ("hsdsl", "title", "source")  # keys that a file may have and that say nothing about its automaton
 
 
-def compose(text: Text, findings: Findings) -> Node:
-    """The root node of a document.
+class Unread(Exception):
+    """A document is not as it should be: `hsdsl.language.diagnosis` reads it again, and says what is wrong."""
 
-    Faults that leave the document readable go to ``findings``.
 
-    Raises ModelError: when the text is not YAML, breaks a cap, or is empty.
+def compose(files: ModelFiles, faults: Any = None) -> tuple[Text, Node, dict[str, bytes]]:
+    """The text of a model, its root node, with automata of files in their places, and the bytes of these files.
+
+    Raises Unread: at the first fault, unless ``faults`` takes it.
+    Raises ModelError: a file is too large or is no text.
     """
-    parser = _Parser(text.content)
-    try:
-        return _Composer(text, parser, findings).document()
-    except yaml.MarkedYAMLError as error:
-        from hsdsl.language.diagnosis.yaml_text import explain
-
-        findings.add(explain(text, error))
-        findings.raise_if_any()
-        raise
-    finally:
-        parser.dispose()
+    text, data = decode(files.path, files.text), dict[str, bytes]()
+    composer = Composer(text, faults)
+    root = composer.document()
+    automata = child(root, "automata")
+    for key, entry in list(automata) if isinstance(automata, Mapping) else ():
+        name = child(entry, "file")
+        if not isinstance(name, Scalar) or not isinstance(entry, Mapping) or len(entry.entries) > 1:
+            continue
+        try:
+            content = data.setdefault(name.value, files.content(name.value))
+        except DataRefused as refusal:
+            composer.faults.report(name.place.diagnostic(refusal.code, refusal.message, refusal.hint))
+            continue
+        inner = Composer(decode(str(files.folder / name.value), content), faults).document()
+        if isinstance(inner, Mapping):
+            for about in _ABOUT:
+                inner.entries.pop(about, None)
+        assert isinstance(automata, Mapping)
+        automata.entries[str(key)] = (key, inner)
+    return text, root, data
 
 
 def _is_strange(entry: tuple[Node, Node]) -> bool:
@@ -61,34 +77,50 @@ def _is_cut(item: Node) -> bool:
     return isinstance(item, Scalar) and item.plain and item.value.count("(") > item.value.count(")")
 
 
-class _Composer:
-    """One reading of one stream of events."""
+class Composer:
+    """One reading of one stream of events; it raises `Unread` at the first fault, unless ``faults`` takes it."""
 
-    def __init__(self, text: Text, parser: Any, findings: Findings) -> None:
+    def __init__(self, text: Text, faults: Any = None) -> None:
         self.text = text
-        self.parser = parser
-        self.findings = findings
+        self._faults = faults
+        self.parser = _Parser(text.content)
         self.depth = 0
         self.count = 0
         self.limits = limits.current()
         self.anchors: dict[str, tuple[Node | None, int, int]] = {}  # node (None while open), nodes, height
         self.unused: dict[str, Any] = {}
 
+    @property
+    def faults(self) -> Any:
+        """What takes faults, where it can go on after them."""
+        if self._faults is None:
+            raise Unread
+        return self._faults
+
     def document(self) -> Node:
         """The only document of the stream."""
+        try:
+            return self._document()
+        except yaml.MarkedYAMLError as error:
+            self.faults.unparsed(self.text, error)
+            raise
+        finally:
+            self.parser.dispose()
+
+    def _document(self) -> Node:
         self.parser.get_event()
         if self.parser.check_event(yaml.StreamEndEvent):
             span = Span(self.text.path, 1, 1)
-            self._stop(self.text.diagnostic("HS011", "the file is empty", span, "a model begins with 'hsdsl: 1'"))
+            self.faults.stop(self.text.diagnostic("HS011", "the file is empty", span, "a model begins with 'hsdsl: 1'"))
         self.parser.get_event()
         root, _, _ = self.node()
         self.parser.get_event()
         if not self.parser.check_event(yaml.StreamEndEvent):
             place = self._place(self.parser.peek_event())
-            self._stop(place.diagnostic("HS010", "a second document begins here", "a file holds one model"))
+            self.faults.stop(place.diagnostic("HS010", "a second document begins here", "a file holds one model"))
         for name, event in self.unused.items():
             message = f"`&{name}` is an anchor in YAML, and nothing refers to it"
-            self.findings.add(self._place(event).diagnostic("HS007", message, "quote this expression"))
+            self.faults.report(self._place(event).diagnostic("HS007", message, "quote this expression"))
         return root
 
     def node(self) -> tuple[Node, int, int]:
@@ -102,7 +134,7 @@ class _Composer:
         if event.tag is not None:
             message = f"`{shown(event.tag)}` is a tag in YAML, and models have no tags"
             hint = "quote this expression; a condition is negated with `not`"
-            self.findings.add(self._place(event).diagnostic("HS009", message, hint))
+            self.faults.report(self._place(event).diagnostic("HS009", message, hint))
         self._grow(event, 1, 1)
         if isinstance(event, yaml.ScalarEvent):
             measured: tuple[Node, int, int] = (self._scalar(event), 1, 1)
@@ -122,7 +154,7 @@ class _Composer:
         hidden = INVISIBLE.search(event.value)
         if hidden:
             message = f"this escape is the invisible character U+{ord(hidden.group()):04X}"
-            self.findings.add(self._place(event).diagnostic("HS002", message, "remove it"))
+            self.faults.report(self._place(event).diagnostic("HS002", message, "remove it"))
             return Scalar(INVISIBLE.sub("", event.value), False, self._place(event))
         return Scalar(event.value, event.style is None or event.style == "", self._place(event))
 
@@ -135,9 +167,7 @@ class _Composer:
             nodes, height = nodes + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
         if event.flow_style and any(map(_is_cut, items)):
-            from hsdsl.language.diagnosis.yaml_text import rejoined_items
-
-            items = rejoined_items(items, self.findings)
+            items = self.faults.rejoined_items(items)
         return Sequence(tuple(items), place), nodes, height + 1
 
     def _mapping(self, event: Any) -> tuple[Node, int, int]:
@@ -150,31 +180,26 @@ class _Composer:
             if len(entries) > self.limits.modes:
                 message = f"a mapping has at most {self.limits.modes:,} entries, and here one has more"
                 hint = f"allow more with --limit modes={self.limits.modes * 10}"
-                self._stop(key.place.diagnostic("HS016", message, hint))
+                self.faults.stop(key.place.diagnostic("HS016", message, hint))
             nodes, height = nodes + more_keys + more, max(height, tall)
         place = self._place(event, self.parser.get_event())
         if event.flow_style and any(map(_is_strange, entries)):
-            from hsdsl.language.diagnosis.yaml_text import rejoined_entries
-
-            entries = rejoined_entries(entries, self.findings)
+            entries = self.faults.rejoined_entries(entries)
         return Mapping(self._unique(entries), place), nodes, height + 1
 
     def _unique(self, entries: list[tuple[Node, Node]]) -> dict[str, tuple[Key, Node]]:
         unique: dict[str, tuple[Key, Node]] = {}
         for node, value in entries:
             if not isinstance(node, Scalar) or node.kind == "null":
-                self.findings.add(node.place.diagnostic("HS013", "a key must be a word", "quote it if it is one"))
+                self.faults.report(node.place.diagnostic("HS013", "a key must be a word", "quote it if it is one"))
                 continue
             if node.plain and (node.value[:1].isspace() or "{" in node.value):
-                from hsdsl.language.diagnosis.yaml_text import strange_key
-
-                if fault := strange_key(self.text, node):
-                    self._stop(fault)
+                self.faults.strange_key(node)
             key = Key.at(normalised(node.value), node.place)
             if key in unique:
                 line = unique[key][0].place.span.line
                 message = f"the key '{shown(key)}' is repeated; line {line} has the first one"
-                self.findings.add(node.place.diagnostic("HS008", message, "keep one of them"))
+                self.faults.report(node.place.diagnostic("HS008", message, "keep one of them"))
                 continue
             unique[str(key)] = (key, value)
         return unique
@@ -183,16 +208,12 @@ class _Composer:
         name = event.anchor
         place = self._place(event)
         if name not in self.anchors:
-            message = f"`*{name}` is an alias in YAML, and there is no anchor `&{name}` before it"
-            from hsdsl.language.diagnosis.yaml_text import quote
-
-            _, line, column = place.start
-            self._stop(place.diagnostic("HS007", message, quote(self.text.lines[line], column)))
+            self.faults.no_anchor(name, place)
         node, nodes, height = self.anchors[name]
         self.unused.pop(name, None)
         if node is None:
-            self._stop(place.diagnostic("HS012", f"`*{name}` is inside the value that it repeats"))
-            raise AssertionError
+            self.faults.stop(place.diagnostic("HS012", f"`*{name}` is inside the value that it repeats"))
+        assert node is not None
         self._grow(event, nodes, height)
         return node, nodes, height
 
@@ -201,15 +222,10 @@ class _Composer:
         if self.count > self.limits.values:
             message = f"the file has more than {self.limits.values:,} values once its aliases are expanded"
             hint = f"keep data in CSV files, or allow more with --limit values={self.limits.values * 10}"
-            self._stop(self._place(event).diagnostic("HS015", message, hint))
+            self.faults.stop(self._place(event).diagnostic("HS015", message, hint))
         if self.depth + height > DEEPEST:
-            self._stop(self._place(event).diagnostic("HS014", TOO_DEEP))
+            self.faults.stop(self._place(event).diagnostic("HS014", TOO_DEEP))
 
     def _place(self, event: Any, last: Any = None) -> SourceRange:
         start, end = event.start_mark, (last or event).end_mark
         return SourceRange(self.text, (start.index, start.line, start.column), (end.index, end.line, end.column))
-
-    def _stop(self, diagnostic: Diagnostic) -> None:
-        self.findings.add(diagnostic)
-        self.findings.raise_if_any()
-        raise ModelError([diagnostic])

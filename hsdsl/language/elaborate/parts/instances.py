@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from hsdsl.base.errors import Findings
 from hsdsl.base.names import closest, did_you_mean, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.symbols import KINDS, SymbolTable
-from hsdsl.language.files import DataRefused, ModelFiles
 from hsdsl.language.schema.documents import AutomatonDocument, InstanceDocument, PartModeDocument, SystemDocument
-from hsdsl.language.source import ABSENT, Key, Mapping, Node, Scalar, child, compose, decode
+from hsdsl.language.source import ABSENT, Key, Scalar
 
 MOST = 10_000  # of one name
 ANY = "*"  # among names that are at fault: an instance of which automaton is not known
@@ -208,28 +206,3 @@ def _check_start(symbols: SymbolTable, one: Instance) -> None:
         noun, verb = ("states", "have") if len(lacking) > 1 else ("state", "has")
         message = f"the {noun} {names} of '{one.key}' {verb} no initial value"
         symbols.report(one.key.place, "HS308", message, "add " + ", ".join(f"{state}: ..." for state in lacking))
-
-
-_ABOUT = ("hsdsl", "title", "source")  # keys that a file may have and that say nothing about the automaton
-
-
-def read_automata(root: Node, files: ModelFiles, findings: Findings) -> dict[str, bytes]:
-    """Put automata of files in their places; the content of the files, by name."""
-    automata = child(root, "automata")
-    found: dict[str, bytes] = {}
-    for key, entry in list(automata) if isinstance(automata, Mapping) else ():
-        name = child(entry, "file")
-        if not isinstance(name, Scalar) or not isinstance(entry, Mapping) or len(entry.entries) > 1:
-            continue
-        try:
-            content = found.setdefault(name.value, files.content(name.value))
-        except DataRefused as refusal:
-            findings.add(name.place.diagnostic(refusal.code, refusal.message, refusal.hint))
-            continue
-        inner = compose(decode(str(files.folder / name.value), content), findings)
-        if isinstance(inner, Mapping):
-            for about in _ABOUT:
-                inner.entries.pop(about, None)
-        assert isinstance(automata, Mapping)
-        automata.entries[str(key)] = (key, inner)
-    return found
