@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import types
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from fractions import Fraction
@@ -32,6 +32,7 @@ _PACKAGE = Path(__file__).parents[1]
 _READERS = ("base", "language", "mathematics", "analysis/sensitivity", "interface/model")  # what a program depends on
 _PIECES: dict[str, Any] = {name: kind for name, kind in vars(declared).items() if is_dataclass(kind)}
 LIST, LONG = "", 16  # the name of a row that is a list, and from how many items on a list is a row
+_ATOMS = {str, int, float, bool, type(None)}
 Row = list[Any]
 Part = tuple[tuple[str, ...], ...]  # names that a model is reduced to, and then those that the rest is reduced to
 SLIDING = ("", "sliding")  # in their place: the model with a mode for each surface that two modes press on
@@ -90,7 +91,7 @@ def _verified(entry: dict[str, Any], files: ModelFiles) -> tuple[Program, ModelF
 def keep(files: ModelFiles, program: Program, part: Part = ()) -> None:
     """Keep a program, where the cache can be written."""
     checksums = {name: _checksum(content) for name, content in (files.data or {}).items()}
-    text = json.dumps({"files": checksums, "rows": _rows(program)}, separators=(",", ":"))
+    text = f'{{"files":{json.dumps(checksums)},"rows":[{",".join(_rows(program))}]}}'
 
     def write(target: Path) -> None:
         target.write_text(text)
@@ -103,33 +104,39 @@ def _checksum(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _rows(program: Program) -> list[Row]:
-    """A program as rows of JSON data: the name of a piece's type and its fields, after the rows that they name."""
-    rows: list[Row] = []
+def _rows(program: Program) -> Iterable[str]:
+    """A program as JSON, row by row: the name of a piece's type and its fields, after the rows that they name."""
     numbers: dict[str, int] = {}
     long: dict[int, int] = {}  # lists, by the objects: every edge has the states of its target
+    written = json.JSONEncoder(separators=(",", ":")).encode
 
     def plain(value: Any) -> Any:
-        if value is None or type(value) in (str, int, float, bool):
-            return value
         if isinstance(value, Fraction):
             return f"{value.numerator}/{value.denominator}"
         if isinstance(value, (tuple, list)):
-            if len(value) >= LONG and id(value) not in long:  # pyright: ignore[reportUnknownArgumentType]
-                long[id(value)] = kept([LIST, *map(plain, value)])  # pyright: ignore[reportUnknownArgumentType]
-            return long[id(value)] if id(value) in long else [*map(plain, value)]  # pyright: ignore[reportUnknownArgumentType]
+            if len(value) < LONG:  # pyright: ignore[reportUnknownArgumentType]
+                return every(value)  # pyright: ignore[reportUnknownArgumentType]
+            if id(value) not in long:  # pyright: ignore[reportUnknownArgumentType]
+                long[id(value)] = kept([LIST, *every(value)])  # pyright: ignore[reportUnknownArgumentType]
+            return long[id(value)]  # pyright: ignore[reportUnknownArgumentType]
         if not is_dataclass(value):
             return value
-        return kept([type(value).__name__, *(plain(getattr(value, field.name)) for field in fields(value))])
+        kind = type(value)
+        return kept([kind.__name__, *every(getattr(value, name) for name in _fields(kind))])
+
+    def every(values: Iterable[Any]) -> Row:
+        return [value if type(value) in _ATOMS else plain(value) for value in values]
 
     def kept(row: Row) -> int:
-        number = numbers.setdefault(json.dumps(row), len(rows))
-        if number == len(rows):
-            rows.append(row)
-        return number
+        return numbers.setdefault(written(row), len(numbers))
 
     plain(program)
-    return rows
+    return numbers
+
+
+@cache
+def _fields(kind: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
 
 
 def _read(rows: list[Row]) -> Program:
@@ -137,7 +144,7 @@ def _read(rows: list[Row]) -> Program:
     pieces: list[Any] = []
     for name, *row in rows:
         if name == LIST:
-            pieces.append(row)
+            pieces.append((row, {}))
             continue
         kind = _PIECES[name]
         pieces.append(kind(*(read(item, pieces) for read, item in zip(_decoders(kind), row, strict=True))))
@@ -164,7 +171,12 @@ def _decoder(kind: Any) -> Decoder:
         one = _decoder(arguments[0])
 
         def read(value: Any, pieces: list[Any]) -> tuple[Any, ...]:
-            return tuple([one(item, pieces) for item in (pieces[value] if type(value) is int else value)])
+            if type(value) is not int:
+                return tuple([one(item, pieces) for item in value])
+            row, made = pieces[value]
+            if read not in made:  # many pieces name one list
+                made[read] = read(row, pieces)
+            return made[read]
 
         return read
     if origin in (Union, types.UnionType):

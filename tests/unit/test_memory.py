@@ -125,3 +125,13 @@ def test_chunks_gathered_are_the_columns_of_one_chunk(name, monkeypatch):
     monkeypatch.setattr(output_buffers, "LEAST_ROWS", 16)
     parts = hsdsl.load(MODELS / f"{name}.yaml").simulate(engine="c")
     assert parts == whole and parts.transitions == whole.transitions
+
+
+@needs_compiler
+def test_transitions_at_one_instant_take_no_memory_for_steps_between_them():
+    model = WIDE.replace("}}}\n", "}, transitions: [{when: x0 <= 0, to: m, reset: {x0: x0 + 1}}]}}\n").replace(
+        "x0: 0", "x0: -4000"
+    )
+    run = hsdsl.loads(model, limits=Limits(memory=20_000_000)).simulate(step=0.25, method="taylor", max_transitions=1e6)
+    assert run.stop.reason == "until" and len(run.transitions) == 4000
+    assert run.values[-1, 0] == 1 and not run.coefficients[:4000].any() and run.coefficients[4000:-1, 0].all()

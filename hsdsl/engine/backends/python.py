@@ -20,7 +20,10 @@ from hsdsl.mathematics.program import EdgeProgram, Program, Routines
 
 
 class PythonKernel:
-    """A program over one number type. Modes are compiled when they are first entered."""
+    """A program over one number type. Modes are compiled when they are first entered.
+
+    ``constants`` are the routines of ``Program.constants`` by name.
+    """
 
     def __init__(self, program: Program, arithmetic: Arithmetic) -> None:
         self.arithmetic = arithmetic
@@ -33,7 +36,7 @@ class PythonKernel:
         self._switches: dict[str, Callable[..., tuple[Routine, ...]]] = {}
         self._bound: dict[int, tuple[Sequence[Number], ModeKernel]] = {}
         constants = compile_routines(program.constants, arithmetic, "constants")
-        self._constants = dict(zip(program.constants.names, constants(), strict=True))
+        self.constants = dict(zip(program.constants.names, constants(), strict=True))
 
     @property
     def enclosing(self) -> PythonKernel:
@@ -50,7 +53,7 @@ class PythonKernel:
 
     def constant(self, name: str, parameters: Sequence[Number]) -> Vector:
         """Evaluate one of ``Program.constants``' routines at parameter values."""
-        return self._constants[name](*parameters)
+        return self.constants[name](*parameters)
 
     def switching(self, data: Sequence[Number]) -> dict[str, Routine]:
         """Return the routines of ``Program.switching`` by name."""
@@ -67,10 +70,6 @@ class PythonKernel:
         if arithmetic.name not in self._switches:
             self._switches[arithmetic.name] = compile_routines(routines, arithmetic, "switches")
         return dict(zip(routines.names, self._switches[arithmetic.name](*data), strict=True))
-
-    def has_constant(self, name: str) -> bool:
-        """Whether the program gives this constant."""
-        return name in self._constants
 
     def bind(self, mode: int, data: Sequence[Number]) -> ModeKernel:
         """Bind a mode to parameter values and input segments; the last binding of each mode is kept."""
@@ -223,12 +222,14 @@ def conjunction(parts: Sequence[Callable[..., tuple[bool, ...]]]) -> Callable[..
 
 LOST = (*DOMAIN_ERRORS, UnboundLocalError)  # no value, also where a name is used whose statement had none
 _CONSTANT = re.compile(r"\bq_(m?)(\d+)_(\d+)\b")
+_DEFINITION = re.compile(r"^    def \w+\(", re.MULTILINE)
 
 
 def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> Callable[..., tuple[Routine, ...]]:
     """Compile generated text; returns its ``bind``.
 
-    Floats are written into the text as literals (the interpreter is fastest on those); other numbers are names.
+    Floats are written into the text as literals (the interpreter is fastest on those); other numbers are names. Each
+    routine is put into a list as it is made: Python compiles n functions with names of their own in n**2 steps.
     """
     namespace: dict[str, Any] = {"__builtins__": {}, "inf": float("inf"), "LOST": LOST, **arithmetic.functions}
     literal = arithmetic.name == "float64"
@@ -240,7 +241,10 @@ def compile_routines(routines: Routines, arithmetic: Arithmetic, name: str) -> C
         namespace[match[0]] = value
         return match[0]
 
-    exec(compile(_CONSTANT.sub(replace, routines.source), f"<hsdsl {name}>", "exec"), namespace)
+    head, text = routines.source.split("\n", 1)
+    inner = _DEFINITION.sub("    @made.append\n    def routine(", text[: text.rindex("    return ")])
+    source = f"{head}\n    made = []\n{_CONSTANT.sub(replace, inner)}    return (*made,)\n"
+    exec(compile(source, f"<hsdsl {name}>", "exec"), namespace)
     return namespace["bind"]
 
 

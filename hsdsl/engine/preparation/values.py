@@ -111,7 +111,7 @@ class Values:
 
     def has(self, name: str) -> bool:
         """Whether the file gives this constant."""
-        return self.kernel.has_constant(name)
+        return name in self.kernel.constants
 
     def alone(self) -> InstanceTable:
         """A table of one instance, which refuses by an exception."""
@@ -130,7 +130,7 @@ class InstanceTable:
 
     values: Values
     count: int = 1
-    parameters: Row = ()
+    parameters: Sequence[Column] = ()
     refused: dict[int, str] = field(default_factory=dict[int, str])
     strict: bool = True
 
@@ -150,7 +150,7 @@ class InstanceTable:
 
     def of(self, routine: Routine, what: str, *further: Column) -> Row:
         """The columns of a routine of the parameters, and of further columns."""
-        arguments = *self.parameters, *further
+        arguments = (*self.parameters, *further) if further else self.parameters
         try:
             if self.strict:
                 found = routine(*arguments)
@@ -163,7 +163,7 @@ class InstanceTable:
             self.refuse(self._lacks(column), lambda _: f"{what} has no finite value with these parameters")
         return tuple(map(_finite, found))
 
-    def _one_by_one(self, routine: Routine, arguments: Row) -> Row:
+    def _one_by_one(self, routine: Routine, arguments: Sequence[Column]) -> Row:
         """The columns of a routine that some instances have no value of."""
         rows = [_attempt(routine, row) for row in self.rows(arguments)]
         nan, width = self.values.kernel.arithmetic.functions["nan"], max(map(len, rows), default=0)
@@ -184,8 +184,7 @@ class InstanceTable:
 
     def constant(self, name: str, what: str) -> Row:
         """The columns of one of the program's constants."""
-        constant = self.values.kernel.constant
-        return self.of(lambda *row: constant(name, row), what)
+        return self.of(self.values.kernel.constants[name], what)
 
     def expression(self, value: Any, what: str) -> Column:
         """A number or an expression of all parameters."""
@@ -232,6 +231,7 @@ def evaluate_parameters(table: InstanceTable, shared: Mapping[str, Any], varied:
     for name in (*shared, *varied):
         if name not in program.parameters:
             raise UsageError(f"the model has no parameter '{name}'", _elsewhere(name, program))
+    table.parameters = found = list[Column]()  # n tuples of up to n parameters would take n**2 steps
     for i, name in enumerate(program.parameters):
         what = f"parameter {name}"
         if name in varied:
@@ -240,7 +240,8 @@ def evaluate_parameters(table: InstanceTable, shared: Mapping[str, Any], varied:
             (column,) = table.of(values.routine(shared[name], what, i), what)
         else:
             (column,) = table.constant(f"parameter_{i}", what)
-        table.parameters = (*table.parameters, column)
+        found.append(column)
+    table.parameters = tuple(found)
     for i, name in enumerate(program.parameters):
         for kind, sign in (("minimum", 1), ("maximum", -1)):
             if values.has(f"{kind}_{i}"):

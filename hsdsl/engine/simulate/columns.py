@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from struct import Struct
-from threading import Lock
+from threading import RLock
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,7 +64,7 @@ class Gathered:
     def __init__(self, chunks: list[dict[str, Array]], rows: int, width: int) -> None:
         self._chunks, self.rows, self._width = chunks, rows, width
         self._arrays: dict[str, Array] = {}
-        self._lock = Lock()
+        self._lock = RLock()
 
     def __getitem__(self, name: str) -> Array:
         if name not in self._arrays:
@@ -77,17 +77,23 @@ class Gathered:
         """One column; a row's piece, which led to it in the run, leaves it here. Copied parts are let go."""
         first = self._chunks[0][name]
         shape = (*first.shape[1:-1], self._width) if name in ("values", "pieces") else first.shape[1:]
-        count = self.rows if name == "pieces" else sum(len(chunk[name]) for chunk in self._chunks)
-        whole, end = np.empty((count, *shape), first.dtype), 0
-        for k, chunk in enumerate(self._chunks):
+        if name == "pieces":
+            return self._joined_pieces(np.zeros((self.rows, *shape)))
+        whole, end = np.empty((sum(len(chunk[name]) for chunk in self._chunks), *shape), first.dtype), 0
+        for chunk in self._chunks:
             part = chunk.pop(name)
-            if name == "pieces":
-                part = part[int(k == 0) : -1]
-            if len(shape) and shape != part.shape[1:]:
-                part = part[..., : self._width]
-            whole[end : end + len(part)] = part
+            whole[end : end + len(part)] = part[..., : self._width] if name == "values" else part
             end += len(part)
-        whole[end:] = 0.0  # nothing leaves the last row
+        return whole
+
+    def _joined_pieces(self, whole: Array) -> Array:
+        """The pieces; no step leaves the last row of an arc."""
+        flows, end = np.ones((self.rows, 1, 1), bool), 0
+        flows[self["arc"]["first"][1:] - 1] = False
+        for k, chunk in enumerate(self._chunks):
+            part = chunk.pop("pieces")[int(k == 0) : -1, :, : self._width]
+            np.copyto(whole[end : end + len(part)], part, where=flows[end : end + len(part)])
+            end += len(part)
         return whole
 
     @property

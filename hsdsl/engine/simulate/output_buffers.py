@@ -20,6 +20,7 @@ from hsdsl.mathematics.program import Program
 LEAST_ROWS, MOST_ROWS = 2048, 2**20
 MOST_KEPT = 2**23  # bytes of a chunk that the next run may use again
 FEWEST_ROWS = 512  # of a first chunk that is as small as that
+LARGEST_PAGE = 2**21  # bytes that become memory together
 BY_ROW = ("times", "values", "outputs", "depth")
 BY_TRANSITION = ("transition", "before", "after")
 
@@ -53,6 +54,7 @@ class OutputBuffers:
             self.review, self._passed = review, 0
             self._stop_at_review()
         if max(rows, self._before, self._least) <= self._rows:
+            self.table.blank = 0
             return
         room = min(max(rows, self._before), MOST_ROWS, memory // self._row_bytes)
         room = max(room, self._least)
@@ -69,9 +71,9 @@ class OutputBuffers:
             self.sink(self._written())
             return self._reset()
         written, rows = self._written(), max(1, self.counts.rows)
-        self._full.append(written)
-        taken = sum(column.nbytes for column in written.values())
+        taken = sum(column.nbytes for name, column in written.items() if name != "pieces") + self._steps(written)
         self._taken += taken
+        self._full.append(written)
         left = (self._memory - self._taken) * rows // taken
         self.full = left < min(LEAST_ROWS, self._rows)
         try:
@@ -79,6 +81,17 @@ class OutputBuffers:
         except MemoryError:
             self.full = True
             self._open(LEAST_ROWS)
+
+    def _steps(self, written: dict[str, Array]) -> int:
+        """Bytes of the pages that pieces are written to: nothing leads to the first row of an arc."""
+        rows, size = len(written["times"]), written["pieces"][0].nbytes
+        before = sum(len(chunk["times"]) for chunk in self._full)
+        leads = np.ones(rows + 1, bool)  # an arc may begin with the row behind them
+        leads[written["arc"]["first"] - before] = False
+        steps = np.flatnonzero(leads[:rows])
+        first, last = steps * size // LARGEST_PAGE, ((steps + 1) * size - 1) // LARGEST_PAGE
+        pages = np.sum(last - first + 1) - np.count_nonzero(first[1:] == last[:-1])
+        return min(int(pages) * LARGEST_PAGE, written["pieces"].nbytes)
 
     def rest(self) -> dict[str, Array]:
         """What is in the chunk that is being written."""
@@ -99,7 +112,7 @@ class OutputBuffers:
             "values": np.empty((rows, shape.width)),
             "outputs": np.empty((rows, shape.outputs)),
             "depth": np.empty(rows),
-            "pieces": np.empty((rows + 1, shape.degree, shape.width)),
+            "pieces": np.zeros((rows + 1, shape.degree, shape.width)),  # of memory that is there when it is written
             "arc": np.empty(arcs, structures.ARC),
             "transition": np.empty(transitions, structures.TRANSITION),
             "before": np.empty((transitions, shape.width)),
@@ -112,6 +125,7 @@ class OutputBuffers:
         for name, column in self._columns.items():
             setattr(table, name, column.ctypes.data)
         self._reset()
+        table.blank = 1
 
     def _look(self) -> None:
         """Review the run where its rows are due."""
@@ -133,7 +147,7 @@ class OutputBuffers:
     def _reset(self) -> None:
         self._stop_at_review()
         table = self.table
-        table.rows = table.arcs = table.transitions = table.notes = table.alternatives_used = 0
+        table.rows = table.arcs = table.transitions = table.notes = table.alternatives_used = table.blank = 0
 
     def _written(self) -> dict[str, Array]:
         rows, arcs, transitions, notes, alternatives = self.counts

@@ -141,6 +141,7 @@ typedef struct {
   int32_t *alternatives;   /* (transition * (model->edges - 1)), edges, one transition's after the other's */
   int64_t alternatives_used;
   hs_note *note;
+  int32_t blank; /* the pieces are zero: what has none is not written, and takes no memory */
 } hs_chunk;
 
 /* States that one chain of transitions at an instant has been in. */

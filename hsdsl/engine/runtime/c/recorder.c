@@ -24,7 +24,7 @@ HS_INLINE void write_piece(const hs_run *run, int n, const hs_polynomial *piece,
     copy(kept + m * w, piece->c + m * w, n);
     for (int s = n; s < w; s++) kept[m * w + s] = 0.0;
   }
-  for (int i = used * w; i < degree * w; i++) kept[i] = 0.0;
+  for (int i = used * w; i < degree * w && !run->task->chunk.blank; i++) kept[i] = 0.0;
 }
 
 HS_INLINE void write_row(hs_run *run, hs_time t, const hs_real *x, const hs_polynomial *piece, hs_real depth,
