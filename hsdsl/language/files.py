@@ -193,8 +193,7 @@ class ModelFiles:
         """
         if self.data is not None:
             return self.data[name]
-        with applied(self.limits):
-            target = _inside(self.folder, name)
+        target = _inside(self.folder, name, self.limits.folders)
         try:
             with open_regular(target, getattr(os, "O_NOFOLLOW", 0)) as stream:
                 content = stream.read(LARGEST + 1)
@@ -206,11 +205,11 @@ class ModelFiles:
         return content
 
 
-def _inside(folder: Path, name: str) -> Path:
-    """The file's path with links followed, if it stays in the model's folder."""
+def _inside(folder: Path, name: str, others: tuple[Path, ...]) -> Path:
+    """The file's path with links followed, if it stays in the model's folder or in another that is allowed."""
     try:
         target = (folder / name).resolve()
-        folders = (folder.resolve(), *(allowed.resolve() for allowed in limits.current().folders))
+        folders = (folder.resolve(), *(allowed.resolve() for allowed in others))
         if any(target.is_relative_to(allowed) for allowed in folders):
             return target
     except (OSError, ValueError, RuntimeError):

@@ -65,7 +65,8 @@ def find(files: ModelFiles, part: Part = ()) -> tuple[Program, ModelFiles] | Non
     None where there is none, or where a data file has changed or breaks a rule.
     """
     for supposed in (files.with_data({}), files) if files.data is None else (files,):
-        entry = store.find(KIND, key_of(supposed, part))
+        key = key_of(supposed, part)
+        entry = store.find(KIND, key)
         with suppress(OSError, ValueError, KeyError, TypeError, IndexError, RecursionError, DataRefused):
             if entry is not None:
                 return _verified(json.loads(entry.read_bytes()), files)
@@ -90,6 +91,7 @@ def _verified(entry: dict[str, Any], files: ModelFiles) -> tuple[Program, ModelF
 
 def keep(files: ModelFiles, program: Program, part: Part = ()) -> None:
     """Keep a program, where the cache can be written."""
+    key = key_of(files, part)
     checksums = {name: _checksum(content) for name, content in (files.data or {}).items()}
     text = f'{{"files":{json.dumps(checksums)},"rows":[{",".join(_rows(program))}]}}'
 
@@ -97,7 +99,7 @@ def keep(files: ModelFiles, program: Program, part: Part = ()) -> None:
         target.write_text(text)
 
     with suppress(OSError):
-        store.keep(KIND, key_of(files, part), ".json", write)
+        store.keep(KIND, key, ".json", write)
 
 
 def _checksum(data: bytes) -> str:

@@ -64,31 +64,25 @@ def pipeline_of(path: str | os.PathLike[str], limits: Limits | None, text: bytes
     """Read a model file once, or take the bytes given for it, and find its program in the cache or elaborate them."""
     began = time.perf_counter()
     files = ModelFiles.read(path, limits, text)
-    cached = program_cache.find(files)
-    if cached is not None:
+    program = system = None
+    if (cached := program_cache.find(files)) is not None:
         program, files = cached
-        return Pipeline(None, time.perf_counter() - began, files, program)
-    lowered = ahead.taken(files, _RUNNING)
-    if lowered is not None and _method_exists(lowered.program):
+    elif (lowered := ahead.taken(files, _RUNNING)) is not None and _method_exists(lowered.program):
         program, sliding, files = lowered
-        made = Pipeline(None, time.perf_counter() - began, files, program)
-        made.keep(program)
+        program_cache.keep(files, program)
         if sliding is not None:
-            made.keep(sliding, (SLIDING,))
-        return made
-    system = _elaborated(files)
-    return Pipeline(system, time.perf_counter() - began, files.with_data(system.files))
+            program_cache.keep(files, sliding, (SLIDING,))
+    else:
+        from hsdsl.language.elaborate import elaborate_files
+
+        system = elaborate_files(files).system
+        files = files.with_data(system.files)
+    return Pipeline(system, time.perf_counter() - began, files, program)
 
 
 def _method_exists(program: Program) -> bool:
     """Whether its method is one of our own; else it may be refused with its place, which no kept program has."""
     return program.method in (None, "auto", *METHODS.own)
-
-
-def _elaborated(files: ModelFiles) -> HybridSystem:
-    from hsdsl.language.elaborate import elaborate_files
-
-    return elaborate_files(files).system
 
 
 class Pipeline:
@@ -144,8 +138,10 @@ class Pipeline:
     @cached_property
     def system(self) -> HybridSystem:
         """The mathematics; of a cached model it is elaborated from the bytes read at first."""
+        from hsdsl.language.elaborate import elaborate_files
+
         assert self._files is not None
-        return self._part_of(_elaborated(self._files))
+        return self._part_of(elaborate_files(self._files).system)
 
     def _part_of(self, system: HybridSystem) -> HybridSystem:
         from hsdsl.language.elaborate.derived import only

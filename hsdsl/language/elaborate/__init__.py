@@ -139,16 +139,16 @@ def _system(symbols: SymbolTable) -> HybridSystem:
     parts: tuple[Part, ...] = ()
     of_parts: dict[str, str] = {}
     ranges: tuple[tuple[str, Any, Any], ...] = ()
-    if isinstance(document, SystemDocument) and (document.system or document.automata):
-        whole = Parts(symbols, document)
-        parameters, parts = parameters + whole.parameters, whole.parts
-        modes, scene, initial, of_parts = whole.modes, whole.scene, whole.initial, whole.units
-    else:
+    if not (isinstance(document, SystemDocument) and (document.system or document.automata)):
         define_lets(symbols)
         modes = elaborate_modes(symbols, elaborate_outputs(symbols))
         scene, numbers = elaborate_scene(symbols)
         modes = tuple(replace(mode, scene=scene_of(symbols, numbers, symbols.scopes[mode.name])) for mode in modes)
         initial, ranges = elaborate_initial(symbols)
+    else:
+        whole = Parts(symbols, document)
+        parameters, parts = parameters + whole.parameters, whole.parts
+        modes, scene, initial, of_parts = whole.modes, whole.scene, whole.initial, whole.units
     experiment = elaborate_experiment(symbols)
     units = of_parts | elaborate_units(symbols)
     reference = elaborate_reference(symbols, modes)

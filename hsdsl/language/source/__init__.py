@@ -1,6 +1,6 @@
 """YAML files as nodes with a line and a column: the core rules of YAML 1.2, capped before anything recurses."""
 
-from hsdsl.language.source.compose import Composer, Unread, compose
+from hsdsl.language.source.compose import Composer, Unread, compose, decode
 from hsdsl.language.source.nodes import (
     ABSENT,
     Key,
@@ -14,7 +14,6 @@ from hsdsl.language.source.nodes import (
     absent,
     child,
     children,
-    decode,
     descend,
     is_empty,
     keys,

@@ -1,4 +1,4 @@
-"""YAML events to nodes.
+"""Bytes to text, and YAML events to nodes.
 
 PyYAML's parser gives the events; its own composer and constructors are not used, for they round numbers, follow
 YAML 1.1 (`on` is true, `010` is eight), lose places and recurse before anything is counted.
@@ -11,10 +11,11 @@ from typing import Any
 import yaml
 
 from hsdsl.base import limits
-from hsdsl.base.errors import Span
+from hsdsl.base.errors import Diagnostic, ModelError, Span
 from hsdsl.base.names import INVISIBLE, is_identifier, normalised, shown
 from hsdsl.language.files import DataRefused, ModelFiles
 from hsdsl.language.source.nodes import (
+    BREAK,
     DEEPEST,
     TOO_DEEP,
     Key,
@@ -26,11 +27,12 @@ from hsdsl.language.source.nodes import (
     Text,
     absent,
     child,
-    decode,
     is_bare,
 )
 
 _Parser: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_ARCHIVE = b"PK\x03\x04"
+_OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
 _ABOUT = ("hsdsl", "title", "source")  # keys that a file may have and that say nothing about its automaton
 
 
@@ -75,6 +77,47 @@ def _is_strange(entry: tuple[Node, Node]) -> bool:
 def _is_cut(item: Node) -> bool:
     """Whether YAML ended an item inside its parentheses."""
     return isinstance(item, Scalar) and item.plain and item.value.count("(") > item.value.count(")")
+
+
+def decode(path: str, data: bytes) -> Text:
+    """The text of a model.
+
+    Raises ModelError: when it is too large, not UTF-8, or has characters that no model may have.
+    """
+    most = limits.current().bytes
+    if len(data) > most:
+        size = f"{most >> 20} MiB" if most % (1 << 20) == 0 else f"{most:,} bytes"
+        hint = f"keep data in CSV files and name them in inputs, or allow more with --limit bytes={most * 10}"
+        raise _refused(path, "HS003", f"the file is larger than {size}", hint)
+    data = data.removeprefix(b"\xef\xbb\xbf")
+    if data.startswith(_ARCHIVE):
+        hint = "a saved run (.npz) is read with hsdsl.store.load"
+        raise _refused(path, "HS001", "the file is an archive, not the text of a model", hint)
+    if data.startswith(_OTHER_ENCODINGS):
+        raise _refused(path, "HS001", "the file is UTF-16 text, not UTF-8", "save it as UTF-8")
+    try:
+        content = data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        before = Text.of(path, data[: error.start].decode("utf-8"))
+        span = Span(path, len(before.lines), len(before.lines[-1]) + 1)
+        message = f"the byte 0x{data[error.start]:02x} here is not UTF-8 text"
+        raise ModelError([Diagnostic("HS001", message, span, "save the file as UTF-8", before.lines[-1])]) from None
+    text = Text.of(path, content)
+    first: dict[str, int] = {}
+    for match in INVISIBLE.finditer(content):
+        first.setdefault(match.group(), match.start())
+    wrong: list[Diagnostic] = []
+    for sign, start in first.items():
+        before = BREAK.split(content[:start])
+        message = f"the invisible character U+{ord(sign):04X} is not allowed in a model"
+        wrong.append(text.fault("HS002", message, len(before), len(before[-1]) + 1, "remove it"))
+    if wrong:
+        raise ModelError(wrong)
+    return text
+
+
+def _refused(path: str, code: str, message: str, hint: str) -> ModelError:
+    return ModelError([Diagnostic(code, message, Span(path, 1, 1), hint)])
 
 
 class Composer:

@@ -1,7 +1,4 @@
-"""A model's bytes as text, and the nodes of a YAML document in it: every value and every key knows its place.
-
-`Text` is decoded, capped, and free of characters that do not belong in a model.
-"""
+"""A text with its lines, and the nodes of a YAML document in it: every value and every key knows its place."""
 
 from __future__ import annotations
 
@@ -10,15 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Literal
 
-from hsdsl.base import limits
-from hsdsl.base.errors import Diagnostic, ModelError, Span
-from hsdsl.base.names import INVISIBLE
+from hsdsl.base.errors import Diagnostic, Span
 
-_BREAK = re.compile("\r\n|\r|\n")
-_ARCHIVE = b"PK\x03\x04"
+BREAK = re.compile("\r\n|\r|\n")
 DEEPEST = 64  # mappings and lists in each other
 TOO_DEEP = f"mappings and lists are nested more than {DEEPEST} deep here"
-_OTHER_ENCODINGS = (b"\xff\xfe", b"\xfe\xff")
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +25,7 @@ class Text:
     @classmethod
     def of(cls, path: str, content: str) -> Text:
         """A text split into its lines."""
-        return cls(path, content, _BREAK.split(content))
+        return cls(path, content, BREAK.split(content))
 
     def span(self, line: int, column: int, length: int = 1) -> Span:
         """The place at a 1-based line and column, kept inside the text and on one line."""
@@ -50,47 +43,6 @@ class Text:
     ) -> Diagnostic:
         """A diagnostic about ``length`` characters at a 1-based line and column."""
         return self.diagnostic(code, message, self.span(line, column, length), hint)
-
-
-def decode(path: str, data: bytes) -> Text:
-    """The text of a model.
-
-    Raises ModelError: when it is too large, not UTF-8, or has characters that no model may have.
-    """
-    most = limits.current().bytes
-    if len(data) > most:
-        size = f"{most >> 20} MiB" if most % (1 << 20) == 0 else f"{most:,} bytes"
-        hint = f"keep data in CSV files and name them in inputs, or allow more with --limit bytes={most * 10}"
-        raise _refused(path, "HS003", f"the file is larger than {size}", hint)
-    data = data.removeprefix(b"\xef\xbb\xbf")
-    if data.startswith(_ARCHIVE):
-        hint = "a saved run (.npz) is read with hsdsl.store.load"
-        raise _refused(path, "HS001", "the file is an archive, not the text of a model", hint)
-    if data.startswith(_OTHER_ENCODINGS):
-        raise _refused(path, "HS001", "the file is UTF-16 text, not UTF-8", "save it as UTF-8")
-    try:
-        content = data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        before = Text.of(path, data[: error.start].decode("utf-8"))
-        span = Span(path, len(before.lines), len(before.lines[-1]) + 1)
-        message = f"the byte 0x{data[error.start]:02x} here is not UTF-8 text"
-        raise ModelError([Diagnostic("HS001", message, span, "save the file as UTF-8", before.lines[-1])]) from None
-    text = Text.of(path, content)
-    first: dict[str, int] = {}
-    for match in INVISIBLE.finditer(content):
-        first.setdefault(match.group(), match.start())
-    wrong: list[Diagnostic] = []
-    for sign, start in first.items():
-        before = _BREAK.split(content[:start])
-        message = f"the invisible character U+{ord(sign):04X} is not allowed in a model"
-        wrong.append(text.fault("HS002", message, len(before), len(before[-1]) + 1, "remove it"))
-    if wrong:
-        raise ModelError(wrong)
-    return text
-
-
-def _refused(path: str, code: str, message: str, hint: str) -> ModelError:
-    return ModelError([Diagnostic(code, message, Span(path, 1, 1), hint)])
 
 
 def positions(raw: str, length: int, value: str) -> list[int]:
@@ -184,7 +136,7 @@ class Scalar:
         begin = first + where[min(start, len(where) - 1)]
         finish = first + where[min(max(end - 1, start), len(where) - 1)] + 1
         first, line, column = self.place.start
-        before = _BREAK.split(self.place.text.content[first:begin])
+        before = BREAK.split(self.place.text.content[first:begin])
         column = len(before[-1]) + (column if len(before) == 1 else 0)
         return self.place.text.span(line + len(before), column + 1, finish - begin)
 

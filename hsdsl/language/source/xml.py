@@ -11,7 +11,8 @@ from xml.parsers import expat
 from hsdsl.base import limits
 from hsdsl.base.errors import Diagnostic, ModelError, Span
 from hsdsl.base.names import shown
-from hsdsl.language.source.nodes import Text, decode
+from hsdsl.language.source.compose import decode
+from hsdsl.language.source.nodes import Text
 
 DEEPEST = 16
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*encoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")

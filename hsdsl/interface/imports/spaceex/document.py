@@ -18,7 +18,8 @@ from hsdsl.base.names import closest, shown
 from hsdsl.language.expression import plain
 from hsdsl.language.expression.parse import ExpressionError, Name, parse, walk
 from hsdsl.language.expression.scope import RESERVED
-from hsdsl.language.source.nodes import Text, decode
+from hsdsl.language.source.compose import decode
+from hsdsl.language.source.nodes import Text
 from hsdsl.language.source.xml import Element, Passage, read_xml
 
 MOST_TEXTS = 100_000  # a product has the same few expressions in many places
