@@ -8,6 +8,7 @@ of products that share a factor go in one loop, as the derivatives of a product 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
@@ -16,6 +17,7 @@ from hsdsl.engine.backends.c.routine import LARGE, Assignment, expression, piece
 from hsdsl.engine.backends.taylor import TapeLanguage, coefficient_of, value_of
 from hsdsl.mathematics.program import Tape
 
+LONGEST_NESTED = 32  # operations of a line that is part of an expression
 _LINE = re.compile(r"\bl(\d+)\b")
 _FLOW = """\
 static int NAME(const hs_real *restrict c, int order, hs_real t, const hs_real *restrict x,
@@ -121,35 +123,66 @@ def surface_lines(tape: Tape, dimension: int) -> str:
     return _filled(_SURFACES, _straight(values, own), _straight(coefficients, own))
 
 
-def piecewise(tape: Tape, dimension: int, own: range, states: Iterable[int]) -> tuple[str, list[str]]:
+def piecewise(
+    tape: Tape, dimension: int, own: range, states: Iterable[int], further: Container[int]
+) -> tuple[str, list[str]]:
     """Write a function ``NAME`` for coefficient k of ``own`` lines, then k + 1 of ``states``, and its pieces.
 
-    States are lines too. The pieces are functions of a name that begins with ``NAME_``.
+    States are lines too. The pieces are functions of a name that begins with ``NAME_``. A line goes into memory where
+    others read it there, or ``further`` lines do; else it is part of the expression that reads it.
     """
     first = dimension + 1
-
-    def ordered(texts: list[tuple[int, str]]) -> list[Assignment]:
-        places = {line: place for place, (line, _) in enumerate(texts)}
-        needs = {i: [places[j] for j in tape.operations[i - first].lines if j in places and j < i] for i, _ in texts}
-        return [Assignment(f"l{i}[k]", text, needs[i]) for i, text in texts]
-
-    values = ordered(_values(tape, own, first, "l{}[0]".format))
-    coefficients = ordered(_coefficients(tape, own, first, "l{}[k]".format))
-    after = [Assignment(f"l{i}[k + 1]", f"l{tape.flow[i - 1]}[k] * hs_inverse[k + 1]") for i in states]
+    inside = _inside(tape, own, first, states, further)
     parts: list[str] = []
     calls: list[str] = []
-    for kind, assignments in (("values", values), ("coefficients", coefficients), ("states", after)):
+    for kind, each, place in (("coefficients", _coefficients, "k"), ("values", _values, "0")):
         names = list[str]()
-        for body in pieces(assignments):
+        for body in pieces(_nested(tape, own, first, states, inside, each, f"l{{}}[{place}]")):
             names.append(f"NAME_{kind}_{len(names)}")
             parts.append(_PIECE.format(name=names[-1], body="\n".join(f"  {line}" for line in body)))
-        calls.append("(" + " || ".join(f"{name}(c, k, length, lines)" for name in names) + ")")
-    values_text, coefficients_text, states_text = calls
-    return _CALLS.format(calls=f"(k ? {coefficients_text} : {values_text}) || {states_text}"), parts
+        calls.append(" || ".join(f"{name}(c, k, length, lines)" for name in names))
+    return _CALLS.format(calls=f"k ? {calls[0]} : {calls[1]}"), parts
+
+
+def _inside(tape: Tape, own: range, first: int, states: Iterable[int], further: Container[int]) -> set[int]:
+    """The lines whose newest coefficient one expression reads, and nothing else."""
+    reads = Counter(tape.flow[i - 1] for i in states)
+    reads.update(line for i in own for line in tape.operations[i - first].lines)
+    earlier = _lines_in(text for _, text in _coefficients(tape, own, first, "{}".format))
+    found, sizes = set[int](), dict[int, int]()
+    for i in own:
+        sizes[i] = 1 + sum(sizes[line] for line in tape.operations[i - first].lines if line in found)
+        if reads[i] == 1 and i not in earlier and i not in further and sizes[i] < LONGEST_NESTED:
+            found.add(i)
+    return found
+
+
+def _nested(
+    tape: Tape, own: range, first: int, states: Iterable[int], inside: set[int], each: Callable[..., Texts], place: str
+) -> list[Assignment]:
+    """The assignments of newest coefficients, of lines and then of states, with those ``inside`` written out."""
+    texts, needs = dict[int, str](), dict[int, set[int]]()
+    places = {line: n for n, line in enumerate(line for line in own if line not in inside)}
+
+    def name(line: int) -> str:
+        return f"({texts[line]})" if line in inside else place.format(line)
+
+    def behind(lines: Iterable[int], i: int) -> set[int]:
+        return set[int]().union(
+            *(needs[j] if j in inside else {places[j]} for j in lines if j in inside or (j in places and j < i))
+        )
+
+    for i, text in each(tape, own, first, name):
+        texts[i], needs[i] = text, behind(tape.operations[i - first].lines, i)
+    found = [Assignment(f"l{i}[k]", texts[i], needs[i]) for i in places]
+    for i in states:
+        line = tape.flow[i - 1]
+        found.append(Assignment(f"l{i}[k + 1]", f"{name(line)} * hs_inverse[k + 1]", behind([line], own.stop)))
+    return found
 
 
 def _straight(
-    texts: list[tuple[int, str]], kept: Container[int], before: Mapping[int, Sequence[str]] | None = None
+    texts: Iterable[tuple[int, str]], kept: Container[int], before: Mapping[int, Sequence[str]] | None = None
 ) -> list[str]:
     """The statements for lines that are variables too, ``v``; those in ``kept`` go into memory."""
     found: list[str] = []
@@ -167,20 +200,21 @@ def read_by_surfaces(tape: Tape) -> set[int]:
     return further | {line for line in tape.surfaces if line is not None}
 
 
-def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
-    found: list[tuple[int, str]] = []
+Texts = Iterator[tuple[int, str]]  # of lines
+
+
+def _values(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> Texts:
     language = _language("c{}".format, "n{}".format, "q_0_1")
     for i in lines:
         operation = tape.operations[i - first]
         names = {f"n{line}": name(line) for line in operation.lines}
         names[f"c{operation.constant}"] = f"c[{operation.constant}]"
-        found.append((i, expression(value_of(operation, language), names)))
-    return found
+        yield i, expression(value_of(operation, language), names)
 
 
-def _coefficients(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> list[tuple[int, str]]:
+def _coefficients(tape: Tape, lines: Iterable[int], first: int, name: Callable[[int], str]) -> Texts:
     language = _language("c[{}]".format, name, "0.0")
-    return [(i, coefficient_of(i, tape.operations[i - first], language)) for i in lines]
+    return ((i, coefficient_of(i, tape.operations[i - first], language)) for i in lines)
 
 
 def _language(constant: Callable[[int], str], name: Callable[[int], str], zero: str) -> TapeLanguage:

@@ -287,10 +287,10 @@ class Writer:
 
     def piecewise(self, tape: Tape, dimension: int, size: int, first: str, every: str) -> tuple[str, str]:
         """Write the functions of a large tape; ``first`` gives the constants of the flow, ``every`` those of all."""
-        start, end = dimension + 1 + tape.needed, line_count(tape, dimension)
+        start, end, read = dimension + 1 + tape.needed, line_count(tape, dimension), self.read[_flow_of(tape)]
         parts = [
-            self.core(piecewise(tape, dimension, range(dimension + 1, start), range(1, dimension + 1))),
-            self.core(piecewise(tape, dimension, range(start, end), ())),
+            self.core(piecewise(tape, dimension, range(dimension + 1, start), range(1, dimension + 1), read)),
+            self.core(piecewise(tape, dimension, range(start, end), (), read)),
         ]
         flow, surfaces = (f"{part}(c, k, length, lines)" for part in parts)
         constants = [f" || {text.removesuffix(' || ')}" if text else "" for text in (first, every)]
