@@ -68,7 +68,8 @@ def _mode(symbols: SymbolTable, name: Key, document: ModeDocument, shared: dict[
 
 def mode_scope(symbols: SymbolTable, name: Key, document: ModeDocument) -> Scope:
     """The names that can be used in a mode: those of the model, under those of the mode's own `let`."""
-    states = symbols.states_within(str(name))
+    timed = symbols.timed and not symbols.without_states(document)
+    states = frozenset((*symbols.states[str(name)], *[SINCE] * timed))
     place = f"the mode '{name}'"
     own: Meanings = placeholders(document.solve, str(name))
     refused: Meanings = {}

@@ -1,7 +1,7 @@
 # pyright: basic
 """The symbol table of a model under elaboration: its document, the meaning of its names, and its expressions.
 
-A scalar is parsed, looked up and translated by `ExpressionResolver`, with every fault at its place in the file.
+A scalar is parsed, looked up and translated, with every fault at its place in the file; the answer is then None.
 """
 
 from __future__ import annotations
@@ -71,20 +71,82 @@ class Seen(Mapping[str, Meaning]):
         return self._values.items()
 
 
-class ExpressionResolver:
-    """Resolver of expressions: their faults go to ``findings``, and the answer is then None.
+def _tree(text: str, expected: Expected, scope: Scope) -> Tree:
+    word = text.strip()
+    if word.lower() in _NOT_FINITE and word.lstrip("+-") not in scope.values:
+        message, hint = f"`{word}` is not a finite number", "every number is finite here"
+        raise ExpressionError("HS118", message, 0, len(text), hint)
+    return parse(text, expected)
 
-    ``box`` bounds the time that each of them takes, and ``at`` is the one that was begun last.
+
+KINDS = {
+    "functions": "a function", "parameters": "a parameter", "inputs": "an input", "states": "a state",
+    "let": "a `let` name", "unknowns": "an unknown of `solve`",
+}  # fmt: skip
+Meanings = dict[str, Meaning]
+
+
+@dataclass
+class SymbolTable:
+    """A document with its names.
+
+    ``names`` has the kind, of :data:`KINDS`, of every name that is not of one mode alone; ``values`` the meaning of
+    those that are defined so far, ``t`` from the start. ``states`` has the states of each mode in file order, none for
+    a final mode without a flow. ``undeclared`` names are in `initial` alone: states of its mode that lack a flow,
+    reported there. ``scopes`` has the scope of each mode that is elaborated, ``data`` the content of the data files
+    that were used. ``drivable`` says that inputs of time stay inputs. ``of_functions`` has the names that functions of
+    the file may use, with the parameters that are defined so far. ``parts`` are those of a system.
+
+    ``box`` bounds the time that each expression takes, and ``at`` is the one that was begun last. ``made`` has the
+    values of expressions by their text and the meanings of their names.
     """
 
+    document: ModelDocument
     findings: Findings
+    files: ModelFiles
+    names: dict[str, str] = field(default_factory=dict)
+    values: Meanings = field(default_factory=dict)
+    states: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    undeclared: frozenset[str] = frozenset()
+    scopes: dict[str, Scope] = field(default_factory=dict)
+    data: dict[str, bytes] = field(default_factory=dict)
+    drivable: bool = False
+    of_functions: Meanings = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
     box: Box | None = None
     at: Scalar | None = None
+    made: dict[tuple[Any, ...], Value] = field(default_factory=dict)
 
-    @cached_property
-    def made(self) -> dict[tuple[Any, ...], Value]:
-        """The values of expressions by their text and the meanings of their names."""
-        return {}
+    def __post_init__(self) -> None:
+        document = self.document
+        self.states = {name: tuple(map(str, mode.flow or ())) for name, mode in document.modes.items()}
+        keys = [(kind, getattr(document, kind)) for kind in ("functions", "parameters", "inputs")]
+        keys += [("states", mode.flow or ()) for mode in document.modes.values()] + [("let", document.let)]
+        keys += [("unknowns", document.solve.unknowns)] if document.solve is not None else []
+        for kind, names in keys:
+            for key in names:
+                taken = self.names.setdefault(key, kind)
+                if taken != kind:
+                    message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
+                    self.report(key.place, "HS301", message, "give one of them another name")
+        self.values["t"] = Value(TIME)
+        self.values |= {name: state(name) for name in self.all_states()}
+        if self.timed:
+            self.values[SINCE] = state(SINCE)
+        self.undeclared = frozenset(self._undeclared())
+        self.values.update(dict.fromkeys(self.undeclared))
+
+    def _undeclared(self) -> list[str]:
+        if not self.document.modes:
+            return []
+        start = self.document.initial
+        if start is None:  # reported with the system, which has no `modes`
+            return []
+        mode = self.document.modes.get(start.mode.value)  # pyright: ignore[reportArgumentType]
+        if mode is None or mode.flow is None:
+            return []
+        given = [str(key) for key in start.__pydantic_extra__ if key not in self.names and key != SINCE]
+        return [key for key in given if closest(key, map(str, mode.flow)) is None]
 
     def report(self, place: SourceRange, code: str, message: str, hint: str | None = None) -> None:
         """Report a fault at a place."""
@@ -174,78 +236,6 @@ class ExpressionResolver:
             hint = "YAML begins a comment at ` #`: quote this expression"
         self.findings.add(text.diagnostic(error.code, error.message, scalar.span(error.start, error.end), hint))
 
-
-def _tree(text: str, expected: Expected, scope: Scope) -> Tree:
-    word = text.strip()
-    if word.lower() in _NOT_FINITE and word.lstrip("+-") not in scope.values:
-        message, hint = f"`{word}` is not a finite number", "every number is finite here"
-        raise ExpressionError("HS118", message, 0, len(text), hint)
-    return parse(text, expected)
-
-
-KINDS = {
-    "functions": "a function", "parameters": "a parameter", "inputs": "an input", "states": "a state",
-    "let": "a `let` name", "unknowns": "an unknown of `solve`",
-}  # fmt: skip
-Meanings = dict[str, Meaning]
-
-
-@dataclass
-class SymbolTable(ExpressionResolver):
-    """A document with its names.
-
-    ``names`` has the kind, of :data:`KINDS`, of every name that is not of one mode alone; ``values`` the meaning of
-    those that are defined so far, ``t`` from the start. ``states`` has the states of each mode in file order, none for
-    a final mode without a flow. ``undeclared`` names are in `initial` alone: states of its mode that lack a flow,
-    reported there. ``scopes`` has the scope of each mode that is elaborated, ``data`` the content of the data files
-    that were used. ``drivable`` says that inputs of time stay inputs. ``of_functions`` has the names that functions of
-    the file may use, with the parameters that are defined so far. ``parts`` are those of a system.
-    """
-
-    document: ModelDocument
-    findings: Findings
-    files: ModelFiles
-    names: dict[str, str] = field(default_factory=dict)
-    values: Meanings = field(default_factory=dict)
-    states: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    undeclared: frozenset[str] = frozenset()
-    scopes: dict[str, Scope] = field(default_factory=dict)
-    data: dict[str, bytes] = field(default_factory=dict)
-    drivable: bool = False
-    of_functions: Meanings = field(default_factory=dict)
-    parts: tuple[Part, ...] = ()
-
-    def __post_init__(self) -> None:
-        document = self.document
-        self.states = {name: tuple(map(str, mode.flow or ())) for name, mode in document.modes.items()}
-        keys = [(kind, getattr(document, kind)) for kind in ("functions", "parameters", "inputs")]
-        keys += [("states", mode.flow or ()) for mode in document.modes.values()] + [("let", document.let)]
-        keys += [("unknowns", document.solve.unknowns)] if document.solve is not None else []
-        for kind, names in keys:
-            for key in names:
-                taken = self.names.setdefault(key, kind)
-                if taken != kind:
-                    message = f"'{key}' is {KINDS[kind]} here, and also {KINDS[taken]}"
-                    self.report(key.place, "HS301", message, "give one of them another name")
-        self.values["t"] = Value(TIME)
-        self.values |= {name: state(name) for name in self.all_states()}
-        if self.timed:
-            self.values[SINCE] = state(SINCE)
-        self.undeclared = frozenset(self._undeclared())
-        self.values.update(dict.fromkeys(self.undeclared))
-
-    def _undeclared(self) -> list[str]:
-        if not self.document.modes:
-            return []
-        start = self.document.initial
-        if start is None:  # reported with the system, which has no `modes`
-            return []
-        mode = self.document.modes.get(start.mode.value)  # pyright: ignore[reportArgumentType]
-        if mode is None or mode.flow is None:
-            return []
-        given = [str(key) for key in start.__pydantic_extra__ if key not in self.names and key != SINCE]
-        return [key for key in given if closest(key, map(str, mode.flow)) is None]
-
     def scope(
         self, usable: tuple[str, ...], sentence: str, values: Meanings | None = None, hint: str | None = None
     ) -> Scope:
@@ -291,11 +281,6 @@ class SymbolTable(ExpressionResolver):
     def timed(self) -> bool:
         """Whether `since` is the time since the mode was entered: the file defines no such name."""
         return SINCE not in self.names and SINCE not in self.inner_lets
-
-    def states_within(self, mode: str) -> frozenset[str]:
-        """The states that expressions of a mode may use: its own ones and, where it has a flow, `since`."""
-        timed = self.timed and not self.without_states(self.document.modes[mode])  # pyright: ignore[reportArgumentType]
-        return frozenset((*self.states[mode], SINCE) if timed else self.states[mode])
 
     @cached_property
     def all_outputs(self) -> tuple[str, ...]:

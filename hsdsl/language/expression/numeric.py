@@ -149,7 +149,7 @@ def refuse_work(tree: Tree, exprs: list[Any], number: Any) -> None:
         case Product():
             length = sum(map(bits, exprs))
         case Power():
-            length = power_bits(*exprs)
+            length = bits(exprs[0]) * _constant_part(exprs[1])
         case Call(function="exp") if large_exponent(exprs[0]):
             raise Refused("HS119", f"`{{it}}` is a power with an exponent above {LARGEST_EXPONENT:,} in magnitude")
         case _:
@@ -161,7 +161,8 @@ def refuse_work(tree: Tree, exprs: list[Any], number: Any) -> None:
 def refuse_value(value: Value, of_power: bool) -> None:
     """Raise where a value is not finite, or SymPy would need too long for it; ``of_power`` says that it is a power."""
     expr = value.expr
-    if _not_real(expr) or beyond_floats(expr):
+    coefficients: list[Any] = [term.as_coeff_Mul()[0] for term in sp.Add.make_args(expr)]
+    if _not_real(expr) or any(c.is_Rational and abs(c.p) >= LARGEST_NUMBER * c.q for c in coefficients):
         raise Refused(*_NOT_FINITE)
     if bits(expr) > MOST_BITS:
         raise Refused(*_TOO_LONG)
@@ -208,12 +209,6 @@ def _constant_part(exponent: Any) -> int:
     return int(abs(constant)) + 1 if constant.is_Rational else 1
 
 
-def beyond_floats(expr: Any) -> bool:
-    """Whether a term of an expression has a coefficient that no float holds."""
-    coefficients: list[Any] = [term.as_coeff_Mul()[0] for term in sp.Add.make_args(expr)]
-    return any(c.is_Rational and abs(c.p) >= LARGEST_NUMBER * c.q for c in coefficients)
-
-
 def sum_bits(terms: list[Any]) -> int:
     """How long the common denominator of like terms of a sum can get."""
     denominators: dict[Any, set[int]] = {}
@@ -224,11 +219,6 @@ def sum_bits(terms: list[Any]) -> int:
             if coefficient.is_Rational and coefficient.q != 1:
                 denominators.setdefault(rest, set()).add(int(coefficient.q))
     return max((sum(q.bit_length() for q in group) for group in denominators.values()), default=0)
-
-
-def power_bits(base: Any, exponent: Any) -> int:
-    """How long the number is that ``base**exponent`` contains."""
-    return bits(base) * _constant_part(exponent)
 
 
 def large_exponent(exponent: Any) -> bool:

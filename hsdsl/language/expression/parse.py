@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from hsdsl.base.names import LOOKALIKES, normalised, shown
 from hsdsl.language.expression.timebox import deep_stack
@@ -26,6 +26,13 @@ class ExpressionError(Exception):
         self.start = start
         self.end = end
         self.hint = hint
+
+
+def explained(what: str, *facts: Any) -> Any:
+    """What a function of `hsdsl.language.diagnosis.expressions` says of a fault."""
+    from hsdsl.language.diagnosis import expressions
+
+    return getattr(expressions, what)(*facts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,9 +258,7 @@ def _operator(text: str, at: int, expected: Expected) -> Token:
     match = _OPERATOR.match(text, at)
     if match:
         return Token("operator", match.group(), at, match.end())
-    from hsdsl.language.diagnosis.expressions import strange_sign
-
-    raise ExpressionError(*strange_sign(text, at, expected))
+    raise ExpressionError(*explained("strange_sign", text, at, expected))
 
 
 DEEPEST = 200
@@ -357,9 +362,7 @@ class _Parser:
                 inner = self.expression(0)
             self.close(token)
             return inner
-        from hsdsl.language.diagnosis.expressions import missing_operand
-
-        raise ExpressionError(*missing_operand(self.tokens, self.at))
+        raise ExpressionError(*explained("missing_operand", self.tokens, self.at))
 
     def call(self, function: Token) -> Tree:
         """A function's arguments."""
@@ -397,9 +400,7 @@ class _Parser:
 
     def unexpected(self) -> ExpressionError:
         """The error for something after an operand that is no operator."""
-        from hsdsl.language.diagnosis.expressions import unexpected
-
-        return ExpressionError(*unexpected(self.tokens, self.at, self.expected, self.depth))
+        return ExpressionError(*explained("unexpected", self.tokens, self.at, self.expected, self.depth))
 
 
 def _chain(binding: int, operators: list[str], operands: list[Tree], start: int, end: int) -> Tree:

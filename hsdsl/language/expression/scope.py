@@ -14,7 +14,7 @@ import sympy as sp
 
 from hsdsl.base.functions import CONSTANTS, FUNCTIONS
 from hsdsl.base.names import SINCE, WORDS, did_you_mean, shown
-from hsdsl.language.expression.parse import Call, ExpressionError, Name, Number, Product, Tree, walk
+from hsdsl.language.expression.parse import Call, ExpressionError, Name, Number, Product, Tree, explained, walk
 
 TIME = sp.Symbol("t", real=True)
 _MISSING: Any = object()
@@ -109,9 +109,7 @@ class Scope:
             elif isinstance(node, Name):
                 fault = self._name(name, start in measured)
             elif fault := self._call(name, node.arguments):
-                from hsdsl.language.diagnosis.expressions import timed
-
-                passed = end if timed(name, None) else passed  # its units mean nothing here
+                passed = end if explained("timed", name, None) else passed  # its units mean nothing here
                 end = start + len(name) if fault.code == "HS112" else end
             if fault and fault.message not in [other.message for other in faults]:
                 faults.append(ExpressionError(fault.code, fault.message, start, end, fault.hint))
@@ -132,10 +130,9 @@ class Scope:
         if name in FUNCTIONS or isinstance(value, Function):
             return Refusal("HS112", f"`{name}` is a function and needs its arguments", f"write {name}(...)")
         if value is _MISSING:
-            from hsdsl.language.diagnosis.expressions import unknown_name
-
             known = [n for n, value in self.values.items() if isinstance(value, Value) and self._reachable(value)]
-            return Refusal("HS111", f"nothing here is called '{shown(name)}'", unknown_name(name, known, measured))
+            hint = explained("unknown_name", name, known, measured)
+            return Refusal("HS111", f"nothing here is called '{shown(name)}'", hint)
         if not isinstance(value, Value) or self._reachable(value):
             return value if isinstance(value, Refusal) else None
         assert self.states is not None
@@ -163,15 +160,12 @@ class Scope:
             own = [name for name, value in self.values.items() if isinstance(value, Function)]
             first = arguments[0] if arguments else None
             time = f"{float(first.value):g}" if isinstance(first, Number) else getattr(first, "name", None)
-            from hsdsl.language.diagnosis.expressions import unknown_function
-
-            return Refusal("HS112", f"there is no function '{shown(name)}'", unknown_function(name, time, own))
+            hint = explained("unknown_function", name, time, own)
+            return Refusal("HS112", f"there is no function '{shown(name)}'", hint)
         broken = isinstance(known, Function) and known.tree is None
         if broken or (given >= fewest and (most is None or given <= most)):
             return None
-        from hsdsl.language.diagnosis.expressions import miscounted
-
-        return Refusal("HS113", *miscounted(name, given, fewest, most, example))
+        return Refusal("HS113", *explained("miscounted", name, given, fewest, most, example))
 
     def _reachable(self, value: Value) -> bool:
         return self.states is None or value.uses <= self.states

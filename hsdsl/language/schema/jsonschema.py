@@ -20,8 +20,9 @@ class _Generator(GenerateJsonSchema):
     def model_schema(self, schema: Any) -> dict[str, Any]:
         """The schema of a class; a key that the class has from another means the same."""
         made = super().model_schema(schema)
+        of_kinds = [_keys().get(_short(kind.__name__), {}) for kind in schema["cls"].__mro__]
         for name, field in schema["cls"].model_fields.items():
-            about, *examples = next(keys[name] for keys in map(_keys_of, schema["cls"].__mro__) if name in keys)
+            about, *examples = next(keys[name] for keys in of_kinds if name in keys)
             made["properties"][field.alias or name] |= {"description": about, "examples": examples}
         return made
 
@@ -53,10 +54,6 @@ def json_schema() -> dict[str, Any]:
 @cache
 def _keys() -> dict[str, Any]:
     return tomllib.loads(Path(__file__).with_name("keys.toml").read_text(encoding="utf-8"))
-
-
-def _keys_of(document: type) -> dict[str, Any]:
-    return _keys().get(_short(document.__name__), {})
 
 
 def _short(name: str) -> str:

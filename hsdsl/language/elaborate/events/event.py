@@ -270,7 +270,8 @@ def edges_of(event: Event, events: Sequence[Event]) -> Iterator[Draft]:
                 now *= 1 - other.ready * alike
             elif turn is None and other.delay is None and other.edge.priority > event.edge.priority:
                 now *= 1 - other.ready
-        yield _when_due(fires, event, now), event, None
+        surface = event.surface(now, HALF, f"{event.names['due']} >= 1/2")  # where now is 1, not 0
+        yield replace(fires, surface=surface, condition=None, condition_text=None, strict=False), event, None
     if event.delay is not None:
         made = _executes(event)
         yield replace(made, condition=all_of(made.condition, *goes)), None, None
@@ -283,12 +284,6 @@ def edges_of(event: Event, events: Sequence[Event]) -> Iterator[Draft]:
             others = [edge.priority for edge in event.mode.edges]
             arms = replace(arms, priority=max(others) + 1 if part.strict else min(others) - 1)
         yield replace(arms, surface=surface, condition=when, condition_text=f"not ({event.event.text})"), None, None
-
-
-def _when_due(edge: Edge, event: Event, truth: Any) -> Edge:
-    """An edge that goes where a number is 1 or more, and not where it is 0 or less."""
-    surface = event.surface(truth, HALF, f"{event.names['due']} >= 1/2")
-    return replace(edge, surface=surface, condition=None, condition_text=None, strict=False)
 
 
 def _with(event: Event, reached: Reached, value: bool, part: Reached) -> Any:
