@@ -52,6 +52,7 @@ CASES = {  # those of parts and events apart: exports take the others as they ar
 }
 MEANING = [f"M{k}" for k in range(1, 14)]
 SCHEMES = ("relaxed", "located")
+DIGITS = ("rk4-30-digits", "adaptive-30-digits")
 LIMIT = 30  # seconds for one run; most take a thousandth of it
 
 
@@ -167,17 +168,26 @@ def engines(setting: str) -> list[tuple[str, Any]]:
     return [("c", ()), ("python", pytest.mark.campaign)]
 
 
+def settings_of(run: Run, turn: int) -> list[tuple[str, Any]]:
+    """The settings of a run, and marks: cases take turns in the explicit methods in thirty digits, campaigns both."""
+    left = DIGITS[turn % 2] if {*DIGITS} <= {*run.settings} else None
+    return [(setting, pytest.mark.campaign if setting == left else ()) for setting in run.settings]
+
+
 def parameters() -> list[Any]:
     """Every run of every case in every setting that it names, by every engine that has it."""
     return [
-        pytest.param(name, run, setting, scheme, engine, id=f"{name}-{number}-{setting}-{scheme}-{engine}", marks=marks)
-        for name, path in CASES.items()
+        pytest.param(
+            name, run, setting, scheme, engine,
+            id=f"{name}-{number}-{setting}-{scheme}-{engine}", marks=of_setting or of_engine,
+        )
+        for turn, (name, path) in enumerate(CASES.items())
         for number, run in enumerate(map(Run.of, read(path)["runs"]))
         for scheme in run.scheme
-        for setting in run.settings
+        for setting, of_setting in settings_of(run, turn + SCHEMES.index(scheme))
         if SETTINGS[setting].get("only", scheme) == scheme
-        for engine, marks in engines(setting)
-    ]
+        for engine, of_engine in engines(setting)
+    ]  # fmt: skip
 
 
 @lru_cache(maxsize=4)  # a model that ran holds memory for each of its settings

@@ -106,7 +106,7 @@ def brusselator(cells: int) -> tuple[Model, Any, list[float]]:
 @needs_compiler
 def test_many_states() -> None:
     made, field, start = brusselator(16)
-    assert_engines_agree(made, kernel=False, scheme="located", tolerance=1e-3, until=0.05)
+    assert_engines_agree(made, scheme="located", tolerance=1e-3, until=0.05)
     run = made.simulate(tolerance=1e-7, until=2)
     theirs = solve_ivp(field, (0, 2), start, "Radau", rtol=1e-9, atol=1e-9).y[:, -1]
     assert np.max(np.abs(list(run.final.state.values()) - theirs)) <= 1e-6

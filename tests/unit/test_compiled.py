@@ -72,7 +72,7 @@ def test_rows_in_many_chunks_are_the_same_rows(monkeypatch):
         {"method": "rk4", "step": 0.02},
         {"method": "midpoint", "step": 0.02},
     ):
-        run = assert_engines_agree(oscillator, kernel=False, until=40, **settings)
+        run = assert_engines_agree(oscillator, until=40, **settings)
         assert len(run.times) > 500
 
 
