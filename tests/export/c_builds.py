@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import subprocess
 import sys
@@ -11,6 +13,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from shutil import which
 from typing import Any
+
+from export import cached_cc
 
 from hsdsl.engine.runtime.library import RUNTIME, print_scheme, runtime_text
 from hsdsl.export import files_of, source_of, write
@@ -43,30 +47,10 @@ def _objects() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="hsdsl-objects-")
 
 
-COMPILER = """\
-import hashlib, os, pathlib, shutil, subprocess, sys
-words, kept = sys.argv[1:], pathlib.Path(__file__).parent
-if not any(word.endswith("runtime/hs.c") for word in words) or "-c" not in words:
-    sys.exit(subprocess.run(["cc", *words]).returncode)
-call = lambda words: subprocess.run(["cc", *words], stdout=subprocess.PIPE, check=True).stdout
-at = words.index("-o") + 1
-rest = words[: at - 1] + words[at + 1 :]
-flags = [word for word in rest if not os.path.exists(word) and not word.startswith("-I")]
-text = call([word for word in rest if word != "-c"] + ["-E", "-P"])
-found = kept / hashlib.sha256(repr(flags).encode() + text).hexdigest()
-if not found.exists():
-    call([*words[:at], f"{found}.{os.getpid()}", *words[at + 1 :]])
-    os.replace(f"{found}.{os.getpid()}", found)
-shutil.copy(found, words[at])
-"""
-
-
 @cache
 def cached_compiler() -> str:
-    """The words of a compiler that compiles the loop once: of the same text with the same flags it keeps the object."""
-    script = Path(_objects().name) / "cc.py"
-    script.write_text(COMPILER)
-    return f"{sys.executable} {script}"
+    """The words of a compiler that compiles the loop once."""
+    return f"{sys.executable} {cached_cc.__file__}"
 
 
 @cache
@@ -74,7 +58,10 @@ def runtime_object(command: tuple[str, ...]) -> str:
     """The runtime compiled by a command, once for all tests: it is the same in every export."""
     target = Path(_objects().name) / f"hs{runtime_object.cache_info().currsize}.o"
     headers = [f"-I{RUNTIME}", f"-I{print_scheme(target.parent)}"]
-    _run([*command, *headers, "-c", "-o", str(target), str(RUNTIME / "hs.c")])
+    written = io.StringIO()
+    with contextlib.redirect_stderr(written):
+        code = cached_cc.compile_once(list(command), headers, str(RUNTIME / "hs.c"), target)
+    assert code == 0 and not written.getvalue(), written.getvalue()[:4000]
     return str(target)
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from functools import cache
 from pathlib import Path
+from shutil import which
 from typing import Any
 
 import pytest
-from export.c_builds import COMPILERS
+from export.c_builds import COMPILERS, cached_compiler
 from export.octave import OCTAVE, assert_runs, evaluated, exported
 from shipped import assert_golden
 
@@ -102,7 +104,10 @@ def test_without_mex_files_a_program_is_compiled_and_called(tmp_path: Path) -> N
     program.unlink()
     command = re.search(r"    cc .*?-lm\n", (tmp_path / "README.md").read_text(), re.DOTALL)
     assert command is not None
-    subprocess.run(["bash", "-ec", command[0]], cwd=tmp_path, check=True)
+    (tmp_path / "none" / "cc").write_text(f'#!/bin/sh\nexec {cached_compiler()} "$@"\n')
+    (tmp_path / "none" / "cc").chmod(0o700)
+    found = {"PATH": f"{tmp_path / 'none'}:{os.environ['PATH']}", "HSDSL_TESTS_CC": which("cc") or "cc"}
+    subprocess.run(["bash", "-ec", command[0]], cwd=tmp_path, check=True, env={**os.environ, **found})
     assert_runs(model, tmp_path, f"{NO_MEX} r = NAME_run();")
     program.unlink()
     tried = f"{NO_MEX} try, thermostat_run(); catch e, disp(e.message); end"
