@@ -92,7 +92,7 @@ static void lay_out_chunk(hs_instance *instance) {
   const hs_chunk chunk = {PROBLEM_ROWS, 0, PROBLEM_ARCS, 0, PROBLEM_TRANSITIONS, 0, PROBLEM_TRANSITIONS, 0,
                           instance->times, instance->values, instance->outputs, instance->depth, instance->pieces,
                           instance->arc, instance->transition, instance->before, instance->after,
-                          instance->alternatives, 0, instance->note};
+                          instance->alternatives, 0, instance->note, 0};
   const hs_visited visited = {PROBLEM_VISITED, 0, instance->visited_mode, instance->visited, instance->slot};
   instance->task.chunk = chunk;
   instance->task.visited = visited;
