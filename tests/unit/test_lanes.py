@@ -127,6 +127,7 @@ def test_crossings_are_found_in_lanes(together: Together, name: str, share: floa
         ("oscillator-with-stop-1", {"until": 25}, 0.9),
         ("thermostat", {}, 0.9),  # from mode to mode
         ("bouncing-ball", {"tolerance": 1e-8}, 0.5),  # to where it stays on the ground
+        ("pronking-runner", {}, 0.95),  # to a final mode
     ],
 )
 def test_transitions_are_made_in_lanes(together: Together, name: str, call: dict[str, Any], share: float) -> None:
@@ -134,6 +135,39 @@ def test_transitions_are_made_in_lanes(together: Together, name: str, call: dict
     for samples in (None, 9):
         together.compare(model, initial=varied(model), samples=samples, **call)
     assert together.jumped > share
+
+
+TIED = """
+hsdsl: 1
+modes:
+  a:
+    flow: {x: v, y: v, v: 1 - v}
+    transitions:
+      - {when: x >= 1, to: b, reset: {x: -1}}
+      - {when: y >= 1, to: b, reset: {y: -1}, priority: 1}
+  b:
+    flow: {x: v, y: v, v: 1 - v}
+    transitions:
+      - {when: x >= 1, to: a, reset: {x: -2, v: v/2}}
+      - {when: y >= 1, to: end, reset: {y: -2}}
+  end: {final: true}
+initial: {mode: a, x: 0, y: 0, v: 1}
+experiment: {until: 20}
+"""
+
+
+@pytest.mark.parametrize("model", [TIED, (MODELS / "pronking-runner.yaml").read_text()])
+def test_edges_that_are_crossed_together(together: Together, model: str) -> None:
+    """The one goes that has the higher priority, or comes first; the other at once, alone, from where that has led."""
+    name = "x" if model is TIED else "z"
+    varied = {name: np.linspace(0.3, 0.6, COUNT) + (name == "z")}
+    for samples in (None, 9):
+        found = together.compare(
+            hsdsl.loads(model), initial=varied | ({"y": varied["x"]} if name == "x" else {}), samples=samples
+        )
+        assert set(found.stop) == {"final"}
+    assert together.located > 0.8
+    assert together.jumped > 0.95
 
 
 def test_four_lanes(together: Together, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,7 +35,8 @@ typedef struct {
   double *end, *error;      /* the flow at the end of the step, and the error there */
   double *values, *weights, *gradient, *shares, *slopes;
   /* what is found on a step: where each surface is crossed that is still open, and the sizes of largest() at the first */
-  double *theta, *time, *q, *sizes, *first;
+  double *theta, *time, *q, *sizes, *first; /* first: of edges that are crossed together there the one that goes */
+  double *stood, *within; /* see stands(), and enter_surfaces(): how long before or after it passes what it counts as stood on */
   /* a bit for each lane; where it passed, or none of the next ones is set, a run brings along what the step ended with */
   int32_t passed;   /* it goes on before its limit */
   int32_t failed;   /* the step is not known to be what the loop for one run would make */
@@ -43,7 +44,8 @@ typedef struct {
   int32_t doubtful; /* of the others: its error is to be looked at */
   int32_t crossed;  /* of the others: a surface may be crossed on it, or reached */
   int32_t landed;   /* the first crossings are found */
-  int32_t jumped;   /* of these: nothing else is there, so the transition may be made in the lane; and then where it was */
+  int32_t jumped;   /* of these: it is known which edge goes, so the transition may be made in the lane; and then where it was */
+  int32_t leads;    /* of these: the flow may lead out of the mode that is entered at once */
 } hs_lanes;
 
 typedef struct {

@@ -27,37 +27,46 @@ static void move_part(lane_part *to, const lane_part *from, int n, int lane) {
   for (int i = 0; i <= n; i++) to->b[i][lane] = from->b[i][lane];
 }
 
-/* The first part on which the polynomial rises once through zero, or the `last` one after which it stays above: see
-   rises() and last_root(). The lanes that have one. */
+/* The first part on which the polynomial rises once through zero, or the `last` one behind which it stays above: see
+   rises() and last_root(). The lanes that have one. Parts of lanes that are cut together are put aside together; a
+   bit for each says whether a lane still has its own. */
 static hs_mask part_that_rises(lane_part *here, int n, hs_mask lanes, int last) {
-  lane_part aside[MOST_ASIDE], left, right;
-  int open[HS_WIDTH] = {0};
+  lane_part aside[MOST_ASIDE];
+  uint32_t open[HS_WIDTH] = {0};
+  int asides = 0;
   hs_mask found = lanes & ~lanes;
   for (hs_mask live = lanes; hs_any(live);) {
     const hs_real *const b = here->b;
+    uint32_t kept = 0;
     hs_mask never;
     const hs_mask gone = live & (last ? least_of(b, n) > 0 : largest_of(b, n) <= 0), once = changes_once(b, n, &never);
     const hs_mask hit = live & ~gone & (b[0] <= 0) & (b[n] > 0) & (last ? once | never : once);
     const hs_mask cut = live & ~gone & ~hit & (here->high - here->low > HS_UNIT) & (last ? lanes : b[0] <= 0);
     found |= hit;
-    live = gone | cut;
-    if (hs_any(cut)) {
-      right = *here;
-      split(right.b, n, HS_ALL(0.5), left.b);
-      left.low = here->low, right.high = here->high;
-      left.high = right.low = (here->low + here->high) / 2;
-      lane_part *const other = last ? &left : &right, *const next = last ? &right : &left;
-      for (int lane = 0; lane < HS_WIDTH; lane++)
-        if (cut[lane] && open[lane] < MOST_ASIDE)
-          move_part(&aside[open[lane]++], other, n, lane), move_part(here, next, n, lane);
-        else if (cut[lane])
-          live[lane] = 0;
+    live = gone;
+    if (hs_any(cut) && asides < MOST_ASIDE) {
+      hs_real middle = (here->low + here->high) / 2, half[HS_MOST_ORDER + 1];
+      lane_part *const other = &aside[asides];
+      hs_real *const later = last ? half : other->b, *const nearer = last ? other->b : half;
+      for (int i = 0; i <= n; i++) later[i] = b[i];
+      split(later, n, HS_ALL(0.5), nearer);
+      other->low = last ? here->low : middle, other->high = last ? middle : here->high;
+      here->low = hs_choose(cut, last ? middle : here->low, here->low);
+      here->high = hs_choose(cut, last ? here->high : middle, here->high);
+      for (int i = 0; i <= n; i++) here->b[i] = hs_choose(cut, half[i], b[i]);
+      for (uint32_t bits = bits_of(cut); bits; bits &= bits - 1) open[__builtin_ctz(bits)] |= 1u << asides;
+      asides++;
+      live |= cut;
     }
-    for (int lane = 0; hs_any(gone) && lane < HS_WIDTH; lane++)
-      if (gone[lane] && open[lane])
-        move_part(here, &aside[--open[lane]], n, lane);
-      else if (gone[lane])
+    for (uint32_t bits = bits_of(gone); bits; bits &= bits - 1) {
+      const int lane = __builtin_ctz(bits), newest = open[lane] ? 31 - __builtin_clz(open[lane]) : -1;
+      if (newest < 0)
         live[lane] = 0;
+      else
+        move_part(here, &aside[newest], n, lane), open[lane] ^= 1u << newest;
+    }
+    for (int lane = 0; hs_any(gone) && lane < HS_WIDTH; lane++) kept |= open[lane];
+    while (hs_any(gone) && asides && !(kept >> (asides - 1))) asides--;
   }
   return found;
 }
@@ -186,22 +195,65 @@ static hs_mask settle_lanes(const hs_lane_mode *mode, const hs_lanes *l, int k, 
   return done;
 }
 
-/* The lanes in which surface k, beside the first one, is not crossed or is crossed with it: see mark_after() and
-   with_unseen(). In those `apart` the state there does not stand on it: see standing(). */
+/* What other surfaces than the first one are, where that is crossed. */
+typedef struct {
+  hs_mask apart; /* not crossed there, and of edges the state does not stand on it: see standing() */
+  hs_mask tied;  /* crossed with it */
+  hs_mask stood; /* the run stands on it, and did before: see stands() */
+} lane_other;
+
+/* The lanes in which surface k is not crossed or is crossed with the first one: see mark_after() and with_unseen(). */
 static hs_mask agrees(const hs_lane_mode *mode, const hs_lanes *l, int k, hs_real share, hs_mask settled, hs_real theta,
-                      hs_real time, const hs_real *q, hs_mask *apart) {
+                      hs_real time, const hs_real *q, lane_other *other) {
   const hs_real r = ((hs_real *)l->values)[k], since = HS_TIE * fabs(time), own = ((hs_real *)l->time)[k];
   hs_real *const open = (hs_real *)l->open + k, noise, rate;
-  const hs_mask rises = share < 2, tied = settled & (own >= time) & (own - time <= since);
-  const hs_mask below = k < mode->edges ? ~(r > 0) : rises | ~rises;
-  *apart = rises & ~rises;
-  if (bound_of(mode, l, k, time, q, ((hs_real *)l->weights)[k], &noise)) return *apart;
-  if (mode->rates[k].shape(mode->rates[k].of, (hs_real *)l->p, time, q, &rate)) return *apart;
+  const hs_mask rises = share < 2, all = rises | ~rises, later = (own > time) | (((hs_real *)l->theta)[k] == theta);
+  const hs_mask close = settled & later & (own - time <= since);
+  const int edge = k < mode->edges;
+  other->apart = other->tied = other->stood = ~all;
+  if (bound_of(mode, l, k, time, q, ((hs_real *)l->weights)[k], &noise)) return ~all;
+  if (mode->rates[k].shape(mode->rates[k].of, (hs_real *)l->p, time, q, &rate)) return ~all;
   const hs_real near = hs_max(noise, fabs(rate) * since);
-  const hs_mask behind = rises & (share > theta) & (r < -near);
-  *open = hs_choose(behind, *open * 0, *open);
-  *apart = (fabs(r) > near) & (behind | ~rises);
-  return (rises & ~behind & tied) | (~(rises & ~behind) & below);
+  const hs_mask counts = rises & ~((share > theta) & (r < -near));
+  *open = hs_choose(rises & ~counts, *open * 0, *open);
+  other->apart = ~counts & (edge ? fabs(r) > near : all);
+  if (edge && is_plain(&l->modes[l->mode].edge[k])) other->tied = counts & close;
+  other->stood = (((hs_real *)l->standing)[k] != 0) & (fabs(r) <= noise);
+  return (counts & close) | (~counts & (edge ? ~(r > 0) : all));
+}
+
+/* Write a number in some lanes. */
+HS_INLINE void put_in(hs_mask lanes, double *column, hs_real number) {
+  *(hs_real *)column = hs_choose(lanes, number, *(hs_real *)column);
+}
+
+/* Choose, where edges are crossed together, which one goes from the first crossing: see choose(). */
+static void choose_in_lanes(const hs_lane_mode *mode, hs_lanes *l, hs_mask lanes, hs_real first, const lane_other *others,
+                               hs_real theta, hs_real time) {
+  const int n = mode->dimension;
+  const hs_edge *const edge = l->modes[l->mode].edge;
+  const hs_real *const standing = (hs_real *)l->standing, *const q = (hs_real *)l->q;
+  hs_real chosen = first, priority = first * 0;
+  hs_mask stood = lanes & ~lanes;
+  for (int k = 0; k < mode->edges; k++) priority = hs_choose(first == k, HS_ALL(edge[k].priority), priority);
+  for (int k = 0; k < mode->edges && mode->surfaces > 1; k++) {
+    const hs_mask before = (edge[k].priority > priority) | ((edge[k].priority == priority) & (k < chosen));
+    const hs_mask goes = others[k].tied & before;
+    chosen = hs_choose(goes, HS_ALL(k), chosen), priority = hs_choose(goes, HS_ALL(edge[k].priority), priority);
+  }
+  for (int k = 0; k < mode->surfaces; k++) {
+    const hs_mask on = standing[k] != 0;
+    if (mode->surfaces > 1) stood |= others[k].stood;
+    stood |= ((first == k) | (chosen == k)) & on;
+    for (int j = 0; k < mode->edges && j < mode->surfaces; j++) {
+      const hs_mask moved = lanes & (chosen == k) & (first == j);
+      if (j == k || !hs_any(moved)) continue;
+      put_in(moved, l->time + k * HS_WIDTH, time), put_in(moved, l->theta + k * HS_WIDTH, theta);
+      for (int s = 0; s < n; s++) put_in(moved, l->q + (k * n + s) * HS_WIDTH, q[j * n + s]);
+    }
+  }
+  *(hs_real *)l->first = chosen;
+  *(hs_real *)l->stood = hs_choose(stood, HS_ALL(1.0), theta * 0);
 }
 
 static int locate_lanes(hs_lanes *l) {
@@ -209,7 +261,8 @@ static int locate_lanes(hs_lanes *l) {
   const int n = mode->dimension;
   hs_real *const sizes = (hs_real *)l->sizes, *const shares = (hs_real *)l->shares, *const slopes = (hs_real *)l->slopes;
   hs_real first = HS_ALL(-1.0), least = HS_ALL(2.0), theta = least, time = least, q[n];
-  hs_mask settled[mode->surfaces + 1], plain = first == first, alone = plain, apart;
+  hs_mask settled[mode->surfaces + 1], plain = first == first, alone = plain;
+  lane_other others[mode->surfaces + 1];
   l->landed = l->jumped = 0;
   if (first_rises(mode, l, shares, slopes, &plain) || !hs_any(plain)) return 0;
   for (int k = 0; k < mode->surfaces; k++) {
@@ -225,14 +278,19 @@ static int locate_lanes(hs_lanes *l) {
   if (!hs_any(plain)) return 0;
   if (mode->surfaces > 1 && look_at(mode, l, theta, &time, q)) return 0;
   for (int k = 0; k < mode->surfaces; k++) {
-    if (mode->surfaces == 1) time = *(hs_real *)l->time, apart = alone;
-    else plain &= (first == k) | agrees(mode, l, k, shares[k], settled[k], theta, time, q, &apart);
-    alone &= (first == k) | apart;
+    const hs_mask is_first = first == k;
+    if (mode->surfaces == 1) {
+      time = *(hs_real *)l->time;
+      break;
+    }
+    plain &= is_first | agrees(mode, l, k, shares[k], settled[k], theta, time, q, &others[k]);
+    alone &= is_first | others[k].apart | others[k].tied;
+    others[k].tied &= ~is_first, others[k].stood &= ~is_first;
   }
   for (int s = 0; s < n; s++) sizes[s] = hs_max(((hs_real *)l->before)[s], size_at(l, n, theta, s));
-  alone &= (time - *(hs_real *)l->t > HS_TIE * fabs(time)) & (time < *(hs_real *)l->limit);
-  *(hs_real *)l->first = first;
+  alone &= plain & (first < mode->edges) & (time < *(hs_real *)l->limit) & (time - *(hs_real *)l->t > HS_TIE * fabs(time));
+  choose_in_lanes(mode, l, alone, first, others, theta, time);
   l->landed = (int32_t)bits_of(plain);
-  l->jumped = (int32_t)bits_of(plain & alone);
+  l->jumped = (int32_t)bits_of(alone);
   return 0;
 }

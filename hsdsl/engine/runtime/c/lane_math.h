@@ -71,6 +71,6 @@ static hs_mask quick_cos(hs_wide x, hs_wide *found) { return turned(x, 1, found)
 #define quick_cos quick_none
 #endif
 
-static hs_mask quick_none(hs_wide x, hs_wide *found) { return (void)found, x != x & x == x; }
+static hs_mask quick_none(hs_wide x, hs_wide *found) { return (void)found, (x != x) & (x == x); }
 
 #endif

@@ -59,6 +59,7 @@ static void lay_out_lanes(hs_row_of_lanes *row, const hs_model *model, const hs_
   take_columns(store, n * lanes, scratch);
   take_columns(store, m * lanes, found);
   l->q = numbers(store, m * n * lanes);
+  l->stood = numbers(store, lanes), l->within = numbers(store, lanes);
   l->inverse = numbers(store, (most + lanes - 1) / lanes * lanes);
   if (store->numbers) fill_binomials(l->inverse, (int)order);
   for (int64_t i = 0; store->numbers && i < most; i++) l->inverse[i] = 1 / l->inverse[i];
@@ -127,6 +128,12 @@ static void clear_lane(hs_row_of_lanes *row, int lane) {
   *seat->mode = seat->run.here.mode;
 }
 
+/* Let the run of a lane go. */
+static void free_lane(hs_row_of_lanes *row, int lane) {
+  row->seat[lane]->has_own = 0;
+  row->seat[lane] = 0, row->count--;
+}
+
 /* Have the run of a seat where a lane has taken it; `written`: its last row as well, where lanes write none. */
 static void leave_lane(hs_row_of_lanes *row, int lane, hs_seat *seat, int written) {
   hs_run *const run = &seat->run;
@@ -147,8 +154,7 @@ static void leave_lane(hs_row_of_lanes *row, int lane, hs_seat *seat, int writte
   for (int k = 0; k < run->here.table->surfaces; k++)
     run->here.active += run->surfaces.active[k] = l->standing[k * lanes + lane] != 0;
   if (written && run->lanes.bare) append(run, run->here.t, run->x, 0);
-  seat->has_own = 0;
-  row->seat[lane] = 0, row->count--;
+  free_lane(row, lane);
 }
 
 /* Put the step of a lane where try_series() writes its own. */

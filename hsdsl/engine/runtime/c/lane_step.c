@@ -199,6 +199,9 @@ static int step_lanes(hs_lanes *l) {
   return 0;
 }
 
+/* Whether the transition of an edge is made wherever its surface is crossed. */
+static int is_plain(const hs_edge *edge) { return !edge->conditional && !edge->strict && !edge->of_event; }
+
 #include "lane_crossings.c"
 
 /* What an edge's routine makes of the values `before` of the states, to `out`: see hs_changed(). */
@@ -232,14 +235,9 @@ static hs_mask may_hold(const hs_lanes *l, int entered, hs_real t, const hs_real
   return held;
 }
 
-/* Write a number in some lanes. */
-HS_INLINE void put_in(hs_mask lanes, double *column, hs_real number) {
-  *(hs_real *)column = hs_choose(lanes, number, *(hs_real *)column);
-}
-
 /* Make the transition of edge k in some lanes, and enter its target: see largest(), reset(), place() and enter(). The
-   lanes in which this is all: the state after it is beyond no surface, none may hold it, and the flow leads out through
-   no guard: see leads_out(). */
+   lanes in which this is all: the state after it is beyond no surface, and none may hold it. Those in which the flow may
+   lead out at once through a guard are marked: see leads_out(). */
 static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lanes) {
   const hs_mode *const own = &l->modes[l->mode];
   const hs_edge *const edge = &own->edge[k];
@@ -247,9 +245,10 @@ static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lan
   const hs_lane_mode *const next = &lane_modes[edge->target];
   const int n = mode->dimension, m = next->dimension;
   const hs_real t = ((hs_real *)l->time)[k], *const q = (hs_real *)l->q + k * n, *const p = (hs_real *)l->p;
-  hs_real both[2 * n], after[m], spread[m], scales[m], sizes[m], noise;
+  hs_real both[2 * n], after[m], spread[m], scales[m], sizes[m], noise, rate;
   hs_real *const values = (hs_real *)l->values, *const weights = (hs_real *)l->weights;
-  const hs_mask stood = ((hs_real *)l->standing)[k] != 0;
+  const hs_real within = *(hs_real *)l->within;
+  const hs_mask stood = *(hs_real *)l->stood != 0;
   hs_mask on[next->surfaces + 1];
   for (int s = 0; s < n; s++) {
     const hs_real x = ((hs_real *)l->x)[s], scale = ((hs_real *)l->scale)[s], entered = ((hs_real *)l->entered)[s];
@@ -268,10 +267,15 @@ static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lan
   for (int j = 0; j < next->surfaces; j++) {
     if (bound_with(next, l, j, t, after, weights[j], spread, lanes | ~lanes, &noise)) return lanes & ~lanes;
     lanes &= (values[j] <= noise) & (values[j] > -FAR);
+    const hs_mask passed = lanes & (within != 0) & (values[j] < -noise);
+    if (hs_any(passed)) {
+      if (next->rates[j].shape(next->rates[j].of, p, t, after, &rate)) return lanes & ~lanes;
+      noise = hs_choose(passed, hs_max(noise, fabs(rate) * within), noise);
+    }
     on[j] = values[j] >= -noise;
     if (!hs_any(lanes & on[j]) || j >= to->edges) continue;
     if (next->rates[j].shape(next->rates[j].of, p, t, after, &noise)) return lanes & ~lanes;
-    lanes &= ~(on[j] & (noise > 0));
+    l->leads |= (int32_t)bits_of(lanes & on[j] & (noise > 0));
   }
   lanes &= ~may_hold(l, edge->target, t, after, sizes, on, lanes);
   for (int s = 0; s < m; s++) {
@@ -285,16 +289,32 @@ static hs_mask jump_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lan
   return lanes;
 }
 
+/* The same into a final mode: only the state there counts. */
+static hs_mask end_by(const hs_lane_mode *mode, hs_lanes *l, int k, hs_mask lanes) {
+  const hs_edge *const edge = &l->modes[l->mode].edge[k];
+  const hs_real *const q = (hs_real *)l->q + k * mode->dimension;
+  const int m = edge->target_dimension;
+  hs_real after[m + 1];
+  if (changed(edge, &mode->edge[k].reset, (hs_real *)l->p, ((hs_real *)l->time)[k], q, q, after)) return lanes & ~lanes;
+  for (int s = 0; s < m; s++) lanes &= fabs(after[s]) < FAR;
+  for (int s = 0; s < m; s++) put_in(lanes, l->x + s * HS_WIDTH, after[s]);
+  return lanes;
+}
+
 static int jump_lanes(hs_lanes *l) {
   const hs_lane_mode *const mode = &lane_modes[l->mode];
   const hs_real first = *(hs_real *)l->first;
   const hs_mask lanes = mask_of(l->jumped);
   uint32_t jumped = 0;
+  l->leads = 0;
   for (int k = 0; k < mode->edges; k++) {
     const hs_edge *const edge = &l->modes[l->mode].edge[k];
     const hs_mask own = lanes & (first == k);
-    const int plain = !edge->conditional && !edge->strict && !edge->of_event && mode->edge[k].reset.shape;
-    if (plain && lanes_are_for[edge->target] && hs_any(own)) jumped |= bits_of(jump_by(mode, l, k, own));
+    if (!is_plain(edge) || !mode->edge[k].reset.shape || !hs_any(own)) continue;
+    if (l->modes[edge->target].final)
+      jumped |= bits_of(end_by(mode, l, k, own));
+    else if (lanes_are_for[edge->target])
+      jumped |= bits_of(jump_by(mode, l, k, own));
   }
   l->jumped = (int32_t)jumped;
   return 0;

@@ -98,12 +98,19 @@ static int first_of_lane(const hs_row_of_lanes *row, int lane, hs_time *t) {
   return k;
 }
 
-/* Whether a run may make the transition that is found in a lane there: see jump() and crowded(). */
+/* Whether a run may make the transition that is found in a lane there, and what it leaves aside: see jump() and
+   crowded(). */
 static int may_jump(const hs_row_of_lanes *row, int lane) {
   hs_run *const run = &row->seat[lane]->run;
+  const hs_lanes *const l = &row->l;
+  int *const count = &run->event.alternatives_count;
   hs_real flight, ratio;
   hs_time t;
-  first_of_lane(row, lane, &t);
+  const int k = first_of_lane(row, lane, &t);
+  *count = 0;
+  for (int j = 0; j < run->here.table->edges; j++)
+    if (j != k && l->open[j * row->lanes + lane] != 0) run->event.alternatives[(*count)++] = j;
+  l->within[lane] = *count ? tie(t) : 0.0;
   if (limit_reached(run) || run->model->queues || run->task->settings.arcs) return 0;
   return run->written.jump < FREE || contraction(run, &flight, &ratio) || flown(run, t) > run->epsilon;
 }
@@ -123,22 +130,28 @@ static void after_jump_in_lane(hs_team *team, hs_row_of_lanes *row, int lane) {
   const hs_lanes *const l = &row->l;
   const int mode = run->here.mode, k = chosen->edge = first_of_lane(row, lane, &chosen->time);
   const hs_edge *const edge = &run->here.table->edge[k];
+  const int m = edge->target_dimension;
   chosen->theta = l->theta[k * row->lanes + lane], chosen->state = run->event.crossings[k].state;
-  run->event.alternatives_count = 0;
   if (!run->lanes.bare) {
     gather(l->q + k * run->here.dimension * row->lanes, chosen->state, run->here.dimension, row->lanes, lane);
-    gather(l->x, run->event.after, edge->target_dimension, row->lanes, lane);
+    gather(l->x, run->event.after, m, row->lanes, lane);
     step_of_lane(row, lane, run);
     write_crossing(run, chosen);
   }
   record(run, chosen, chosen->time, run->event.after, 0);
-  run->here = mode_at(run, edge->target, edge->target_dimension, chosen->time, 0);
+  if (run->model->mode[edge->target].final) {
+    gather(l->x, run->x, m, row->lanes, lane);
+    free_lane(row, lane);
+    go_ahead(team, seat, enter(run, edge->target, m, chosen->time, 1, 0.0, 0, chosen->time), 0);
+    return;
+  }
+  run->here = mode_at(run, edge->target, m, chosen->time, 0);
   begin(run, HS_FLOW);
-  gather(l->x, run->x, edge->target_dimension, row->lanes, lane);
+  gather(l->x, run->x, m, row->lanes, lane);
   begin_following(run);
   comes_back(run, 1);
   seat->has_jumped = 1;
-  if (run->lanes.bare && !may_end(run, chosen->time) && !steps_alone(team, run)) {
+  if (run->lanes.bare && !(l->leads >> lane & 1) && !may_end(run, chosen->time) && !steps_alone(team, run)) {
     clear_lane(row, lane);
     return;
   }
