@@ -141,13 +141,9 @@ def making(kind: str, key: str) -> AbstractContextManager[None]:
     """Let one process at a time make an entry, where the cache can be written: others wait and find it."""
     from hsdsl.base.atomic import locked
 
-    return locked(folder() / kind / key) if can_keep(kind, key) else nullcontext()
-
-
-def can_keep(kind: str, key: str) -> bool:
-    """Whether an entry may be made and there is a folder for it."""
     entry = folder() / kind / key
-    return all(private(place) is None for place in (folder(), entry.parent, entry))
+    usable = all(private(place) is None for place in (folder(), entry.parent, entry))
+    return locked(entry) if usable else nullcontext()
 
 
 def _checksum(data: bytes) -> str:

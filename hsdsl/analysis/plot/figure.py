@@ -142,7 +142,9 @@ def draw(runs: Sequence[Execution], view: View, make: Callable[[tuple[float, flo
     phases = _phases(figure, outer[0, 1], plan, pairs, data, view) if pairs else []
     top = ribbon or panels[0]
     title = view.title or ", ".join(dict.fromkeys(map(words.heading, runs)))
-    facts = _facts(runs[0]) if len(runs) == 1 else _facts_of_several(runs)
+    badly = sum(not run.stop.complete for run in runs)
+    several = f"{len(runs)} runs" + f", {badly} stopped before the end" * bool(badly)
+    facts = _facts(runs[0]) if len(runs) == 1 else several
     heading(figure, title, facts, top, 6 if ribbon else 16 + _raise_of(top))
     handles = modes_named(panels[0], data[0], strip, plan.room[0]) if len(data) == 1 else _runs_named(labels, strip)
     columns = [name for each in shown_panels.values() for name in each if len(each) <= MOST_MARKED]
@@ -184,11 +186,6 @@ def _facts(run: Execution) -> str:
         return f"{made}, stopped: {words.stop(run)}"
     how = "until" if run.stop.reason == "until" else "final mode entered at"
     return f"{made}, {how} t = {words.number(run.stop.time, 8)}"
-
-
-def _facts_of_several(runs: Sequence[Execution]) -> str:
-    badly = sum(not run.stop.complete for run in runs)
-    return f"{len(runs)} runs" + (f", {badly} stopped before the end" if badly else "")
 
 
 def modes_named(top: Axes, run: Curves, strip: Strip | None, width: float) -> list[Patch]:

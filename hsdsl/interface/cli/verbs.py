@@ -6,7 +6,7 @@ import os
 import re
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib import import_module
 from inspect import Parameter, Signature, signature
 from keyword import iskeyword
@@ -142,7 +142,11 @@ def _report(error: Any, words: list[str]) -> int:
     if choices or json:
         from hsdsl.interface.cli.console import report_usage
 
-        report_usage(_not_a_choice(error, choices) if choices else UsageError(error.format_message()), json)
+        message, hint = error.format_message(), None
+        if choices:
+            value: str = error.message.split("'")[1]
+            message, hint = f"there is no {error.param.name} '{value}'", did_you_mean(value, choices)
+        report_usage(UsageError(message, hint), json)
     else:
         error.message = visible(error.message) if words else error.message  # else the help text
         error.show(sys.stderr)
@@ -174,8 +178,3 @@ def _whole(error: Any, words: list[str]) -> str | None:
 
 def _options(error: Any) -> set[str]:
     return {each for option in getattr(getattr(error.ctx, "command", None), "params", ()) for each in option.opts}
-
-
-def _not_a_choice(error: Any, choices: Sequence[str]) -> UsageError:
-    value: str = error.message.split("'")[1]
-    return UsageError(f"there is no {error.param.name} '{value}'", did_you_mean(value, choices))

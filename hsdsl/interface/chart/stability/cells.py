@@ -81,7 +81,9 @@ class Bench:
         if isinstance(scene, str):
             return Cell(UNKNOWN, why=scene)
         try:
-            return self._peer(scene, tool, arguments) if tool.name else self._own(scene, tool, arguments)
+            if not tool.name:
+                return self._own(scene, tool, arguments)
+            return _cell(scene, prepare(tool.name, scene)(arguments.get("tolerance", PEER_TOLERANCE)), "stopped")
         except UsageError as error:
             return Cell(REFUSED, why=str(error))
         except NotFinite as end:
@@ -133,9 +135,6 @@ class Bench:
         except UsageError:  # the model's space has none
             return nan
         return rho.upper if isfinite(rho.upper) and rho.upper - rho.lower <= LOOSE * rho.upper else nan
-
-    def _peer(self, scene: Scene, tool: Tool, arguments: Mapping[str, Any]) -> Cell:
-        return _cell(scene, prepare(tool.name, scene)(arguments.get("tolerance", PEER_TOLERANCE)), "stopped")
 
 
 def _cell(scene: Scene, result: Result, reason: str) -> Cell:

@@ -10,6 +10,7 @@ from hsdsl.base import limits
 from hsdsl.base.names import shown
 from hsdsl.language.source.xml import Element
 
+_NOTES = ("notes", "annotation")
 _SYMBOLS = {"time": "time", "delay": "delay", "avogadro": "avogadro", "rateOf": "rateOf"}  # ends of definition URLs
 CONSTANTS = ("true", "false", "pi", "exponentiale", "infinity", "notanumber")
 
@@ -308,7 +309,7 @@ class _Reader:
         self.model.events = [event for i, one in events if (event := self.event(i, one)) is not None]
 
     def listed(self, element: Element, name: str) -> list[Element]:
-        return [one for list_ in element.all(f"listOf{name}") for one in list_.children if not _is_note(one)]
+        return [one for list_ in element.all(f"listOf{name}") for one in list_.children if one.tag not in _NOTES]
 
     def number(self, element: Element, key: str) -> float:
         text = element.attributes.get(key, "")
@@ -438,7 +439,3 @@ def _renamed(node: Node, names: Mapping[str, str]) -> Node:
         return Node("name", part.element, name=names[part.name])
 
     return node.mapped(change)
-
-
-def _is_note(element: Element) -> bool:
-    return element.tag in ("notes", "annotation")
