@@ -1,12 +1,14 @@
 """What large flat models cost: chains of masses with stops (`tests/chains.py`), and the grid of 625 modes.
 
 For each number of masses: processor seconds to load, lower and compile the first time, and again with everything kept;
-processor time of a run for each step and state; memory. SciPy and scikit-SUNDAE run with events to the same tolerance,
-in turns with ours: how many times as long the fastest of their runs takes. CVODE has its sparse solver, or its banded
-one, for which each mass's states stand together. Then chains whose masses all come to rest on their stops, and a stiff
-chain by `radau`.
+processor time of a run for each step and state; memory. SciPy and scikit-SUNDAE run with events, in turns with ours:
+how many times as long the fastest of their runs takes. CVODE has its sparse solver, or its banded one, for which each
+mass's states stand together. It runs to the same tolerance, and to the first of those that are quartered from there
+whose error is no larger than ours. Errors are the largest of a state at the end, against a run of ours to 1e-12; CVODE
+agrees with that to the error printed. Then chains whose masses all come to rest on their stops, and a stiff chain by
+`radau`. Processor time is that of all threads, so those that only wait must not be there.
 
-    python benchmarks/scale.py [10 50 100 200 500]
+    OMP_NUM_THREADS=1 python benchmarks/scale.py [10 50 100 200 500]
 """
 
 from __future__ import annotations
@@ -90,8 +92,8 @@ class Chain:
         x[self.n :][hit] *= -BOUNCE
         return x
 
-    def by_scipy(self, until: float) -> int:
-        """Run by `solve_ivp`; returns how many impacts there were."""
+    def by_scipy(self, until: float) -> tuple[int, np.ndarray]:
+        """Run by `solve_ivp`; returns how many impacts there were, and the state at the end."""
 
         def stop(k: int) -> Callable[[float, np.ndarray], float]:
             def event(_: float, x: np.ndarray) -> float:
@@ -109,11 +111,13 @@ class Chain:
         while True:
             found = solve_ivp(rates, (t, until), x, rtol=TOLERANCE, atol=TOLERANCE, events=events)
             if found.status != 1:
-                return count
+                return count, found.y[:, -1]
             hit = np.array([len(times) > 0 for times in found.t_events])
             t, x, count = found.t[-1], self.bounced(found.y[:, -1], hit), count + int(hit.sum())
 
-    def by_cvode(self, until: float, banded: bool = False) -> Callable[[], int]:
+    def by_cvode(
+        self, until: float, banded: bool = False, tolerance: float = TOLERANCE
+    ) -> Callable[[], tuple[int, np.ndarray]]:
         """The same by CVODE with its sparse solver, or its banded one and the states mass by mass, made once."""
         n = self.n
         order = np.arange(2 * n).reshape(2, n).T.ravel() if banded else np.arange(2 * n)
@@ -133,17 +137,17 @@ class Chain:
         events.terminal, events.direction = [True] * n, [1] * n  # type: ignore[attr-defined]
         sparse = {"linsolver": "sparse", "sparsity": self.pattern()}
         options = {"linsolver": "band", "lband": 3, "uband": 2} if banded else sparse
-        options |= {"rtol": TOLERANCE, "atol": TOLERANCE, "max_num_steps": 1_000_000}
+        options |= {"rtol": tolerance, "atol": tolerance, "max_num_steps": 1_000_000}
         solver = sun.cvode.CVODE(rates, eventsfn=events, num_events=n, **options)
 
-        def run() -> int:
+        def run() -> tuple[int, np.ndarray]:
             t, x, count = 0.0, self.at, 0
             while True:
                 found = solver.solve(np.array([t, until]), x[order])
                 if not found.success:
                     raise RuntimeError(f"CVODE stopped at {found.t[-1]}: {found.message}")
                 if found.status != 2:
-                    return count
+                    return count, np.atleast_2d(found.y)[-1][place]
                 hit = np.atleast_2d(found.i_events)[-1] != 0
                 t, x = float(np.ravel(found.t_events)[-1]), self.bounced(np.atleast_2d(found.y_events)[-1][place], hit)
                 count += int(hit.sum())
@@ -163,21 +167,37 @@ def fastest(*runs: Callable[[], Any]) -> list[float]:
     return best
 
 
+def end_of(model: hsdsl.Model, n: int, tolerance: float) -> np.ndarray:
+    """The state at the end of our run."""
+    state = model.simulate(tolerance=tolerance).final.state
+    return np.array([state[f"{name}{i}"] for name in "xv" for i in range(n)])
+
+
 def row(n: int) -> str:
     """One line of the table."""
     first, again, memory = started(chain(n))
     model, other = hsdsl.loads(chain(n, until=UNTIL)), Chain(n, 1 / 20)
     found = model.simulate(tolerance=TOLERANCE)
-    peers = [other.by_cvode(UNTIL), other.by_cvode(UNTIL, banded=True)]
+    exact = end_of(model, n, 1e-12)
+
+    def off(end: np.ndarray) -> float:
+        return float(np.abs(end - exact).max())
+
+    own_error = off(end_of(model, n, TOLERANCE))
+    tolerance, peers = TOLERANCE, [other.by_cvode(UNTIL), other.by_cvode(UNTIL, banded=True)]
+    while off(other.by_cvode(UNTIL, banded=True, tolerance=tolerance)()[1]) > own_error:
+        tolerance /= 4
+    peers += [other.by_cvode(UNTIL, tolerance=tolerance), other.by_cvode(UNTIL, banded=True, tolerance=tolerance)]
     peers += [lambda: other.by_scipy(UNTIL)] if n <= MOST_FOR_SCIPY else []
+    errors = [off(end) for count, end in (peer() for peer in peers) if count == len(found.transitions)]
+    if len(errors) < len(peers):
+        print("other impacts:", end=" ")
     own, *others = fastest(lambda: model.simulate(tolerance=TOLERANCE), *peers)
-    for peer in peers:
-        if (count := peer()) != len(found.transitions):
-            print(f"other impacts: {count}", end=" ")
     each = own / len(found.times) / (2 * n) * 1e9
     return (
         f"{n:5}  {first:6.2f} s  {again:6.2f} s  {memory:5.0f} MB  {len(found.transitions):5}  {own * 1e3:8.2f} ms"
-        f"  {each:6.0f} ns  {'  '.join(f'{time / own:6.1f} x' for time in others)}"
+        f"  {each:6.0f} ns  {own_error:.0e}  {tolerance:.0e}"
+        f"  {'  '.join(f'{time / own:5.2f} x ({error:.0e})' for time, error in zip(others, errors, strict=False))}"
     )
 
 
@@ -198,12 +218,17 @@ def resting(n: int) -> str:
         f"{n:5}  lowered in {loaded:6.2f} s  {len(kept.routines.source) / n / 1e3:5.1f} kB of routines a mass  "
         f"{len(found.transitions):6} impacts  {own:6.2f} s"
         f"  {each:6.0f} ns a step and state  {rest} at rest"
+        f"{'' if found.stop.complete else f' as {found.stop.reason} ended the run at t = {found.times[-1]:.3g}'}"
     )
 
 
 def main() -> None:
     """Print the tables."""
-    print("    n     first     again    memory  impacts      run   step/state   sparse    banded     SciPy", flush=True)
+    print(
+        "    n     first     again    memory  impacts      run   step/state  error  CVODE's tolerance"
+        "  times as long (error): CVODE sparse and banded at 1e-06, sparse and banded at that tolerance, SciPy",
+        flush=True,
+    )
     for n in map(int, sys.argv[1:] or (10, 50, 100, 200, 500)):
         print(row(n), flush=True)
     print("masses that come to rest on their stops:", flush=True)
