@@ -7,20 +7,20 @@ import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from types import FunctionType
-from typing import ParamSpec, TypeVar, cast
+from typing import Any, ParamSpec, TypeVar, cast
 
 from hsdsl.base.errors import UsageError
 
 V = TypeVar("V")
 LOOKALIKES = "·²³"  # Unicode allows some of them in names; in mathematics they are operators
 # controls, line ends that are none in YAML, marks of direction, and what has no width
-INVISIBLE = re.compile(
+INVISIBLE = (  # these are compiled where they are needed, which few runs do
     "[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u00ad\u061c\u200b\u200e\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufffe\uffff]"
 )
-_HIDDEN = re.compile(f"(?:{INVISIBLE.pattern}|[\n\r\ud800-\udfff])")  # a surrogate is a byte that is no text
+_HIDDEN = f"(?:{INVISIBLE}|[\n\r\ud800-\udfff])"  # a surrogate is a byte that is no text
 _MEMORY = "@"  # in no name of a file
-_STORED = re.compile(rf".*{_MEMORY}to\.(.+?)(?:\[\d+\])?")
-_GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
+_STORED = rf".*{_MEMORY}to\.(.+?)(?:\[\d+\])?"
+GREEK = "GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)"
 SINCE = "since"  # the time since the mode was entered, where a file has no such name of its own
 INITIAL = "initial."  # before the name of a state: its initial value
 NO_FILE = "<text>"  # the path of a model that is in no file
@@ -37,7 +37,7 @@ _SIGNS = {  # signs that Unicode does not take for the ASCII sign they look like
 _LETTERS = str.maketrans(  # Cyrillic and Greek letters and the Latin ones they look like
     "аеорсухіјѕԁһԛԝАВЕКМНОРСТУХІЈЅΑΒΕΖΗΙΚΜΝΟΡΤΥΧοανρ", "aeopcyxijsdhqwABEKMHOPCTYXIJSABEZHIKMNOPTYXoavp"
 )
-_WIDE = re.compile("<(?:wide|narrow|small|noBreak|compat)> [0-9A-F]{4,5}")
+_WIDE = "<(?:wide|narrow|small|noBreak|compat)> [0-9A-F]{4,5}"
 _LONGEST_TO_COMPARE = 60
 _MOST_TO_COMPARE = 300
 MOST_LISTED = 8
@@ -62,7 +62,7 @@ def plain_sign(character: str) -> str | None:
     """The ASCII sign, digit or blank that another character is easily taken for."""
     if character.isascii():
         return None
-    wide = _WIDE.fullmatch(unicodedata.decomposition(character))
+    wide = re.fullmatch(_WIDE, unicodedata.decomposition(character))
     plain = _SIGNS.get(character) or (unicodedata.normalize("NFKC", character) if wide else "")
     return plain if plain.isascii() and not plain.isalpha() and len(plain) == 1 else None
 
@@ -97,7 +97,7 @@ def _spelled(name: str) -> str:
     """A name without accents and dots above, Greek letters by their names: what people take for the same."""
     letters: list[str] = []
     for letter in name if name.isascii() else unicodedata.normalize("NFKD", name):
-        greek = _GREEK.fullmatch(unicodedata.name(letter, ""))
+        greek = re.fullmatch(GREEK, unicodedata.name(letter, ""))
         letters.append(greek.group(1) if greek else "" if unicodedata.combining(letter) else letter)
     return "".join(letters).lower().replace("_", "")
 
@@ -114,7 +114,7 @@ def nth_memory(state: str, number: int) -> str:
 
 def remembered_state(name: str) -> str:
     """The state whose later value a state of an event's memory is, as x of ``NAME@to.x[2]``; none is ``""``."""
-    found = _STORED.fullmatch(name)
+    found = re.fullmatch(_STORED, name)
     return found[1] if found else ""
 
 
@@ -166,7 +166,7 @@ def did_you_mean(name: str, candidates: Iterable[str], otherwise: str | None = N
 
 def visible(text: str) -> str:
     """A text as one line, character by character, without any that steer a terminal or hide from a reader."""
-    return _HIDDEN.sub("\ufffd", text)
+    return text if text.isprintable() else re.sub(_HIDDEN, "\ufffd", text)
 
 
 def visible_lines(text: str) -> str:
@@ -178,7 +178,7 @@ def visible_lines(text: str) -> str:
 
 def shown(text: str, limit: int | None = 60) -> str:
     """A text as a sentence can carry it: in one line, and cut."""
-    text = visible(" ".join(INVISIBLE.sub("\ufffd", text).split()))
+    text = visible(" ".join(re.sub(INVISIBLE, "\ufffd", text).split()))
     return text if limit is None or len(text) <= limit else text[: limit - 3] + "..."
 
 
@@ -216,7 +216,8 @@ def checks_arguments(function: Callable[P, R], name: str = "", elsewhere: Elsewh
 
 def checks_methods(kind: C, elsewhere: Elsewhere = nowhere, name: str = "") -> C:
     """Let a class and its methods raise UsageError for arguments that are none of theirs."""
-    for key, value in list(vars(kind).items()):
+    for key in list(vars(kind)):
+        value: Any = kind.__init__ if key == "__init__" else vars(kind)[key]  # a data class compiles its own then
         if isinstance(value, FunctionType) and (key == "__init__" or not key.startswith("_")):
             of = name or kind.__name__
             setattr(kind, key, checks_arguments(value, of if key == "__init__" else f"{of}.{key}", elsewhere))

@@ -10,14 +10,14 @@ import ast
 import re
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
 
 from hsdsl import __version__
+from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.errors import UsageError
-from hsdsl.base.names import visible
+from hsdsl.base.names import GREEK, visible
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import numbered
 from hsdsl.engine.backends.python import PythonKernel
@@ -243,9 +243,6 @@ def parameters_in(*nodes: ast.AST) -> set[int]:
     return {int(name[1:]) for name in names if name[0] == "p" and name[1:].isdigit()}
 
 
-_GREEK = re.compile("GREEK (?:SMALL|CAPITAL) LETTER ([A-Z]+)")
-
-
 def identifiers(names: Iterable[str], reserved: Collection[str] = ()) -> dict[str, str]:
     """An identifier for each name, in order; one that is taken or reserved gets underscores at its end."""
     taken: dict[str, str] = {}
@@ -270,7 +267,7 @@ def _letters(sign: str) -> str:
         return sign if sign.isalnum() else "_"
     if unicodedata.combining(sign):
         return ""
-    greek = _GREEK.fullmatch(unicodedata.name(sign, ""))
+    greek = re.fullmatch(GREEK, unicodedata.name(sign, ""))
     return greek.group(1).lower() if greek else "_"
 
 

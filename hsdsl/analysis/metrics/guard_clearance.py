@@ -11,8 +11,7 @@ import numpy as np
 
 from hsdsl.analysis.metrics.gate_sequence import interval_of, norm
 from hsdsl.analysis.metrics.geometry import TOLERANCE, Formula, Passage, Space
-from hsdsl.base.numbers.bernstein import UNIT
-from hsdsl.base.numbers.enclosures import Array
+from hsdsl.base.numbers.bernstein import UNIT, Array
 
 HALVINGS = 12
 FARTHEST = 1e6  # times the points' size: no bound beyond it is looked for where a gradient vanishes

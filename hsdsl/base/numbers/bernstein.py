@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from functools import cache
 from math import comb
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array = np.ndarray[Any, np.dtype[np.float64]]  # numpy.typing would be imported for its one name
 UNIT = 2.0**-53  # round-off of one operation, relative
 
 

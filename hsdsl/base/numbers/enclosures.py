@@ -9,7 +9,6 @@ nowhere negative is nowhere negative.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial, reduce
 from math import isfinite
@@ -17,11 +16,10 @@ from operator import add, mul
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import Arithmetic
-
-Array = NDArray[np.float64]
+from hsdsl.base.numbers.bernstein import Array
 
 ANGLE = 2.0**-49  # more than rounding makes of a number of turns, beside that number and 1
 STEPS = 4  # units in the last place by which NumPy's functions may be wrong

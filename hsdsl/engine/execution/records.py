@@ -6,7 +6,6 @@ Records are frozen dataclasses, with fields that may be made on first use, and e
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import lru_cache
 from importlib import import_module
 from itertools import chain
@@ -14,8 +13,8 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast, overload
 
 import numpy as np
-import numpy.typing as npt
 
+from hsdsl.base.dataclasses import dataclass, field, fields, is_dataclass, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_methods, did_you_mean
 
@@ -297,7 +296,7 @@ class Point:
         return self.state[name] if name in self.state else self.outputs[name]
 
 
-Array = npt.NDArray[Any]
+Array = np.ndarray[Any, np.dtype[Any]]
 
 # The first three columns of every table; a state or output of such a name is labelled `state.j`, `output.j`.
 HYBRID_TIME = ("time", "mode", "j")

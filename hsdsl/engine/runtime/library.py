@@ -95,7 +95,7 @@ def loop() -> ctypes.CDLL:
 
 def _shipped(content: str) -> Path:
     """Where a library would be that came with this package."""
-    return SHIPPED / f"{key_of(content, _our_text(), _OPTIONS, _processor())}.so"
+    return SHIPPED / f"{key_of(content, _our_own(), _OPTIONS, _processor())}.so"
 
 
 def load(content: str, symbol: str, source: Callable[[], Sequence[str]], further: tuple[str, ...] = ()) -> ctypes.CDLL:
@@ -132,12 +132,12 @@ def _loaded(path: Path) -> ctypes.CDLL | None:
 
 
 def _key(content: str, compiler: Compiler, further: tuple[str, ...] = ()) -> str:
-    return key_of(content, _our_text(), compiler.identity, " ".join((_OPTIONS, *further)), _processor())
+    return key_of(content, _our_own(), compiler.identity, " ".join((_OPTIONS, *further)), _processor())
 
 
 @cache
-def _our_text() -> bytes:
-    """The hand-written C and what prints the rest: closer than a version to what a library was made by."""
+def _our_own() -> str:
+    """The checksum of the hand-written C and of what prints the rest: closer than a version to what made a library."""
     printers = (
         BACKENDS / "printer.py",
         BACKENDS / "taylor.py",
@@ -145,7 +145,7 @@ def _our_text() -> bytes:
         *sorted(SCHEME.glob("*.py")),
     )
     paths = (*sorted(RUNTIME.glob("*.[ch]")), *printers)
-    return b"".join(path.read_bytes() for path in paths)
+    return key_of(*(path.read_bytes() for path in paths))
 
 
 def _processor() -> str:

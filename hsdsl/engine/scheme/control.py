@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import NOTHING, Number
 from hsdsl.engine.scheme.primitives import Count, Time, Vector, inline
 

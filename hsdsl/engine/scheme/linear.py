@@ -9,8 +9,7 @@ vary with the states: a solution is one of the states, then one for each column.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.primitives import IndexRoom, Indices, Room, Vector, inline

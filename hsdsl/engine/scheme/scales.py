@@ -9,8 +9,7 @@ round-off of this, and no more than a thirty-second.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.primitives import (
     Here,

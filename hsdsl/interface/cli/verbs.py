@@ -27,9 +27,9 @@ VERBS = {  # with their modules
     "doctor": "doctor",
 }  # fmt: skip
 COMPLETE = "_HSDSL_COMPLETE"  # set by a shell that completes a command line
-_UNKNOWN = re.compile(r"No such (?:option|command):? '?([\w-]+)")
-_EXTRA = re.compile(r"unexpected extra argument\S* \((.+)\)")
-_OVERRIDE = re.compile(r"[\w.\[\]]+=.+")
+_UNKNOWN = r"No such (?:option|command):? '?([\w-]+)"
+_EXTRA = r"unexpected extra argument\S* \((.+)\)"
+_OVERRIDE = r"[\w.\[\]]+=.+"
 _PAIRS = ("--set", "--vary", "--limit")  # options of NAME=VALUE
 _MODELS = (".yaml", ".yml", ".json")
 _OF_OTHERS = {
@@ -157,7 +157,7 @@ def _report(error: Any, words: list[str]) -> int:
 
 def _meant(error: Any) -> str | None:
     """The command or option that has another name in other tools."""
-    name = _UNKNOWN.search(error.message)
+    name = re.search(_UNKNOWN, error.message)
     known = {*VERBS, *_options(error)}
     return next(
         (own for own, others in _OF_OTHERS.items() if name and name[1] in others.split() and own in known), None
@@ -168,12 +168,12 @@ def _whole(error: Any, words: list[str]) -> str | None:
     """The command line of a model without a verb, or the override that is not one word with its option."""
     if error.message.startswith("No such command") and (words[0].endswith(_MODELS) or os.path.isfile(words[0])):
         return shlex.join(["hsdsl", "run", *words])
-    extra = _EXTRA.search(error.message)
+    extra = re.search(_EXTRA, error.message)
     stray = extra[1].split()[0] if extra else ""
     before = words[words.index(stray) - 2 :][:2] if stray in words[2:] else []
     if before and before[0] in _PAIRS and "=" not in before[1]:
         return f"{before[0]} {before[1]}={stray}"
-    return f"--set {stray}" if _OVERRIDE.fullmatch(stray) and "--set" in _options(error) else None
+    return f"--set {stray}" if re.fullmatch(_OVERRIDE, stray) and "--set" in _options(error) else None
 
 
 def _options(error: Any) -> set[str]:

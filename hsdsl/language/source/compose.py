@@ -6,6 +6,7 @@ YAML 1.1 (`on` is true, `010` is eight), lose places and recurse before anything
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import yaml
@@ -104,7 +105,7 @@ def decode(path: str, data: bytes) -> Text:
         raise ModelError([Diagnostic("HS001", message, span, "save the file as UTF-8", before.lines[-1])]) from None
     text = Text.of(path, content)
     first: dict[str, int] = {}
-    for match in INVISIBLE.finditer(content):
+    for match in re.finditer(INVISIBLE, content):
         first.setdefault(match.group(), match.start())
     wrong: list[Diagnostic] = []
     for sign, start in first.items():
@@ -194,11 +195,11 @@ class Composer:
     def _scalar(self, event: Any) -> Scalar:
         if event.tag is not None:
             return absent(self._place(event))
-        hidden = INVISIBLE.search(event.value)
+        hidden = re.search(INVISIBLE, event.value)
         if hidden:
             message = f"this escape is the invisible character U+{ord(hidden.group()):04X}"
             self.faults.report(self._place(event).diagnostic("HS002", message, "remove it"))
-            return Scalar(INVISIBLE.sub("", event.value), False, self._place(event))
+            return Scalar(re.sub(INVISIBLE, "", event.value), False, self._place(event))
         return Scalar(event.value, event.style is None or event.style == "", self._place(event))
 
     def _sequence(self, event: Any) -> tuple[Node, int, int]:

@@ -15,14 +15,13 @@ both beside their values.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property
 from math import copysign
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.names import remembered_state
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
 from hsdsl.base.numbers.bernstein import Array
@@ -34,6 +33,8 @@ from hsdsl.engine.simulate.problem import Tails
 from hsdsl.mathematics.program import ModeProgram
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from hsdsl.engine.simulate.verdict.run_view import Place, RunView
 
 SAFE = 10  # margins below so many errors are named

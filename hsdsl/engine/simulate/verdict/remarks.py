@@ -11,15 +11,15 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
-from hsdsl.base.numbers.enclosures import Array, Range, Undecided, as_range
+from hsdsl.base.numbers.bernstein import Array
+from hsdsl.base.numbers.enclosures import Range, Undecided, as_range
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.kernel import ModeKernel
 from hsdsl.engine.simulate.stops import (
@@ -36,6 +36,9 @@ from hsdsl.engine.simulate.stops import (
 from hsdsl.engine.simulate.verdict.crossings import sliding_spans
 from hsdsl.engine.simulate.verdict.run_view import MOST_PARTS, ROUNDS, RunView
 from hsdsl.mathematics.program import ModeProgram, Program
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 BEYOND = 4  # times its round-off: a wall that does not hold
 END = 1.0

@@ -7,15 +7,14 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import groupby
 from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.names import remembered_state, without_memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Arithmetic, Number
 from hsdsl.base.numbers.bernstein import Array
@@ -31,6 +30,8 @@ from hsdsl.engine.simulate.verdict.shadow import ErrorsByShadow, shadow_errors
 from hsdsl.mathematics.program import ModeProgram
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from hsdsl.engine.simulate.surfaces import Surfaces
 
 ALONG = 1e-3  # of what a surface may change by: less is along it
