@@ -13,6 +13,7 @@ import os
 import platform
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 from typing import Any, BinaryIO, cast
@@ -131,6 +132,7 @@ FORMAT, VERSION = "hsdsl table", 2  # sidecars of version 1 name neither
 LIBRARIES = ("hsdsl", "numpy", "mpmath", "sympy")
 
 
+@cache
 def versions() -> dict[str, str]:
     """Return the versions of Python and of the libraries that numbers can depend on."""
     known = {"python": platform.python_version()}
