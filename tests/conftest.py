@@ -25,6 +25,11 @@ settings.load_profile("any machine")
 cache.MOST_ENTRIES = 1 << 20  # tests make thousands: to look for the oldest of 500 takes longer than to write one
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Begin with tests that take minutes: at the end one worker would be alone with them."""
+    items.sort(key=lambda item: item.get_closest_marker("minutes") is None)
+
+
 def pytest_collection_finish() -> None:
     """Spare the collector of garbage what stays: thousands of tests and the libraries that they import."""
     gc.freeze()

@@ -50,6 +50,7 @@ def _with_all_addresses() -> None:
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
 
 
+@pytest.mark.minutes
 @pytest.mark.parametrize(
     "most", [pytest.param([], marks=pytest.mark.slow, id="some"), pytest.param(["all"], marks=pytest.mark.campaign)]
 )
