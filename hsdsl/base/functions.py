@@ -192,7 +192,12 @@ def power(base, exponent):
 
 
 def rebuilt(expr, arguments):
-    """An expression with other arguments, made as :func:`power` makes powers."""
+    """An expression with other arguments, made as :func:`power` makes powers.
+
+    Which of two expressions is larger SymPy is not asked: it splits both into real and imaginary parts.
+    """
+    if expr.is_Relational and arguments[0] != arguments[1] and not all(side.is_number for side in arguments):
+        return expr.func(*arguments, evaluate=False)
     return power(*arguments) if expr.is_Pow else expr.func(*arguments)
 
 

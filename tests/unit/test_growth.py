@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from sympy.core import relational
 
 from hsdsl.engine.backends.c.source import model_source
 from hsdsl.language.elaborate import elaborate
@@ -42,3 +43,12 @@ def test_text_grows_with_the_model(model):
         program = lower(elaborate("large.yaml", text=text.encode()))
         sizes.append(len(repr(program)) + len(model_source(program)))
     assert sizes[1] < 2.4 * sizes[0]  # numbers with more digits; a square would be 4
+
+
+def test_conditions_are_lowered_without_a_proof_of_which_side_is_larger(monkeypatch):
+    edge = "{when: x >= 2, if: (1 - x)*(2 - y)*(3 - z) >= 1/2, to: m}"
+    text = f"hsdsl: 1\nmodes: {{m: {{flow: {{x: 1, y: 1, z: 1}}, transitions: [{edge}]}}}}\n"
+    text += "initial: {mode: m, x: 0, y: 0, z: 0}\nexperiment: {until: 1}\n"
+    system, asked = elaborate("proof.yaml", text=text.encode()), []
+    monkeypatch.setattr(relational, "is_ge", lambda *sides: asked.append(sides))
+    assert lower(system).modes[0].conditions == (("condition_0_0",),) and not asked

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property, partial
-from math import prod
 from typing import Any
 
 from hsdsl.base.dataclasses import dataclass, replace
@@ -242,7 +241,7 @@ def _turn(event: Event, events: Sequence[Event]) -> Any | None:
         return None
     others = [other for other in events if other is not event]
     higher = ((other, below(event.priority - other.priority, ZERO, ONE, ZERO)) for other in others)
-    return prod((ONE - rank * other.ready for other, rank in higher if rank != 0), start=ONE)
+    return ONE - either([rank * other.ready for other, rank in higher if rank != 0])
 
 
 def edges_of(event: Event, events: Sequence[Event]) -> Iterator[Draft]:
