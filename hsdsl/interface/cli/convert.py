@@ -99,6 +99,9 @@ AT = (
 )
 
 
+SEED = "SBML: draws the order of simultaneous events of equal priority, 1 to 2147483646."
+
+
 def import_(
     file: Annotated[Path, Argument(metavar="FILE", help=FILE)],
     cfg: Annotated[Path | None, option("FILE", CFG)] = None,
@@ -106,6 +109,7 @@ def import_(
     force: Annotated[bool, Option("--force", help="Replace an existing file.")] = False,
     urgent: Annotated[bool, Option("--urgent", help=URGENT)] = False,
     at: Annotated[list[str] | None, option("POINT", AT)] = None,
+    seed: Annotated[int | None, option("N", SEED)] = None,
     until: Until = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -118,7 +122,7 @@ def import_(
             raise UsageError(f"--out {out}: the file already exists", "--force replaces it")
         from hsdsl.base.atomic import replacing
 
-        text, system = _imported(file, cfg, until, urgent, at or [])
+        text, system = _imported(file, cfg, until, urgent, at or [], seed)
         if out is None:
             print(text, end="")
             return
@@ -132,7 +136,9 @@ def import_(
             say(f"wrote {out}: {counted(len(modes), 'mode')}, {counted(edges, 'transition')}")
 
 
-def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool, at: list[str]) -> tuple[str, HybridSystem]:
+def _imported(
+    file: Path, cfg: Path | None, until: str | None, urgent: bool, at: list[str], seed: int | None
+) -> tuple[str, HybridSystem]:
     """The text of the model in a file of one of the formats, and its mathematics."""
     from hsdsl.interface.imports import sbml, spaceex
     from hsdsl.interface.model import loads
@@ -141,13 +147,18 @@ def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool, at:
 
     root = read_xml(str(file), read_bytes(file), sbml.DEEPEST)
     if not sbml.is_sbml(root):
+        if seed is not None:
+            raise UsageError(f"--seed applies to SBML models, and {file} is a SpaceEx model")
         text = spaceex.imported(file, cfg, until, urgent, at)
         return text, loads(text).system
     given = [name for name, value in (("--cfg", cfg), ("--urgent", urgent), ("--at", at)) if value]
     if given:
         raise UsageError(f"{given[0]} applies to SpaceEx models, and {file} is an SBML model")
+    seed = 1 if seed is None else seed
     try:
-        text = sbml.imported(root, until or "1")  # any end, so that errors of the file are found without one as well
+        text = sbml.imported(
+            root, until or "1", seed=seed
+        )  # any end, so that errors of the file are found without one as well
         try:
             system = loads(text).system
         except ModelError as error:
@@ -155,7 +166,7 @@ def _imported(file: Path, cfg: Path | None, until: str | None, urgent: bool, at:
     except ModelError as error:
         end = root.fault("HS202", "the end of the run is not given", "SBML does not say it: give --until")
         raise ModelError([*error.diagnostics, *([] if until else [end])]) from None
-    return (text if until else sbml.imported(root)), system
+    return (text if until else sbml.imported(root, seed=seed)), system
 
 
 NOTHING = (

@@ -1,8 +1,9 @@
 """Models of SBML, Levels 2 and 3, as models of this language; what the language has no words for is refused.
 
 `document` has the lists of a file with the defaults of their level, and its formulas as trees; `formulas` formulas as
-text of the language, and what each quantity is; `convert` the document of a model, `text` its text. Submodels (the
-package `comp`) are written out by libSBML's own converter, which people install for that.
+text of the language, and what each quantity is; `order` what draws the order of events of equal priority; `convert` the
+document of a model, `text` its text. Submodels (the package `comp`) are written out by libSBML's own converter, which
+people install for that.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from hsdsl.base.errors import Diagnostic, ModelError
+from hsdsl.base.errors import Diagnostic, ModelError, UsageError
 from hsdsl.interface.imports import end_of_run
 from hsdsl.interface.imports.sbml.convert import Converter
 from hsdsl.interface.imports.sbml.document import NotExpressible, is_sbml, model_of
+from hsdsl.interface.imports.sbml.order import MODULUS
 from hsdsl.interface.imports.sbml.text import written
 from hsdsl.language.expression.timebox import deep_stack
 from hsdsl.language.source.xml import Element, read_xml
@@ -35,20 +37,22 @@ _FIRST = {
 }
 
 
-def imported(root: Element, until: str | None = None, outputs: Mapping[str, str] | None = None) -> str:
+def imported(root: Element, until: str | None = None, outputs: Mapping[str, str] | None = None, seed: int = 1) -> str:
     """The text of a model for the root of an SBML file, Level 2 or 3.
 
     The file does not say when a run ends, at ``until``. ``outputs`` are what is recorded: names, each with ``value``,
-    ``amount`` or ``concentration``.
+    ``amount`` or ``concentration``. ``seed`` draws the order of simultaneous events of equal priority.
 
     Raises ModelError: what a model cannot keep, with its place.
-    Raises UsageError: no end of the run.
+    Raises UsageError: no end of the run; a seed that is too small or too large.
     """
     end = end_of_run(until, "SBML does not say it: give --until")
+    if not 0 < seed < MODULUS:
+        raise UsageError(f"--seed: expected a whole number from 1 to {MODULUS - 1}, got {seed}")
     try:
         with deep_stack():
             root = _flattened(root)
-            converter = Converter(model_of(root))
+            converter = Converter(model_of(root), seed)
             return written(converter, converter.document(outputs or {}, end), root.file.path)
     except NotExpressible as feature:
         place = feature.element or root

@@ -24,10 +24,10 @@ from hsdsl.interface.imports.sbml.document import (
     Undefined,
 )
 from hsdsl.interface.imports.sbml.formulas import FACTORIAL, TAKEN, Facts, Writer, literal
+from hsdsl.interface.imports.sbml.order import FIRST, Order
 
 NOTHING = "a value that nothing gives"
 ENDLESS = "infinity or not-a-number as a value"
-FIRST = 10**8  # the priority of what switches a condition inside a formula
 MOST_LISTED = 3  # lines of constraints
 LONGEST = 100_000  # characters of an initial value that is written out
 _NAME = re.compile(r"[A-Za-z_]\w*")
@@ -37,8 +37,9 @@ Document = dict[str, Any]
 class Converter(Facts):
     """What becomes of a model: conditions inside formulas by their text, in the order in which they were met."""
 
-    def __init__(self, model: SbmlModel) -> None:
+    def __init__(self, model: SbmlModel, seed: int = 1) -> None:
         super().__init__(model)
+        self.order = Order(self, lambda node: self.running.number(node), seed)
         self.flags: dict[str, tuple[str, Node]] = {}
         self._first: dict[str, str | None] = {}  # initial values of what rules assign; None while one is worked out
 
@@ -201,13 +202,21 @@ class Converter(Facts):
         recorded = {f"out_{name}": self.output(name, kind) for name, kind in finite.items()}
         equations = [f"{self.running.number(equation)} == 0" for equation in self.model.equations]
         flow = {self.own(name): self.flow(name, self.running) for name in states}
+        self.order.find()
         transitions = [self.event(event) for event in self.model.events]
         initial = {self.own(name): self.own_start(name) for name in states}
         switches, chosen = self.switches()
+        drawing = self.order.parts()
+        chosen |= drawing.get("initial", {})
         parameters = {self.own(name): self.own_start(name) for name in self.ordered(fixed)}
+        parameters |= drawing.get("parameters", {})
         functions = {self.spelled(name): self.function(known) for name, known in self.functions.items()}
+        functions |= drawing.get("functions", {})
         solve = {"solve": {"unknowns": list(map(self.spelled, self.unknowns)), "equations": equations}}
-        mode = {"flow": flow | dict.fromkeys(chosen, "0"), "transitions": [*switches, *transitions]}
+        mode = {
+            "flow": flow | dict.fromkeys(chosen, "0"),
+            "transitions": [*switches, *self.order.resets(), *transitions],
+        }
         used = set(_NAME.findall(str((list(let.values()), mode, equations, parameters, initial, recorded))))
         if not outputs:  # what only reports is an output
             recorded = {name: let.pop(name) for name in [*let] if name not in used}
@@ -290,7 +299,7 @@ class Converter(Facts):
         }
         transition: Document = {"name": self.spelled(event.name)}
         transition["event"] = self.running.condition(self.whole(event.trigger))
-        if reset:
+        if reset or event.name in self.order.drawing:
             transition["reset"] = reset
         if event.delay is not None:
             if not event.at_trigger:
@@ -301,12 +310,13 @@ class Converter(Facts):
             transition["delay"] = self.running.number(self.whole(event.delay))
         elif event.at_trigger and self.reads_changes(event):
             transition["delay"] = "0"  # its values are those of its trigger, before what other events do then
+        reset |= self.order.reset(event, "delay" in transition and "values" not in transition)
         if not event.persistent:
             transition["persistent"] = False
         if not event.initially:
             transition["initially"] = False
         if event.priority is not None:
-            text = self.running.number(self.whole(event.priority))
+            text = self.order.priorities.get(event.name) or self.running.number(self.whole(event.priority))
             whole = re.fullmatch(r"\(?(-?\d{1,9})\)?", text)
             transition["priority"] = whole[1] if whole else text
         return transition
@@ -317,14 +327,7 @@ class Converter(Facts):
         if lines:
             where = f"of line {', '.join(lines[:MOST_LISTED])}" + " and others" * (len(lines) > MOST_LISTED)
             yield f"the SBML constraints {where} are not checked: write them under `domain` to stop a run there"
-        alike: dict[str, list[str]] = {}
-        for event in self.model.events:
-            if event.priority is not None:
-                alike.setdefault(self.running.number(self.whole(event.priority)), []).append(event.name)
-        for first, other, *_ in (names for names in alike.values() if len(names) > 1):
-            yield (
-                f"{first} and {other} have one priority: where SBML chooses at random, the first in the file goes first"
-            )
+        yield from self.order.assumption()
 
     def reads_changes(self, event: Event) -> bool:
         """Whether what an event assigns uses what changes at that instant: by others, or by itself, set off again."""

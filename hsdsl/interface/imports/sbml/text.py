@@ -15,6 +15,7 @@ from hsdsl import __version__
 from hsdsl.base.names import shown, visible
 from hsdsl.interface.imports.sbml.convert import Converter
 from hsdsl.interface.imports.sbml.document import Species
+from hsdsl.interface.imports.sbml.order import MODULUS
 from hsdsl.language.expression.parse import (
     Call,
     Comparison,
@@ -55,6 +56,7 @@ def written(converter: Converter, document: dict[str, Any], path: str) -> str:
     elements |= {event.name: event.element for event in converter.model.events}
     found = {converter.spelled(name): _remark(name, element) for name, element in elements.items()}
     found |= {converter.own(name): found[converter.spelled(name)] for name in converter.quantities}
+    found[converter.order.seed_name] = f"from 1 to {MODULUS - 1}: draws the order of simultaneous events"
     remarks, units = {name: f"  # {remark}" for name, remark in found.items() if remark}, _units(converter)
     lines = ["hsdsl: 1", f"title: {_quoted(converter.model.name)}", f"source: {_quoted(Path(path).name)}", ""]
     lines += [f"# {visible(note)}" for note in notes]
