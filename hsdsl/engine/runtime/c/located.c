@@ -250,7 +250,9 @@ static int leads_out(hs_run *run) {
   const hs_time t = here->t;
   int known = 0; /* whether run->surfaces.values and run->surfaces.magnitudes are those here */
   for (int k = 0; k < here->table->edges; k++) {
+    hs_real rate; /* most flows lead inside: then no more is looked at */
     if (!run->surfaces.active[k]) continue;
+    if (hs_call(&here->table->rates[k], here->p, t, run->x, &rate) || !(rate > 0)) continue;
     if (!known && (here->table->values(here->p, t, run->x, run->surfaces.values) ||
                    magnitudes_at(run, t, run->x, run->surfaces.magnitudes)))
       break;
