@@ -11,10 +11,10 @@ import secrets
 import stat
 from collections.abc import Generator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import UsageError
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
-
-from hsdsl.base.dataclasses import dataclass, field
 
 Severity = Literal["error", "warning", "note"]
 Decided = Literal["symbolic", "interval", "sampled"]

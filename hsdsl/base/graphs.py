@@ -9,12 +9,11 @@ short. See T. A. Davis, Direct Methods for Sparse Linear Systems, SIAM 2006, Ch.
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import accumulate
 from typing import TypeVar
-
-from hsdsl.base.dataclasses import dataclass
 
 T = TypeVar("T", bound=Hashable)
 

@@ -7,9 +7,9 @@ import os
 from collections.abc import Generator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass, fields
 from pathlib import Path
 
-from hsdsl.base.dataclasses import dataclass, fields
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_methods
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeVar
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.names import did_you_mean
 
 _LISTED = 8  # instances that a hint names

@@ -7,11 +7,10 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
-
-from hsdsl.base.dataclasses import dataclass
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")

@@ -10,10 +10,9 @@ import sys
 import time
 from collections.abc import Callable, Generator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass, field
 from threading import Event, RLock, Thread
 from typing import Any
-
-from hsdsl.base.dataclasses import dataclass, field
 
 FIRST_SIGN, INTERVAL = 0.5, 0.2  # seconds
 WIDTH = 30  # letters of a bar

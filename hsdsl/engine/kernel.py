@@ -7,9 +7,9 @@ kernels tells a fault of the loop from one of the code generator.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
 
 Vector = tuple[Number, ...]

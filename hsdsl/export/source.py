@@ -10,12 +10,12 @@ import ast
 import re
 import unicodedata
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Protocol
 
 from hsdsl import __version__
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import GREEK, visible
 from hsdsl.base.numbers.arithmetic import FLOAT64

@@ -14,13 +14,13 @@ import stat
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 from hsdsl.base import limits
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import Limits, applied
 from hsdsl.base.names import closest, shown

@@ -12,6 +12,7 @@ sampled input stays as its symbol.
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from itertools import pairwise
@@ -19,7 +20,6 @@ from typing import Any, Literal, NamedTuple
 
 import sympy as sp
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.parts import Part
 from hsdsl.language.expression.conditions import Trigger
 from hsdsl.language.expression.scope import TIME as TIME

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import ast
 import re
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Literal
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.graphs import Elimination, Variation, elimination, variation
 from hsdsl.base.parts import Part
 from hsdsl.base.samples import Hold

@@ -25,6 +25,7 @@ IN_C_ALONE = {
     "LEAST_MOST_DEGREE", "BLOCK", "STEPS_BEFORE_SEARCH", "SMALL", "FEWEST_WAITS",  # of memory
     "LEVELS", "END_LEVELS", "MOST_PARTS_TRIED", "COARSE_PARTS_TRIED", "CLOSE_SHARE",  # of the screen
     "MOST_LANES", "WIDTH", "FAR", "LOST", "MOST_LOST", "KEPT", "KEPT_OF_PLACE", "MOST_ASIDE",  # of lanes
+    "OFF", "OWN", "MOST_TURNED", "LEAST_TURNED",  # and of their sines
     "MOST_NEWTON", "MOST_SETTLINGS",  # and how these find roots
     "TINIEST", "LIBRARY",  # of ranges: Python takes the next number instead
 }  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import inf, isinf
 from pathlib import Path
 from typing import Any, cast
@@ -13,7 +14,6 @@ import numpy as np
 
 from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import condensed, number
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, checks_methods, counted, did_you_mean, shown, visible
 from hsdsl.engine.execution import HYBRID_TIME, Array, Execution

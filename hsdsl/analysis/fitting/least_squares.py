@@ -7,6 +7,7 @@ is moved over it, and the fit goes on from there. A fit that ends beside a jump 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, cast
 
 import numpy as np
@@ -28,7 +29,6 @@ from hsdsl.analysis.fitting.jumps import (
 )
 from hsdsl.analysis.report.words import number
 from hsdsl.analysis.sensitivity.result import SampleSlopes, Sensitivity
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL
 from hsdsl.engine.execution import Array

@@ -7,6 +7,7 @@ Watts, Nonlinear Regression Analysis, 1988, section 6.1).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,6 @@ from scipy.optimize import brentq  # pyright: ignore[reportMissingTypeStubs, rep
 from scipy.special import chdtri, stdtrit  # pyright: ignore[reportMissingTypeStubs, reportUnknownVariableType]
 
 from hsdsl.analysis.fitting.jumps import MOST_SIDES, around, lowest
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.engine.execution import Array
 
 Numbers = Callable[[Array], Array]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import Decided, Edit, Severity, Span
 from hsdsl.language.source import Mapping, Node, SourceRange
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 from typing import Any, Literal, NamedTuple
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import Span
 from hsdsl.base.graphs import closure
 from hsdsl.language.expression import Expected, parse

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, cached_property
 from typing import Any, Literal, NamedTuple
 
 from hsdsl.analysis.lint.source_expressions import TIME, SourceExpression
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.functions import CONSTANTS  # pyright: ignore[reportUnknownVariableType]
 from hsdsl.base.names import SINCE
 from hsdsl.language.expression import ExpressionError, parse

@@ -8,6 +8,7 @@ ends of ever shorter parts and the length of the way between them. Cells are bou
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,6 @@ from hsdsl.analysis.metrics.interval import CERTIFIED, ZERO, Budget, Interval
 from hsdsl.analysis.metrics.points import ModePoints, SpaceMetric
 from hsdsl.analysis.metrics.trace import Cells, Side, merge, names_of, trace
 from hsdsl.analysis.report.json_form import named
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.bernstein import UNIT, bernstein, largest_norm, length
 from hsdsl.engine.execution import Array, Execution

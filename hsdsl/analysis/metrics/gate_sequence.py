@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib import import_module
 from itertools import pairwise
@@ -22,7 +23,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hsdsl.analysis.metrics.geometry import Array, Gate, Passage, Space
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.numbers.bernstein import UNIT
 
 if TYPE_CHECKING:

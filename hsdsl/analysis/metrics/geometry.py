@@ -8,13 +8,13 @@ the point is allowed, so that the polyhedra contain the sets they stand for: low
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64
 from hsdsl.base.numbers.bernstein import UNIT, Array
 from hsdsl.base.numbers.enclosures import ENCLOSED, as_range, hull

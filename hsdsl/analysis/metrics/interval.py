@@ -6,10 +6,9 @@ What is open when the time of a `Budget` is spent stays open, and the interval s
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from math import inf, nan
 from time import monotonic
-
-from hsdsl.base.dataclasses import dataclass, field, replace
 
 CERTIFIED = "certified"
 SAMPLED = "sampled"

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from importlib import import_module
 from itertools import accumulate, pairwise
@@ -27,7 +28,6 @@ from hsdsl.analysis.metrics.geometry import TOLERANCE, Array, CurvedGate, Domain
 from hsdsl.analysis.metrics.guard_clearance import CERTAIN, OUTSIDE, UNDECIDED, segments_inside, to_passages
 from hsdsl.analysis.metrics.interval import CERTIFIED, SAMPLED, SEARCHED, Budget
 from hsdsl.analysis.metrics.search import ROUNDING, End, Indices, Query, SearchResult, search, unchanged
-from hsdsl.base.dataclasses import dataclass, field, replace
 
 MOST_SEQUENCES = 6
 MORE_HOPS = 1  # than the shortest sequence has

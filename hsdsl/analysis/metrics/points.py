@@ -7,6 +7,7 @@ relaxation and a strip has the metric of Def. 15.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -28,7 +29,6 @@ from hsdsl.analysis.metrics.interval import (
 )
 from hsdsl.analysis.metrics.local import Neighbours, Route, search_nonaffine
 from hsdsl.analysis.metrics.search import TOLERANCE, End, Query, SearchResult, search
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_methods
 from hsdsl.engine.execution import Array

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise, takewhile
@@ -35,7 +36,6 @@ from hsdsl.analysis.metrics.gate_sequence import ROUNDS, gate_sequence, norm, on
 from hsdsl.analysis.metrics.geometry import Array, Passage, Space
 from hsdsl.analysis.metrics.guard_clearance import to_entry, to_exit
 from hsdsl.analysis.metrics.interval import Budget
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.numbers.rational import Exact, maximise, never_negative
 
 Indices = NDArray[np.intp]

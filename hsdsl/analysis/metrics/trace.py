@@ -7,11 +7,11 @@ value at the very end, which is a last piece of no length.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.bernstein import UNIT, degree_raised, length, restrict, sizes
 from hsdsl.engine.execution import Array, Execution

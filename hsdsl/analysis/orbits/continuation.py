@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -30,7 +31,6 @@ from hsdsl.analysis.orbits.orbit import LEAST_MARGIN, Orbit, multipliers_of
 from hsdsl.analysis.orbits.section import CLOSED, Closed, NoReturn, Return, gap
 from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import number
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.names import called, checks_methods
 from hsdsl.engine.execution import Array
 from hsdsl.engine.simulate.verdict.run_view import RunView

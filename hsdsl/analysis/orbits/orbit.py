@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from hsdsl.analysis.orbits.section import Closed
 from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import condensed, number, values
 from hsdsl.analysis.sensitivity.result import Sensitivity
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.names import called, checks_methods, seen
 from hsdsl.engine.execution import Array, Execution
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsdsl.analysis.report.json_form import named, plain
 from hsdsl.analysis.report.words import number
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.names import checks_methods
 from hsdsl.engine.execution import Array
 

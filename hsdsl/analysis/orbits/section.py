@@ -9,6 +9,7 @@ no transition moves in time.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,6 @@ import numpy as np
 from hsdsl.analysis.orbits.mathematics import Level
 from hsdsl.analysis.sensitivity.result import Sensitivity
 from hsdsl.analysis.sensitivity.targets import derivative_name, own, shift_name
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.execution import Array, Execution
 

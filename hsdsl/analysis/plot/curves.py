@@ -6,12 +6,12 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import accumulate, groupby, pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import SINCE, checks_methods, did_you_mean, without_memory
 from hsdsl.base.numbers.decimals import number_of

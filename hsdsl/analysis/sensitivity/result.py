@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import groupby
 from typing import Any
@@ -22,7 +23,6 @@ from hsdsl.analysis.sensitivity.targets import (
     still_rate_name,
 )
 from hsdsl.analysis.sensitivity.ties import Tie, landing, parted, ties, touched
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.names import called, checks_methods, seen
 from hsdsl.base.parts import numbered, present, product_name
 from hsdsl.engine.execution import Array, Execution, Samples, Transition, Verdict

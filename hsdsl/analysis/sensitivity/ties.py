@@ -15,13 +15,13 @@ parameters. Where that is not zero, the executions on one side begin beyond the 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hsdsl.analysis.sensitivity.targets import derivative_name, own, shift_name
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.execution import Transition

@@ -14,13 +14,13 @@ import os
 import types
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, fields
 from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from hsdsl.base.dataclasses import asdict, dataclass, fields
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_arguments
 from hsdsl.base.numbers import decimals

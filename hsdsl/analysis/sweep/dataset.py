@@ -13,6 +13,7 @@ import shlex
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -23,7 +24,6 @@ import numpy as np
 from hsdsl.analysis.sweep import manifest as manifests
 from hsdsl.analysis.sweep.manifest import TAG, Manifest, column_of, library, schema
 from hsdsl.base.atomic import replacing
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import WARNINGS, UsageError
 from hsdsl.base.names import INITIAL, called, checks_arguments, checks_methods, counted, did_you_mean, shown, visible
 from hsdsl.base.processes import Lost, in_processes

@@ -35,6 +35,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -43,7 +44,6 @@ import numpy as np
 from hsdsl.analysis.store.table import versions
 from hsdsl.analysis.sweep.variation import Draw, Grid, Variation
 from hsdsl.base.atomic import replacing
-from hsdsl.base.dataclasses import asdict, dataclass, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean, shown
 from hsdsl.base.numbers.arithmetic import TIE

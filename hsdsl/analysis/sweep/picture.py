@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hsdsl.analysis.sweep.manifest import LISTS, Manifest, column_of, schema
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import SINCE, called, did_you_mean, shown
 from hsdsl.engine.execution import Array

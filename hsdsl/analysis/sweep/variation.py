@@ -19,11 +19,11 @@ import math
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import counted, did_you_mean, shown
 from hsdsl.engine.execution import Array

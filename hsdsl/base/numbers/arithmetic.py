@@ -10,11 +10,10 @@ from __future__ import annotations
 import copyreg
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property, partial
 from typing import Any
-
-from hsdsl.base.dataclasses import dataclass
 
 Number = Any  # float or mpmath.mpf, as the arithmetic makes them
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[np.float64]]  # numpy.typing would be imported for its one name
+Array = np.ndarray[tuple[Any, ...], np.dtype[np.float64]]  # numpy.typing would be imported for its one name
 UNIT = 2.0**-53  # round-off of one operation, relative
 
 

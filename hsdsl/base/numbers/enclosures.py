@@ -9,6 +9,7 @@ nowhere negative is nowhere negative.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial, reduce
 from math import isfinite
@@ -17,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import Arithmetic
 from hsdsl.base.numbers.bernstein import Array
 

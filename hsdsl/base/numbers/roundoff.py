@@ -11,13 +11,13 @@ As ``runtime/c/roundoff.c`` does, with the same operations in the same order.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, partial, reduce
 from math import inf, isfinite
 from operator import mul
 from typing import Any
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number, repeated
 
 ROUNDOFF_UNITS = 32  # below so many of the sizes of its terms a surface counts as zero

@@ -10,10 +10,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from math import copysign
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import FLOAT64
 
 _CONSTANT = re.compile(r"q_(m?)(\d+)_(\d+)")

@@ -8,11 +8,11 @@ from __future__ import annotations
 import os
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, checks_methods, visible, without_memory
 from hsdsl.engine.execution.records import COMPLETE, Array, optional, shown

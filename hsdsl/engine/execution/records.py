@@ -6,6 +6,7 @@ Records are frozen dataclasses, with fields that may be made on first use, and e
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import lru_cache
 from importlib import import_module
 from itertools import chain
@@ -14,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast, overload
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field, fields, is_dataclass, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_methods, did_you_mean
 
@@ -296,7 +296,7 @@ class Point:
         return self.state[name] if name in self.state else self.outputs[name]
 
 
-Array = np.ndarray[Any, np.dtype[Any]]
+Array = np.ndarray[tuple[Any, ...], np.dtype[Any]]
 
 # The first three columns of every table; a state or output of such a name is labelled `state.j`, `output.j`.
 HYBRID_TIME = ("time", "mode", "j")

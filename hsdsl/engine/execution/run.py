@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -14,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field, fields, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_methods, visible, without_memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, TIE

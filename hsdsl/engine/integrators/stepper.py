@@ -8,11 +8,11 @@ here too; how each steps is in a module that its run imports.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar, Literal
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
 from hsdsl.engine.integrators.tableau import ButcherTableau

@@ -10,6 +10,7 @@ without their zeros, as programs in other languages take it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from functools import cache
@@ -17,7 +18,6 @@ from itertools import combinations_with_replacement
 from math import lcm, prod
 from typing import Any, ClassVar, Literal, NamedTuple
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import FLOAT64, Arithmetic, Number
 
 Vector = tuple[Fraction, ...]

@@ -9,10 +9,10 @@ high-order Taylor methods, Experimental Mathematics 14, 2005 (doi:10.1080/105864
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import ceil
 from typing import ClassVar, Literal
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, NOTHING, Arithmetic, Number
 from hsdsl.engine.integrators.stepper import Flow, Polynomial, Stages, State, Stepper, root
 from hsdsl.engine.kernel import Taylor

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, cast
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.defaults import COMPLETIONS, DEFAULT_TOLERANCE, DEFAULTS, SCHEMES, SETTINGS
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.names import closest, did_you_mean

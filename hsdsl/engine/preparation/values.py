@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import partial
 from itertools import repeat
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Arithmetic, Number, multiprecision
 from hsdsl.base.numbers.columns import COLUMNS, Column, varies

@@ -6,11 +6,11 @@ import os
 import shutil
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 from hsdsl.base import limits
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.names import shown
 
 NAMES = ("cc", "gcc", "clang")

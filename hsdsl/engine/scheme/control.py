@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from hsdsl.base.dataclasses import dataclass
+from dataclasses import dataclass
+
 from hsdsl.base.numbers.arithmetic import NOTHING, Number
 from hsdsl.engine.scheme.primitives import Count, Time, Vector, inline
 

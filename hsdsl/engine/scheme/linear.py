@@ -9,7 +9,8 @@ vary with the states: a solution is one of the states, then one for each column.
 
 from __future__ import annotations
 
-from hsdsl.base.dataclasses import dataclass
+from dataclasses import dataclass
+
 from hsdsl.base.graphs import Elimination, Variation
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.primitives import IndexRoom, Indices, Room, Vector, inline

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from hsdsl.base.dataclasses import dataclass
+from dataclasses import dataclass
+
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.linear import Blocks, Factors, solve_all, solve_all_complex
 from hsdsl.engine.scheme.primitives import (

@@ -5,7 +5,8 @@ See hsdsl/engine/simulate/stalls.py and transitions.py there.
 
 from __future__ import annotations
 
-from hsdsl.base.dataclasses import dataclass
+from dataclasses import dataclass
+
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.scheme.primitives import Count, Here, Room, Time, Vector, flow_between, inline
 

@@ -7,11 +7,11 @@ each with the same bits, and what is of a model: its routines, and records that 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import reduce
 from operator import add
 from typing import Any, TypeVar
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import Number
 
 Time = Number  # an instant: of 64 bits also where numbers have 32

@@ -15,12 +15,12 @@ import ast
 import io
 import tokenize
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from itertools import takewhile
 from pathlib import Path
 from textwrap import fill, indent
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.engine.backends.printer import C_OPERATORS
 
 FOLDER = Path(__file__).parent

@@ -5,7 +5,8 @@ An interval is halved until the signs of the Bernstein coefficients show one roo
 
 from __future__ import annotations
 
-from hsdsl.base.dataclasses import dataclass
+from dataclasses import dataclass
+
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.polynomials import ROUNDING, split, value_and_slope, value_at_end, value_of
 from hsdsl.engine.scheme.primitives import Room, Vector, fill_bernstein, inline, largest_of, least_of

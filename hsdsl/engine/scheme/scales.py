@@ -9,7 +9,8 @@ round-off of this, and no more than a thirty-second.
 
 from __future__ import annotations
 
-from hsdsl.base.dataclasses import dataclass
+from dataclasses import dataclass
+
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.scheme.primitives import (
     Here,

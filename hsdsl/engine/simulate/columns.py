@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
 from struct import Struct
 from threading import RLock
@@ -11,7 +12,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.engine.execution import Array
 from hsdsl.engine.runtime import structures
 from hsdsl.mathematics.program import Program

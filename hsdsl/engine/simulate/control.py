@@ -25,11 +25,11 @@ evaluated only where a step would be rejected for the second time.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from math import nan
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Literal
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.engine.integrators.stepper import State, Stepper, make_resolved
 from hsdsl.engine.scheme import control as text

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.engine.execution import REASONS, Array
 from hsdsl.engine.runtime import structures
 from hsdsl.engine.runtime.kernel import runtime

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, TIE, Number
 from hsdsl.base.samples import in_order

@@ -57,15 +57,17 @@ def flow(run: Run, here: ModeState) -> Event | ModeState | Stop:
 def leads_out(run: Run, here: ModeState) -> Event | None:
     """The transition where the flow leads out at once, through a guard that the state stands on, to round-off.
 
-    It has stood there since the mode was entered. A step would find it at its start; a series takes long, and knows
-    nothing of steps before.
+    It has stood there since the mode was entered, and reaches the guard at this instant: much round-off in the state is
+    no reason to be on a guard. A step would find it at its start; a series takes long, and knows nothing of earlier
+    steps.
     """
     method, surfaces, t, x, zero = run.settings.method, here.surfaces, here.t, here.x, run.arithmetic.zero
     if method is None or not method.is_series or not surfaces.active:
         return None
     others = set(range(len(here.mode.edges))) - surfaces.active
     for k in surfaces.standing(t, x, run.tie(t), known=others):
-        if abs(here.kernel.surfaces(t, *x)[k]) <= surfaces.roundoff_bound(k, t, x):
+        r, rate = here.kernel.surfaces(t, *x)[k], here.kernel.rates[k](t, *x)[0]
+        if abs(r) <= surfaces.roundoff_bound(k, t, x) and -r <= rate * run.tie(t):
             chosen, alternatives = choose(here, [Crossing(k, zero, t, x, zero)], run)
             return Event(chosen, alternatives, t, sizes(x, x, here, stands(here, chosen)))
     return None

@@ -6,9 +6,9 @@ They are made by a Runge-Kutta or implicit method (`TableSteps`), or by Taylor's
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.integrators.radau import NoConvergence
 from hsdsl.engine.integrators.stepper import Polynomial, Stages, State

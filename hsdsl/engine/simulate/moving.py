@@ -19,11 +19,11 @@ of a state counts: less is in the last digits of every step.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.base.numbers.roundoff import exactly, following, moved
 from hsdsl.engine.execution import Execution

@@ -14,8 +14,8 @@ positions: central in flight, one-sided at an impact (a rebound takes two steps)
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.stepper import State

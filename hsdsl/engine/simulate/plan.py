@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.engine.execution import Array, Execution, Stop
 from hsdsl.engine.integrators import METHODS
 from hsdsl.engine.runtime import structures

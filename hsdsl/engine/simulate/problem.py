@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.names import nth_memory
 from hsdsl.base.numbers.arithmetic import TIE, Arithmetic, Number
 from hsdsl.engine.integrators.stepper import State

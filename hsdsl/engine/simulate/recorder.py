@@ -6,13 +6,13 @@ The loop appends to plain lists; a run that is interrupted at any moment still c
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
 from hsdsl.engine.execution import Arc, Array, Transition
 from hsdsl.engine.integrators.stepper import Polynomial, State

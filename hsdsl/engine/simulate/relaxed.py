@@ -8,9 +8,9 @@ is located on the flow, only on the step's own interpolant (`Trial`).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cached_property, partial
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.radau import NoConvergence

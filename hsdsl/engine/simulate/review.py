@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import Number
 
 FIRST = 2048  # rows

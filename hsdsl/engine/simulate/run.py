@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.numbers.arithmetic import Number
 from hsdsl.engine.execution import Stop, Transition
 from hsdsl.engine.integrators.stepper import Derivatives, State, Stepper, stepper

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cache, reduce
 from operator import add
 from typing import Any
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.limits import DEFAULT
 from hsdsl.base.numbers.arithmetic import Arithmetic, Number
 from hsdsl.engine.integrators import Method

@@ -10,9 +10,9 @@ The compiled loop returns codes: `add_note` and `stop` give its notes and stops 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from math import nan
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.stepper import State

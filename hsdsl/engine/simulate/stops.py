@@ -7,10 +7,10 @@ reported first, as warnings: one for each kind of thing and what it is about.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.defaults import MOST_WAITING
 from hsdsl.base.names import without_memory
 from hsdsl.base.numbers.arithmetic import Number

@@ -16,10 +16,10 @@ The Bernstein polynomial basis: a centennial retrospective, Computer Aided Geome
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import comb
 from typing import TYPE_CHECKING
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Arithmetic, Number
 from hsdsl.base.numbers.roundoff import ROUNDOFF_UNITS
 from hsdsl.engine.integrators.stepper import Polynomial, State

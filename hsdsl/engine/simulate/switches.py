@@ -10,6 +10,7 @@ argument touches a level to round-off, which counts as no change, or has no valu
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil, floor
 from typing import Any
@@ -17,7 +18,6 @@ from typing import Any
 import numpy as np
 
 from hsdsl.base import limits
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.base.numbers.enclosures import Range, as_range

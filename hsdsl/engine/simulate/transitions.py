@@ -17,9 +17,9 @@ its time says, the first was made, or all were dropped.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, Number
 from hsdsl.engine.execution import Stop
 from hsdsl.engine.integrators.stepper import State

@@ -9,13 +9,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.arithmetic import FLOAT64
 from hsdsl.base.parts import numbered
 from hsdsl.engine.backends.c.routine import literal

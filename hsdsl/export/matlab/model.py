@@ -8,9 +8,9 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.names import visible
 from hsdsl.base.parts import layout_of
 from hsdsl.engine.backends.c.source import width

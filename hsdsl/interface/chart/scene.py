@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -11,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsdsl.analysis.exact import precise, reference, start_of
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import did_you_mean
 from hsdsl.engine.execution import Array, Execution

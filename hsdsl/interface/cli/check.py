@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +11,6 @@ from typer import Argument, Exit, Option
 
 import hsdsl
 from hsdsl import __version__
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import Diagnostic, ModelError, UsageError
 from hsdsl.base.names import counted, did_you_mean, visible
 from hsdsl.base.parts import written_edges, written_modes

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 from hsdsl.analysis.sensitivity.result import Sensitivity, Setting
 from hsdsl.analysis.sensitivity.targets import ERROR, SPAN, UNIT, Target, listed, targets
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.defaults import DEFAULT_TOLERANCE
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import INITIAL

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from math import inf
@@ -23,7 +24,6 @@ from hsdsl.analysis.metrics.points import distance as shortest
 from hsdsl.analysis.metrics.space import make_space
 from hsdsl.analysis.metrics.table import CURVE_METRICS, POINT_METRICS, between, check_same_model
 from hsdsl.analysis.orbits.sampling import OrbitalStability, directions, sampled
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.defaults import DEFAULTS, least_relaxation
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import called, checks_arguments, did_you_mean

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
-from hsdsl.base.dataclasses import asdict, dataclass
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import checks_methods
 from hsdsl.base.numbers.arithmetic import TIE, Number

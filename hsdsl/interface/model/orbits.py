@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,7 +23,6 @@ from hsdsl.analysis.orbits.section import (
     without_noise,
 )
 from hsdsl.analysis.sensitivity.result import Sensitivity
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import counted, did_you_mean, without_memory
 from hsdsl.base.numbers.arithmetic import TIE

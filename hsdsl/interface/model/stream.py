@@ -6,13 +6,13 @@ import io
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hsdsl.analysis.store.table import forget_sidecar, write_csv
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import UsageError
 from hsdsl.base.names import without_memory
 from hsdsl.engine.execution import Array, RunWarning, Samples, Stop

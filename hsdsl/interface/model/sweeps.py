@@ -7,6 +7,7 @@ import re
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -17,7 +18,6 @@ from hsdsl.analysis.sweep import Recording, Sweep, variation
 from hsdsl.analysis.sweep import manifest as manifests
 from hsdsl.analysis.sweep.dataset import Run, damaged, encoded, run_here, write_chunk
 from hsdsl.analysis.sweep.manifest import Manifest, library, refused, table
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.errors import UsageError
 from hsdsl.base.limits import cores
 from hsdsl.base.names import INITIAL, without_memory

@@ -7,10 +7,10 @@ A scalar is parsed, looked up and translated, with every fault at its place in t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import Findings
 from hsdsl.base.names import SINCE, closest, shown
 from hsdsl.base.parts import Part

@@ -7,11 +7,11 @@ A condition of an event is comparisons with their surfaces, joined by `and` and 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import sympy as sp
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.functions import absolute, below
 from hsdsl.base.names import shown
 from hsdsl.language.expression import symbolic

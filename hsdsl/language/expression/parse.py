@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.names import LOOKALIKES, normalised, shown
 from hsdsl.language.expression.timebox import deep_stack
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 from collections import ChainMap
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import sympy as sp
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.functions import CONSTANTS, FUNCTIONS
 from hsdsl.base.names import SINCE, WORDS, did_you_mean, shown
 from hsdsl.language.expression.parse import Call, ExpressionError, Name, Number, Product, Tree, explained, walk

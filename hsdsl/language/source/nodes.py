@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Literal
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import Diagnostic, Span
 
 BREAK = re.compile("\r\n|\r|\n")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, NoReturn
 from xml.parsers import expat
 
 from hsdsl.base import limits
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import Diagnostic, ModelError, Span
 from hsdsl.base.names import shown
 from hsdsl.language.source.compose import decode

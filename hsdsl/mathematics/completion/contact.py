@@ -12,6 +12,7 @@ the rate of the guard is positive (M2), which decides that of what is zero at re
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import takewhile
 from typing import Any
@@ -19,7 +20,6 @@ from typing import Any
 import sympy as sp
 from sympy.core.relational import Relational
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.functions import absolute, maximum, minimum, power, renamed, rewritten, sign
 from hsdsl.base.names import memory, without_memory
 from hsdsl.language.expression.algebra import Shape, derivative, lie_derivative

@@ -12,6 +12,7 @@ for all its questions, after which only exact reasoning goes on.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import reduce
 from math import inf
@@ -19,7 +20,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import Decided
 from hsdsl.base.functions import replaced
 from hsdsl.mathematics.decisions.polynomial import (

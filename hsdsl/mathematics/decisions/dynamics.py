@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 import sympy as sp
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import Decided
 from hsdsl.base.functions import absolute, maximum, minimum, replaced
 from hsdsl.language.expression.algebra import derivative, lie_derivative

@@ -8,13 +8,13 @@ a jump or a value that may be 0 decides, nothing is known.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from math import inf, perm
 from typing import Any
 
 import numpy as np
 import sympy as sp
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.language.expression.scope import symbol
 from hsdsl.language.system import TIME, Edge, Mode
 from hsdsl.mathematics.decisions.decide import MOST_PARTS

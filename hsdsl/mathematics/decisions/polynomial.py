@@ -11,13 +11,12 @@ stays a product.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
 import sympy as sp
-
-from hsdsl.base.dataclasses import dataclass
 
 Monomial = tuple[tuple["Atom", int], ...]
 UNIT: Monomial = ()

@@ -12,6 +12,7 @@ there is no point; when they get too many, nothing is known.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import lru_cache
 from math import inf
@@ -23,7 +24,6 @@ import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.errors import Decided
 from hsdsl.base.functions import FUNCTIONS
 from hsdsl.base.numbers.arithmetic import FLOAT64

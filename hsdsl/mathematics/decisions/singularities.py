@@ -9,13 +9,13 @@ kink.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple
 
 import sympy as sp
 
 from hsdsl.base import functions
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.graphs import closure
 from hsdsl.mathematics.decisions.decide import MOST_PARTS
 from hsdsl.mathematics.decisions.dynamics import Clause, Dynamics

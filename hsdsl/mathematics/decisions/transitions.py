@@ -18,10 +18,10 @@ instant; where all orders lead to the same point the choice does not matter. Her
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.errors import Decided
 from hsdsl.base.functions import replaced
 from hsdsl.language.expression.scope import symbol

@@ -10,11 +10,11 @@ boundary at each of the times, and an expression on either side of it has deriva
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import sympy as sp
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.functions import absolute, atan2, floor, maximum, minimum, replaced, rewritten, sign
 from hsdsl.language.expression.algebra import by_constants
 from hsdsl.language.expression.scope import symbol

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from hsdsl.analysis.lint.finding import Alike, Finding, Severity
 from hsdsl.analysis.lint.source_expressions import SourceExpression
 from hsdsl.analysis.lint.subject import EdgePart, ModePart, Subject
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.names import shown
 from hsdsl.language.expression.plain import text_of
 from hsdsl.language.expression.scope import symbol

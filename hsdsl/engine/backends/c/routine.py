@@ -10,10 +10,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from textwrap import dedent
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.engine.backends.printer import C_OPERATORS, Language, number_text, stored
 
 _FUNCTION = """\

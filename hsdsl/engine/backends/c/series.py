@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.engine.backends.c.routine import LARGE, Assignment, expression, pieces
 from hsdsl.engine.backends.taylor import TapeLanguage, coefficient_of, value_of
 from hsdsl.mathematics.program import Tape

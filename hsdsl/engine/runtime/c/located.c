@@ -258,7 +258,8 @@ static int leads_out(hs_run *run) {
       break;
     known = 1;
     const hs_real noise = bound_from(run, run->surfaces.magnitudes, k, t, run->x, 0);
-    if (!(fabs(run->surfaces.values[k]) <= noise) || !stands_on(run, k, t, run->x, tie(t))) continue;
+    const hs_real r = run->surfaces.values[k]; /* much round-off in the state is no reason to be on a guard */
+    if (!(fabs(r) <= noise && -r <= rate * tie(t)) || !stands_on(run, k, t, run->x, tie(t))) continue;
     first->edge = k;
     first->theta = first->depth = 0.0;
     first->time = t;

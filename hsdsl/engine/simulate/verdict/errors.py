@@ -15,13 +15,13 @@ both beside their values.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import copysign
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.names import remembered_state
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Number
 from hsdsl.base.numbers.bernstein import Array

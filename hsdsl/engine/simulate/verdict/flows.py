@@ -17,6 +17,7 @@ Each function has its series around the middle of a part, with a bound of what f
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from functools import partial, reduce
 from typing import Any
@@ -24,7 +25,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.numbers.arithmetic import NOTHING, Arithmetic, repeated
 from hsdsl.base.numbers.bernstein import Array, around_middle
 from hsdsl.base.numbers.enclosures import CONTINUOUS, ENCLOSED, Range, as_range, square

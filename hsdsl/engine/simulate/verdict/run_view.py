@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import groupby
 from math import inf, isfinite
@@ -14,7 +15,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.names import remembered_state, without_memory
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS, FLOAT64, Arithmetic, Number
 from hsdsl.base.numbers.bernstein import Array

@@ -39,13 +39,13 @@ oscillation of one radian a step to 1e-4.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cache, cached_property
 from math import comb, factorial, isfinite, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.numbers.arithmetic import DOMAIN_ERRORS
 from hsdsl.base.numbers.bernstein import Array
 from hsdsl.engine.execution import Arc, Execution, Transition

@@ -7,12 +7,12 @@ Routines over interval arithmetic then enclose what a surface or the flow is any
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.numbers.bernstein import Array, from_powers, halving
 from hsdsl.base.numbers.enclosures import Range, as_range
 from hsdsl.engine.kernel import ModeKernel

@@ -11,6 +11,7 @@ eigenvalue lambda of the flow that does not grow.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from math import inf, isfinite, nan
@@ -19,7 +20,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hsdsl.analysis.exact import reference
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.defaults import NUMERICAL
 from hsdsl.base.errors import UsageError
 from hsdsl.engine.execution import Array, Execution

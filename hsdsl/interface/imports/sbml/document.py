@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from hsdsl.base import limits
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.names import shown
 from hsdsl.language.source.xml import Element
 

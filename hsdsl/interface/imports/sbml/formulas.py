@@ -6,10 +6,10 @@ import math
 import operator
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
 
-from hsdsl.base.dataclasses import dataclass
 from hsdsl.base.names import SINCE
 from hsdsl.interface.imports.sbml.document import (
     Lambda,

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, TypeVar
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import Diagnostic, ModelError
 from hsdsl.base.names import closest, shown
 from hsdsl.language.expression import plain

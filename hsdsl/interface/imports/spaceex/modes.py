@@ -11,9 +11,9 @@ what differs otherwise is a comment or a refusal.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import Findings
 from hsdsl.base.functions import replaced
 from hsdsl.base.names import shown

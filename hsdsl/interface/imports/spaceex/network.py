@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from itertools import islice, product
 
 from hsdsl.base import limits
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.names import closest, shown
 from hsdsl.interface.imports.spaceex.document import (
     BOUNDED,

@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from itertools import islice, product
 from typing import Any
 
 from hsdsl.base import limits
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.errors import ModelError, UsageError
 from hsdsl.base.functions import replaced
 from hsdsl.base.names import closest, did_you_mean, shown

@@ -7,10 +7,10 @@ States have the first that waits; where several can, `hsdsl.engine.simulate.tran
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
 
-from hsdsl.base.dataclasses import dataclass, replace
 from hsdsl.base.functions import below, maximum, replaced
 from hsdsl.base.names import memory
 from hsdsl.language.expression.algebra import either, is_mode, select, total, whole

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.names import SINCE, did_you_mean, shown
 from hsdsl.base.parts import numbered
 from hsdsl.language.elaborate.modes import NOWHERE, edge_names, event_of, of_events, surface

@@ -6,9 +6,9 @@ An automaton may be in a file of its own. Every node knows its own text, so faul
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from functools import cached_property
 
-from hsdsl.base.dataclasses import dataclass, field
 from hsdsl.base.names import closest, did_you_mean, shown
 from hsdsl.base.parts import Part
 from hsdsl.language.elaborate.symbols import KINDS, SymbolTable

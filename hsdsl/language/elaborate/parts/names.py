@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence, Set
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property, lru_cache
 from typing import Any
 
-from hsdsl.base.dataclasses import dataclass, field, replace
 from hsdsl.base.names import SINCE, counted, did_you_mean, shown
 from hsdsl.language.elaborate.definitions import placeholders, solutions, with_solutions
 from hsdsl.language.elaborate.parts.instances import Instance, Roster
