@@ -91,7 +91,7 @@ def unlikely(counts: list[int], expected: float) -> bool:
 @pytest.mark.parametrize("old", [False, True], ids=["values of the execution", "values of the trigger"])
 @pytest.mark.parametrize("count", [2, 3, 5])
 def test_each_of_tied_events_is_as_likely_whatever_went_before(count: int, old: bool) -> None:
-    """One in `count`, and so behind each of the others; neighbours in the file and in time have nothing in common."""
+    """One in `count`, and so after each of the others; neighbours in the file and in time have nothing in common."""
     made = winners(text_of(*rivals(count, old=old), until=1500.5))
     assert len(made) == 1500
     single = Counter(made)

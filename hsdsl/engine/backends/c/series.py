@@ -167,17 +167,17 @@ def _nested(
     def name(line: int) -> str:
         return f"({texts[line]})" if line in inside else place.format(line)
 
-    def behind(lines: Iterable[int], i: int) -> set[int]:
+    def beyond(lines: Iterable[int], i: int) -> set[int]:
         return set[int]().union(
             *(needs[j] if j in inside else {places[j]} for j in lines if j in inside or (j in places and j < i))
         )
 
     for i, text in each(tape, own, first, name):
-        texts[i], needs[i] = text, behind(tape.operations[i - first].lines, i)
+        texts[i], needs[i] = text, beyond(tape.operations[i - first].lines, i)
     found = [Assignment(f"l{i}[k]", texts[i], needs[i]) for i in places]
     for i in states:
         line = tape.flow[i - 1]
-        found.append(Assignment(f"l{i}[k + 1]", f"{name(line)} * hs_inverse[k + 1]", behind([line], own.stop)))
+        found.append(Assignment(f"l{i}[k + 1]", f"{name(line)} * hs_inverse[k + 1]", beyond([line], own.stop)))
     return found
 
 

@@ -96,7 +96,7 @@ class Order:
             yield from (f"{of} {how}: {some}" for _ in names[:1])
 
     def resets(self) -> list[dict[str, Any]]:
-        """The event that draws anew behind executions whose values are older than they."""
+        """The event that draws anew after executions whose values are older than they."""
         if not self._waits:
             return []
         reset = {self.draw: self.drawn_anew, self.drawn: "0"}
